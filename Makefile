@@ -1,0 +1,37 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test quick check clean
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(VENV)/ready: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@
+
+demo: $(VENV)/ready ## set everything up and solve the paper's Section 4.1
+	$(BIN)/screwsynth solve paper-4.1-helical
+
+test: $(VENV)/ready ## set everything up and run every test
+	$(BIN)/python -P -m pytest --numprocesses auto
+
+quick: $(VENV)/ready ## the fast tests only
+	$(BIN)/python -P -m pytest --numprocesses auto -m 'not slow'
+
+# Type checkers cannot follow the editable install's hook, so they get the folders under the package's name.
+build/typing/screwsynth:
+	mkdir -p $@
+	ln -sfn ../../../models ../../../nlp ../../../cases $@
+
+check: $(VENV)/ready build/typing/screwsynth ## formatting, lint, types and import order
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+clean: ## remove the environment and everything built
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

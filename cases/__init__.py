@@ -1,0 +1,1 @@
+"""Case files that come with the package: the paper's examples and starting points for designs."""

@@ -1,0 +1,80 @@
+"""Symbolic robots and the screw algebra they are written in."""
+
+from screwsynth.models.arrays import FloatArray, frozen_array
+from screwsynth.models.catalog import RobotFunction, model_names, robot_function
+from screwsynth.models.hexapod import hexapod
+from screwsynth.models.legs import Leg, LeggedPlatform, legged_platform
+from screwsynth.models.model import (
+    Body,
+    Closure,
+    Dimension,
+    Link,
+    Model,
+    ModelError,
+    Parameter,
+    Point,
+    PoseSymbols,
+    Quantity,
+    Scene,
+    Unknown,
+    Wrench,
+    WrenchKind,
+    component_names,
+    couple_about,
+    force_along,
+)
+from screwsynth.models.rotation import (
+    axis_angle_from_matrix,
+    matrix_from_axis_angle,
+    matrix_from_cayley,
+    matrix_from_quaternion_vector,
+)
+from screwsynth.models.screws import (
+    Screw,
+    axis_from_screw,
+    line_through,
+    moved_screw,
+    reciprocal_product,
+    screw_from_axis,
+)
+from screwsynth.models.stewart_gough import stewart_gough
+
+__all__ = [
+    "Body",
+    "Closure",
+    "Dimension",
+    "FloatArray",
+    "Leg",
+    "LeggedPlatform",
+    "Link",
+    "Model",
+    "ModelError",
+    "Parameter",
+    "Point",
+    "PoseSymbols",
+    "Quantity",
+    "RobotFunction",
+    "Scene",
+    "Screw",
+    "Unknown",
+    "Wrench",
+    "WrenchKind",
+    "axis_angle_from_matrix",
+    "axis_from_screw",
+    "component_names",
+    "couple_about",
+    "force_along",
+    "frozen_array",
+    "hexapod",
+    "legged_platform",
+    "line_through",
+    "matrix_from_axis_angle",
+    "matrix_from_cayley",
+    "matrix_from_quaternion_vector",
+    "model_names",
+    "moved_screw",
+    "reciprocal_product",
+    "robot_function",
+    "screw_from_axis",
+    "stewart_gough",
+]

@@ -1,0 +1,27 @@
+"""The numeric array type of the package, and read-only arrays for frozen values."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+
+def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """Return a read-only copy of ``values`` as float64.
+
+    Args:
+        values: numbers that can be arranged as an array.
+        shape: the shape that the array must have.
+
+    Raises:
+        ValueError: the shape is another one.
+    """
+    array = np.array(values, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,86 @@
+"""What platforms on extensible legs share: rows, measures and drawing, from their joint centres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import SX
+
+from screwsynth.models.model import Body, Dimension, Link, Point, PoseSymbols, Quantity, Scene, Wrench, force_along
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A leg between two spherical (or universal) joints, driven along its own axis.
+
+    Attributes:
+        name: the limb's name.
+        base: (3, 1) centre of its base joint in the world frame, length.
+        platform: (3, 1) centre of its platform joint in the platform frame, length.
+    """
+
+    name: str
+    base: SX
+    platform: SX
+
+
+@dataclass(frozen=True, eq=False)
+class LeggedPlatform:
+    """Rows, measures and drawing of legs between a base and a platform."""
+
+    wrenches: tuple[Wrench, ...]
+    quantities: tuple[Quantity, ...]
+    scene: Scene
+
+
+def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
+    """Assemble the legs at a pose.
+
+    With ``d = p + R a - b`` from base joint ``b`` to platform joint ``a``, the row of a leg is the unit force along
+    ``d`` through ``b`` (equation 10), and its work rate in a twist is the rate of change of the leg's length.
+
+    Args:
+        legs: at least one, in drawing order around the plates.
+        pose: symbols of the platform's pose.
+    """
+    R, p = pose.rotation, pose.position
+    names = tuple(leg.name for leg in legs)
+    ends = [p + R @ leg.platform for leg in legs]
+    spans = [end - leg.base for end, leg in zip(ends, legs, strict=True)]
+    lengths = [ca.norm_2(span) for span in spans]
+    base_cosines = [span[2] / length for span, length in zip(spans, lengths, strict=True)]
+    platform_cosines = [ca.dot(R[:, 2], span) / length for span, length in zip(spans, lengths, strict=True)]
+    return LeggedPlatform(
+        wrenches=tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True)),
+        quantities=(
+            Quantity("leg_length", names, ca.vertcat(*lengths), Dimension.LENGTH, "distance between a leg's joints"),
+            Quantity(
+                "base_joint_angle",
+                names,
+                ca.acos(ca.vertcat(*base_cosines)),
+                Dimension.ANGLE,
+                "angle between a leg and the base's normal",
+            ),
+            Quantity(
+                "platform_joint_angle",
+                names,
+                ca.acos(ca.vertcat(*platform_cosines)),
+                Dimension.ANGLE,
+                "angle between a leg and the platform's normal",
+            ),
+        ),
+        scene=_scene(legs, ends, pose),
+    )
+
+
+def _scene(legs: Sequence[Leg], ends: Sequence[SX], pose: PoseSymbols) -> Scene:
+    base = [Point(f"B{leg.name}", leg.base, Body.BASE) for leg in legs]
+    platform = [Point(f"A{leg.name}", end, Body.PLATFORM) for leg, end in zip(legs, ends, strict=True)]
+    origin = Point("P", pose.position, Body.PLATFORM)
+    links = [Link(b.name, a.name, Body.LIMB, leg.name) for leg, b, a in zip(legs, base, platform, strict=True)]
+    for outline in (base, platform):
+        following = outline[1:] + outline[:1]
+        links += [Link(one.name, next_.name, one.body) for one, next_ in zip(outline, following, strict=True)]
+    return Scene((*base, *platform, origin), tuple(links))

@@ -1,0 +1,331 @@
+"""What a robot function returns: a :class:`Model`, frozen and checked once.
+
+A model is symbolic throughout. It says which unit wrenches the robot's limbs apply to the platform, as expressions of
+its parameters, of the pose and, for robots given joint by joint, of internal unknowns that closure equations tie down.
+It knows no values, bounds, tasks or solvers; those come from a case.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import casadi as ca
+from casadi import SX
+
+_AXES = ("x", "y", "z")
+
+
+class ModelError(ValueError):
+    """A robot function built a model that contradicts itself; the message names the robot and the fault."""
+
+
+class Dimension(enum.Enum):
+    """What a number measures, and so which unit of a case it is in."""
+
+    LENGTH = "length"
+    ANGLE = "angle"
+    NUMBER = "number"
+
+
+class WrenchKind(enum.Enum):
+    """What a limb applies to the platform along one row of the Jacobian."""
+
+    FORCE = "force"
+    COUPLE = "couple"
+
+
+def component_names(name: str, size: int) -> tuple[str, ...]:
+    """Names of the scalars of a quantity: itself when it is one, ``name_x, name_y, name_z`` for a vector."""
+    return (name,) if size == 1 else tuple(f"{name}_{axis}" for axis in _AXES[:size])
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """A dimension of the robot that a case fixes or frees.
+
+    Attributes:
+        name: the name in case files.
+        symbol: (1, 1) or (3, 1) CasADi symbol.
+        dimension: what it measures; angles are radians inside.
+        description: a few words for people.
+        typical: a sensible value for each component, in some length unit and radians: what a starter case begins with.
+        lower, upper: the values for which the robot exists, ends included.
+    """
+
+    name: str
+    symbol: SX
+    dimension: Dimension
+    description: str
+    typical: tuple[float, ...]
+    lower: float = -float("inf")
+    upper: float = float("inf")
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Name of each scalar."""
+        return component_names(self.name, self.symbol.numel())
+
+
+@dataclass(frozen=True, eq=False)
+class Unknown:
+    """An internal unknown, such as a passive joint's position, that the closure equations determine.
+
+    Attributes:
+        name: unique within the model.
+        symbol: (1, 1) CasADi symbol.
+        dimension: what it measures; angles are radians.
+        description: a few words for people.
+        lower, upper: finite range in which the assembly is looked for.
+    """
+
+    name: str
+    symbol: SX
+    dimension: Dimension
+    description: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """An equation that the robot's loops impose: ``expression == 0``."""
+
+    name: str
+    expression: SX
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSymbols:
+    """Pose of the platform in the world frame (equation 8).
+
+    Attributes:
+        rotation: (3, 3) matrix of symbols ``R``: platform to world coordinates.
+        position: (3, 1) symbols ``p``: origin of the platform frame, length.
+    """
+
+    rotation: SX = field(default_factory=lambda: SX.sym("R", 3, 3))
+    position: SX = field(default_factory=lambda: SX.sym("p", 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """One row of the Jacobian: the wrench that a limb applies to the platform, before it is made a unit wrench.
+
+    The unit wrench is ``(force, moment) / sqrt(square)``. Rows are kept in this form because
+    ``(m . omega + f . v)^2 / square`` is smoother and has a tighter interval enclosure than the product of unit
+    vectors.
+
+    Attributes:
+        limb: name of the limb that applies it.
+        kind: a force along a line, or a constraint couple.
+        force: (3, 1) in world coordinates; zero for a couple.
+        moment: (3, 1) about the world origin; the direction of the couple for a couple.
+        square: (1, 1) squared length of ``force``, or of ``moment`` for a couple.
+    """
+
+    limb: str
+    kind: WrenchKind
+    force: SX
+    moment: SX
+    square: SX
+
+    def rate(self, twist: SX) -> SX:
+        """Reciprocal product ``m . omega + f . v`` with a (6, 1) twist, not yet divided by ``sqrt(square)``."""
+        return ca.dot(self.moment, twist[:3]) + ca.dot(self.force, twist[3:])
+
+
+def force_along(limb: str, point: SX, direction: SX) -> Wrench:
+    """Row of a limb that pushes the platform along a line.
+
+    Args:
+        limb: name of the limb.
+        point: (3, 1) any point of the line in the world frame, length.
+        direction: (3, 1) along the line towards the platform, of any length but zero.
+    """
+    return Wrench(limb, WrenchKind.FORCE, direction, ca.cross(point, direction), ca.sumsqr(direction))
+
+
+def couple_about(limb: str, direction: SX) -> Wrench:
+    """Row of a limb that keeps the platform from turning about a direction.
+
+    Args:
+        limb: name of the limb.
+        direction: (3, 1) in world coordinates, of any length but zero.
+    """
+    return Wrench(limb, WrenchKind.COUPLE, SX.zeros(3), direction, ca.sumsqr(direction))
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A named measure of the robot, one number for each limb or joint, that limits may bound.
+
+    Attributes:
+        name: the name in results and limits, such as ``leg_length``.
+        owners: what each number belongs to, in order.
+        values: (n, 1) expressions.
+        dimension: what they measure.
+        description: a few words for people.
+    """
+
+    name: str
+    owners: tuple[str, ...]
+    values: SX
+    dimension: Dimension
+    description: str
+
+
+class Body(enum.Enum):
+    """What a point of the drawing moves with."""
+
+    BASE = "base"
+    PLATFORM = "platform"
+    LIMB = "limb"
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A named point of the drawing: (3, 1) world coordinates, length."""
+
+    name: str
+    position: SX
+    body: Body
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A straight line of the drawing between two named points; ``limb`` names the limb it is part of, if any."""
+
+    start: str
+    end: str
+    body: Body
+    limb: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The robot as points and straight links, enough for a picture in true proportion."""
+
+    points: tuple[Point, ...]
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A parallel robot, symbolically.
+
+    Attributes:
+        name: the name in case files.
+        description: one sentence for people.
+        options: the options that the robot function was called with.
+        parameters: dimensions that a case fixes or frees.
+        pose: symbols of the platform's pose.
+        home: (3,) a sensible platform position beside the parameters' typical values.
+        wrenches: the rows of the Jacobian, any number of them.
+        quantities: named measures for results and limits.
+        scene: the drawing.
+        unknowns: internal unknowns, none for robots whose rows follow from parameters and pose.
+        closure: as many equations as it takes to determine the unknowns.
+
+    Raises:
+        ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
+            or a drawing refers to a point or limb that does not exist.
+    """
+
+    name: str
+    description: str
+    parameters: tuple[Parameter, ...]
+    pose: PoseSymbols
+    home: tuple[float, float, float]
+    wrenches: tuple[Wrench, ...]
+    quantities: tuple[Quantity, ...] = ()
+    scene: Scene = Scene((), ())
+    unknowns: tuple[Unknown, ...] = ()
+    closure: tuple[Closure, ...] = ()
+    options: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
+        _check_names(self)
+        _check_shapes(self)
+        _check_symbols(self)
+        _check_scene(self)
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Limb names, each once, in the order of their first row."""
+        return tuple(dict.fromkeys(row.limb for row in self.wrenches))
+
+    @property
+    def has_couples(self) -> bool:
+        """Whether a row is a constraint couple, so that F depends on a characteristic length."""
+        return any(row.kind is WrenchKind.COUPLE for row in self.wrenches)
+
+
+def _fail(model: Model, fault: str) -> ModelError:
+    return ModelError(f"model {model.name!r}: {fault}")
+
+
+def _check_names(model: Model) -> None:
+    if not model.wrenches:
+        raise _fail(model, "it has no wrenches, so it has no Jacobian")
+    names = [name for parameter in model.parameters for name in parameter.components]
+    names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
+    names += [quantity.name for quantity in model.quantities]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise _fail(model, f"names appear twice: {', '.join(repeated)}")
+
+
+def _check_shapes(model: Model) -> None:
+    expected: list[tuple[str, SX, tuple[int, int]]] = [
+        ("pose rotation", model.pose.rotation, (3, 3)),
+        ("pose position", model.pose.position, (3, 1)),
+    ]
+    for index, row in enumerate(model.wrenches):
+        expected += [
+            (f"wrench {index} force", row.force, (3, 1)),
+            (f"wrench {index} moment", row.moment, (3, 1)),
+            (f"wrench {index} square", row.square, (1, 1)),
+        ]
+    expected += [(parameter.name, parameter.symbol, (len(parameter.typical), 1)) for parameter in model.parameters]
+    expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
+    expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
+    expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
+    expected += [(f"point {point.name}", point.position, (3, 1)) for point in model.scene.points]
+    for what, expression, shape in expected:
+        if expression.shape != shape:
+            raise _fail(model, f"{what} should have shape {shape}, got {expression.shape}")
+
+
+def _check_symbols(model: Model) -> None:
+    declared = [parameter.symbol for parameter in model.parameters] + [unknown.symbol for unknown in model.unknowns]
+    declared += [model.pose.rotation, model.pose.position]
+    for symbol in declared:
+        if not symbol.is_valid_input():
+            raise _fail(model, f"{symbol} is an expression where a symbol must stand")
+    scalars = ca.vertcat(*[ca.vec(symbol) for symbol in declared])
+    if len({scalars[i].element_hash() for i in range(scalars.numel())}) < scalars.numel():
+        raise _fail(model, "a symbol stands for two things")
+    used: Iterable[SX] = [
+        *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
+        *(equation.expression for equation in model.closure),
+        *(quantity.values for quantity in model.quantities),
+        *(point.position for point in model.scene.points),
+    ]
+    known = {scalars[i].element_hash() for i in range(scalars.numel())}
+    stray = sorted({str(s) for s in ca.symvar(ca.veccat(*used)) if s.element_hash() not in known})
+    if stray:
+        raise _fail(model, f"symbols are used but not declared: {', '.join(stray)}")
+
+
+def _check_scene(model: Model) -> None:
+    points = {point.name for point in model.scene.points}
+    for link in model.scene.links:
+        for end in (link.start, link.end):
+            if end not in points:
+                raise _fail(model, f"a link ends at {end!r}, which is no point of the drawing")
+        if link.limb is not None and link.limb not in model.limbs:
+            raise _fail(model, f"a link belongs to limb {link.limb!r}, which has no wrench")

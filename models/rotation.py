@@ -1,0 +1,82 @@
+"""Rotations: symbolic matrices from three coordinate sets, and back from a matrix of numbers.
+
+Which coordinates to choose: the vector part ``q`` of a unit quaternion is smooth without trigonometry for every angle
+below 180 degrees, and turns a limit on the angle into one ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector
+``tan(angle / 2) n`` is smooth on the same set and unbounded. Axis and angle (equation 9) are for a held axis only:
+freed together they are redundant, and singular at zero angle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from screwsynth.models.arrays import FloatArray, frozen_array
+
+
+def matrix_from_quaternion_vector(q: SX) -> SX:
+    """Rotation matrix from the vector part of a unit quaternion.
+
+    Args:
+        q: (3, 1) ``sin(angle / 2) * axis`` with ``|q| < 1``; the scalar part is the positive root ``sqrt(1 - |q|^2)``.
+
+    Returns:
+        (3, 3) ``I + 2 q0 [q]x + 2 [q]x^2``.
+    """
+    q0 = ca.sqrt(1 - ca.sumsqr(q))
+    cross = ca.skew(q)
+    return SX.eye(3) + 2 * q0 * cross + 2 * cross @ cross
+
+
+def matrix_from_cayley(c: SX) -> SX:
+    """Rotation matrix from the Cayley (Rodrigues) vector.
+
+    Args:
+        c: (3, 1) ``tan(angle / 2) * axis``.
+
+    Returns:
+        (3, 3) ``I + 2 / (1 + |c|^2) ([c]x + [c]x^2)``.
+    """
+    cross = ca.skew(c)
+    return SX.eye(3) + 2 / (1 + ca.sumsqr(c)) * (cross + cross @ cross)
+
+
+def matrix_from_axis_angle(axis: SX, angle: SX) -> SX:
+    """Rotation matrix ``exp(angle [axis]x)`` (equation 9, Rodrigues' formula).
+
+    Args:
+        axis: (3, 1) unit vector.
+        angle: scalar, radians.
+    """
+    cross = ca.skew(axis)
+    return SX.eye(3) + ca.sin(angle) * cross + (1 - ca.cos(angle)) * cross @ cross
+
+
+def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
+    """Unit axis and angle of a rotation matrix.
+
+    Args:
+        matrix: (3, 3) rotation matrix of numbers.
+
+    Returns:
+        (3,) unit axis and the angle in [0, pi]. Without rotation the axis is z by convention; at half a turn the
+        axis's first component that is not zero is positive.
+    """
+    R = frozen_array(matrix, (3, 3))
+    sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    size = float(np.linalg.norm(sine))
+    cosine = (float(np.trace(R)) - 1) / 2
+    angle = math.atan2(size, cosine)
+    if cosine > 0:
+        axis = sine / size if size > 0 else np.array([0.0, 0.0, 1.0])
+        return frozen_array(axis, (3,)), angle
+    # Past a right angle the symmetric part holds the axis, n n' (1 - cos), better than the vanishing sine does.
+    outer = (R + R.T) / 2 - cosine * np.eye(3)
+    axis = outer[:, int(np.argmax(np.diag(outer)))]
+    axis = axis / np.linalg.norm(axis)
+    lead = float(axis @ sine) if size > 1e-12 else float(axis[np.flatnonzero(np.abs(axis) > 1e-12)[0]])
+    return frozen_array(axis if lead > 0 else -axis, (3,)), angle

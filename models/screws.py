@@ -1,0 +1,156 @@
+"""Lines, twists and wrenches as numbers, and the work rate between them.
+
+Every screw is six numbers in ray order, direction first, with its moment taken about the origin of the world frame:
+
+* a **twist** ``(omega, v)``: angular velocity (1/time) and the velocity (length/time) of the body point that coincides
+  with the world origin;
+* a **wrench** ``(f, m)``: force, and moment about the world origin (force * length).
+
+A screw of intensity ``q`` about the unit axis ``s`` through the point ``s0`` with pitch ``h`` is
+``q (s, s0 x s + h s)``; infinite pitch is ``q (0, s)``: a pure translation as a twist, a pure couple as a wrench.
+A line is a screw of zero pitch. Because both kinds have the same coordinates, one set of functions serves them.
+
+Source: R. S. Ball, *A Treatise on the Theory of Screws*, Cambridge University Press, 1900, and equations 3 to 6 of the
+paper that :mod:`screwsynth.nlp.formulation` cites.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from screwsynth.models.arrays import FloatArray, frozen_array
+
+#: A direction part shorter than this times the moment part is rounding error: the pitch is infinite. Lengths of a
+#: screw's two parts differ by the distance of its axis, and no machine is 1e12 of its own length units away.
+_INFINITE_PITCH = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Screw:
+    """A screw taken apart.
+
+    Attributes:
+        axis: (3,) unit direction of the screw axis.
+        point: (3,) point of the axis nearest to the world origin, length; the origin when the pitch is infinite, where
+            the axis has a direction but no place.
+        pitch: translation per rotation (twist) or couple per force (wrench), length; ``math.inf`` for a pure
+            translation or a pure couple.
+        intensity: magnitude, at least 0: of the direction part, or of the moment part when the pitch is infinite.
+    """
+
+    axis: FloatArray
+    point: FloatArray
+    pitch: float
+    intensity: float
+
+
+def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: float = 1.0) -> FloatArray:
+    """Coordinates of a screw from its axis (equations 3 and 4).
+
+    Args:
+        axis: (3,) direction, any length but zero.
+        point: (3,) any point of the axis, length. It has no effect when the pitch is infinite.
+        pitch: length; ``math.inf`` gives the pure translation or pure couple along ``axis``.
+        intensity: magnitude that multiplies the unit screw.
+
+    Returns:
+        (6,) read-only array, ``intensity * (s, point x s + pitch * s)``, or ``intensity * (0, s)``.
+
+    Raises:
+        ValueError: the axis is zero, or a number is not finite (the pitch may be ``+inf``).
+    """
+    s = np.array(axis, dtype=np.float64)
+    s0 = np.array(point, dtype=np.float64)
+    if s.shape != (3,) or s0.shape != (3,):
+        raise ValueError(f"axis and point must have 3 components, got shapes {s.shape} and {s0.shape}")
+    size = float(np.linalg.norm(s))
+    if not (math.isfinite(size) and size > 0.0):
+        raise ValueError("axis must be finite and not zero")
+    if not (np.isfinite(s0).all() and math.isfinite(intensity)):
+        raise ValueError("point and intensity must be finite")
+    if math.isnan(pitch) or pitch == -math.inf:
+        raise ValueError("pitch must be a number or +inf")
+    s /= size
+    if math.isinf(pitch):
+        return frozen_array(np.concatenate([np.zeros(3), intensity * s]), (6,))
+    return frozen_array(intensity * np.concatenate([s, np.cross(s0, s) + pitch * s]), (6,))
+
+
+def axis_from_screw(screw: ArrayLike) -> Screw:
+    """Axis, point, pitch and intensity of a twist or wrench: the inverse of :func:`screw_from_axis`.
+
+    Args:
+        screw: (6,) direction part, then moment part about the world origin.
+
+    Raises:
+        ValueError: all six numbers are zero, or one is not finite.
+    """
+    coordinates = frozen_array(screw, (6,))
+    if not np.isfinite(coordinates).all():
+        raise ValueError("a screw must be six finite numbers")
+    direction, moment = coordinates[:3], coordinates[3:]
+    intensity, couple = float(np.linalg.norm(direction)), float(np.linalg.norm(moment))
+    if intensity == 0.0 and couple == 0.0:
+        raise ValueError("a screw of six zeros has no axis")
+    if intensity <= _INFINITE_PITCH * couple:
+        return Screw(frozen_array(moment / couple, (3,)), frozen_array(np.zeros(3), (3,)), math.inf, couple)
+    axis, moment = direction / intensity, moment / intensity
+    return Screw(
+        axis=frozen_array(axis, (3,)),
+        point=frozen_array(np.cross(axis, moment), (3,)),
+        pitch=float(axis @ moment),
+        intensity=intensity,
+    )
+
+
+def line_through(first: ArrayLike, second: ArrayLike) -> FloatArray:
+    """Unit line from one point to another (equation 1, normalised).
+
+    Args:
+        first: (3,) point, length.
+        second: (3,) another point, length.
+
+    Returns:
+        (6,) read-only array: unit direction from ``first`` to ``second``, then its moment about the world origin.
+
+    Raises:
+        ValueError: the points coincide, or a number is not finite.
+    """
+    start, end = frozen_array(first, (3,)), frozen_array(second, (3,))
+    return screw_from_axis(end - start, start, 0.0)
+
+
+def reciprocal_product(wrenches: ArrayLike, twist: ArrayLike) -> FloatArray:
+    """Work rate ``m . omega + f . v`` of each wrench in a twist (equations 5 and 14).
+
+    Args:
+        wrenches: (6,) or (m, 6), force then moment.
+        twist: (6,), angular velocity then velocity.
+
+    Returns:
+        () or (m,) array, force * length / time.
+    """
+    rows = np.asarray(wrenches, dtype=np.float64)
+    omega, v = np.split(frozen_array(twist, (6,)), 2)
+    return np.asarray(rows[..., 3:] @ omega + rows[..., :3] @ v)
+
+
+def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -> FloatArray:
+    """The screw after the body that carries it was turned by ``rotation`` and then moved by ``translation``.
+
+    Args:
+        screw: (6,) twist or wrench.
+        rotation: (3, 3) rotation matrix.
+        translation: (3,) length.
+
+    Returns:
+        (6,) read-only array, ``(R s, R s_o + t x R s)``.
+    """
+    coordinates, matrix = frozen_array(screw, (6,)), frozen_array(rotation, (3, 3))
+    direction = matrix @ coordinates[:3]
+    moment = matrix @ coordinates[3:] + np.cross(frozen_array(translation, (3,)), direction)
+    return frozen_array(np.concatenate([direction, moment]), (6,))

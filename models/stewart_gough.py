@@ -1,0 +1,64 @@
+"""The 6-6 Stewart-Gough platform with its joints in pairs on two circles (Fig. 3).
+
+Letters: ``x1``, ``x2`` radii of the base and platform circle; ``x3``, ``x4`` half of the angle between the joints of
+a pair, seen from the centre, on the base and on the platform. Pair ``k = 1, 2, 3`` of the base is centred on azimuth
+``120 (k - 1)`` degrees. Half angle 0 makes a triangle (the joints of a pair coincide), 30 degrees a regular hexagon.
+
+The paper draws the platform pairs above the base pairs (``aligned``): leg ``k+`` joins base joint ``k+`` at azimuth
+``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` likewise with minus signs. In the
+``octahedral`` layout, usual in machines, the platform pairs are turned by 60 degrees and each leg goes to the nearer
+neighbour: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import casadi as ca
+from casadi import SX
+
+from screwsynth.models.legs import Leg, legged_platform
+from screwsynth.models.model import Dimension, Model, Parameter, PoseSymbols
+
+_THIRD = 2 * math.pi / 3
+_SIXTH = math.pi / 3
+_HEXAGON = math.radians(30)
+
+
+def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Model:
+    """6-6 Stewart-Gough platform with joints on two circles (Fig. 3).
+
+    Args:
+        layout: ``aligned`` as in the paper, or ``octahedral``.
+    """
+    x1, x2, x3, x4 = (SX.sym(name) for name in ("x1", "x2", "x3", "x4"))
+    pose = PoseSymbols()
+    legs = []
+    for k in range(3):
+        # Counter-clockwise around the base, so that the drawn outline does not cross itself.
+        for sign, mark in ((-1, "-"), (1, "+")):
+            centre = k * _THIRD
+            platform = centre + sign * (x4 if layout == "aligned" else _SIXTH - x4)
+            legs.append(Leg(f"{k + 1}{mark}", _on_circle(x1, centre + sign * x3), _on_circle(x2, platform)))
+    parts = legged_platform(legs, pose)
+    return Model(
+        name="stewart-gough",
+        description="6-6 Stewart-Gough platform: six legs between pairs of joints on two circles",
+        options={"layout": layout},
+        parameters=(
+            Parameter("x1", x1, Dimension.LENGTH, "radius of the base's joint circle", (12.0,), 0.0),
+            Parameter("x2", x2, Dimension.LENGTH, "radius of the platform's joint circle", (8.0,), 0.0),
+            Parameter("x3", x3, Dimension.ANGLE, "half angle of a base pair", (math.radians(20),), 0.0, _HEXAGON),
+            Parameter("x4", x4, Dimension.ANGLE, "half angle of a platform pair", (math.radians(8),), 0.0, _HEXAGON),
+        ),
+        pose=pose,
+        home=(0.0, 0.0, 35.0),
+        wrenches=parts.wrenches,
+        quantities=parts.quantities,
+        scene=parts.scene,
+    )
+
+
+def _on_circle(radius: SX, azimuth: SX) -> SX:
+    return ca.vertcat(radius * ca.cos(azimuth), radius * ca.sin(azimuth), 0)

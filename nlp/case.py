@@ -1,0 +1,326 @@
+"""A case: a robot, what is fixed and what is free, and the motion its platform must make.
+
+This is what a case file becomes, and what a program builds directly. Angles are radians here. A :class:`Case` checks
+itself once, in the words of a case file, so everything behind it can rely on it.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis
+from screwsynth.nlp.errors import CaseError, nearest
+from screwsynth.nlp.units import Units
+
+#: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
+MAX_FREE_ROTATION = math.radians(179)
+
+
+class Sense(enum.Enum):
+    """Whether F is to be as large or as small as possible."""
+
+    MAX = "max"
+    MIN = "min"
+
+
+@dataclass(frozen=True)
+class Free:
+    """A number that the solver chooses between two bounds.
+
+    Attributes:
+        lower, upper: finite bounds, ``lower < upper``.
+        start: where the first search begins; the middle when left out.
+    """
+
+    lower: float
+    upper: float
+    start: float | None = None
+
+    @property
+    def first(self) -> float:
+        """Where the first search begins."""
+        return (self.lower + self.upper) / 2 if self.start is None else self.start
+
+
+Value: TypeAlias = float | Free
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
+
+    Attributes:
+        axis: (3,) held axis, any length but zero; None leaves the axis free.
+        angle: radians. With the axis free the sign of an angle means nothing: ``Free(-0.5, 0.5)`` allows every rotation
+            by at most 0.5, about any axis.
+    """
+
+    axis: ArrayLike | None = (0.0, 0.0, 1.0)
+    angle: Value = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """An instantaneous twist deformation (ITD) that the platform must make (equation 12).
+
+    Attributes:
+        twist: (6,) ``(omega, v)`` in the world frame; ``v`` is the velocity of the platform point at the world origin.
+        sense: whether the robot should put much or little work rate into it.
+        name: a few words.
+        weight: positive; what the task counts for beside others.
+    """
+
+    twist: ArrayLike
+    sense: Sense = Sense.MAX
+    name: str = "task"
+    weight: float = 1.0
+
+    @classmethod
+    def screw(
+        cls,
+        sense: Sense | str,
+        *,
+        axis: ArrayLike,
+        point: ArrayLike = (0.0, 0.0, 0.0),
+        pitch: float = 0.0,
+        name: str = "task",
+        weight: float = 1.0,
+    ) -> Task:
+        """A unit screw motion from its axis.
+
+        Args:
+            sense: ``"max"`` or ``"min"``.
+            axis: (3,) direction, any length but zero.
+            point: (3,) any point of the axis, length.
+            pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
+            name: a few words.
+            weight: positive.
+        """
+        return cls(screw_from_axis(axis, point, pitch), Sense(sense), name, weight)
+
+
+@dataclass(frozen=True)
+class Search:
+    """How the solver searches.
+
+    Attributes:
+        starts: number of starting points.
+        seed: seed of the random ones.
+        max_iterations: Ipopt's limit for each start.
+    """
+
+    starts: int = 32
+    seed: int = 0
+    max_iterations: int = 500
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a regression holds the case to; ``tolerance`` is relative, and absolute where F is 0."""
+
+    F: float | None = None
+    tolerance: float = 1e-6
+    singular: bool | None = None
+
+
+@dataclass(frozen=True)
+class Published:
+    """A number that the literature prints, and whether this program reproduces it."""
+
+    quantity: str
+    value: float | tuple[float, ...]
+    source: str
+    reproduced: bool
+    because: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A synthesis problem.
+
+    Attributes:
+        model: the robot.
+        parameters: a value for each of the model's parameters: a number or :class:`Free`, or a sequence of three for a
+            point or direction. Stored as tuples of components.
+        position: origin of the platform frame in the world frame, length.
+        rotation: orientation of the platform.
+        tasks: the motions.
+        units: units for people.
+        characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
+            constraint couples.
+        search: how the solver searches.
+        title, name: for people; the name is the file's.
+        expect: what a regression holds the case to.
+        published: what the literature prints.
+
+    Raises:
+        CaseError: a value is missing, unknown, not finite, out of its range, or crossed; the key is in the words of a
+            case file.
+    """
+
+    model: Model
+    parameters: Mapping[str, Value | Sequence[Value]]
+    position: Sequence[Value]
+    tasks: Sequence[Task]
+    rotation: Rotation = field(default_factory=Rotation)
+    units: Units = field(default_factory=Units)
+    characteristic_length: float = 1.0
+    search: Search = field(default_factory=Search)
+    title: str = ""
+    name: str = "case"
+    expect: Expectation = field(default_factory=Expectation)
+    published: tuple[Published, ...] = ()
+
+    def __post_init__(self) -> None:
+        settle = object.__setattr__
+        settle(self, "parameters", MappingProxyType(_parameters(self)))
+        settle(self, "position", _position(self))
+        settle(self, "rotation", _rotation(self))
+        settle(self, "tasks", _tasks(self))
+        if not (math.isfinite(self.characteristic_length) and self.characteristic_length > 0):
+            raise CaseError("robot.characteristic_length", "must be positive", self.characteristic_length)
+
+    def components(self, name: str) -> tuple[Value, ...]:
+        """Values of a parameter, component by component."""
+        values = self.parameters[name]
+        return tuple(values) if isinstance(values, Sequence) else (values,)
+
+    @property
+    def axis(self) -> FloatArray | None:
+        """Held axis of rotation, (3,) unit, or None when it is free."""
+        return None if self.rotation.axis is None else frozen_array(self.rotation.axis, (3,))
+
+
+def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
+    known = {parameter.name: parameter for parameter in case.model.parameters}
+    for name in case.parameters:
+        if name not in known:
+            raise CaseError(f"robot.parameters.{name}", f"no such parameter; {nearest(name, known)}")
+    settled = {}
+    for name, parameter in known.items():
+        key = f"robot.parameters.{name}"
+        if name not in case.parameters:
+            raise CaseError(key, f"is missing: {parameter.description}, {_expected(parameter)}")
+        given = case.parameters[name]
+        values = tuple(given) if isinstance(given, Sequence) else (given,)
+        if len(values) != len(parameter.typical) or isinstance(given, Sequence) != (len(parameter.typical) > 1):
+            raise CaseError(key, f"must be {_expected(parameter)}")
+        settled[name] = tuple(
+            _checked(
+                value,
+                key if len(values) == 1 else f"{key}[{index}]",
+                parameter.dimension,
+                case.units,
+                (parameter.lower, parameter.upper),
+            )
+            for index, value in enumerate(values)
+        )
+    return settled
+
+
+def _expected(parameter: Parameter) -> str:
+    one = "a number or { min, max }"
+    return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
+
+
+def _position(case: Case) -> tuple[Value, ...]:
+    if len(case.position) != 3:
+        raise CaseError("pose.position", "must be a list of 3, each a number or { min, max }")
+    return tuple(
+        _checked(value, f"pose.position[{index}]", Dimension.LENGTH, case.units)
+        for index, value in enumerate(case.position)
+    )
+
+
+def _rotation(case: Case) -> Rotation:
+    given, key = case.rotation, "pose.rotation.angle"
+    if given.axis is None:
+        limit, why = MAX_FREE_ROTATION, "with the axis free"
+    else:
+        limit, why = 2 * math.pi, "with the axis held"
+    angle = _checked(given.angle, key, Dimension.ANGLE, case.units)
+    for end in (angle.lower, angle.upper) if isinstance(angle, Free) else (angle,):
+        if abs(end) > limit:
+            allowed = case.units.text(limit, Dimension.ANGLE)
+            raise CaseError(key, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
+    axis = None if given.axis is None else _unit(given.axis, "pose.rotation.axis")
+    return Rotation(axis, angle)
+
+
+def _unit(values: ArrayLike, key: str) -> FloatArray:
+    vector = np.array(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise CaseError(key, "must be three finite numbers")
+    size = float(np.linalg.norm(vector))
+    if size == 0:
+        raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
+    return frozen_array(vector / size, (3,))
+
+
+def _tasks(case: Case) -> tuple[Task, ...]:
+    if not case.tasks:
+        raise CaseError("task", "is missing: a case needs at least one [[task]]")
+    settled = []
+    for index, task in enumerate(case.tasks):
+        key = f"task[{index}]"
+        twist = np.array(task.twist, dtype=np.float64)
+        if twist.shape != (6,) or not np.isfinite(twist).all():
+            raise CaseError(f"{key}.twist", "must be six finite numbers")
+        if not twist.any():
+            raise CaseError(f"{key}.twist", "must not be zero: the platform would not move", twist.tolist())
+        if not (math.isfinite(task.weight) and task.weight > 0):
+            raise CaseError(f"{key}.weight", "must be positive", task.weight)
+        settled.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight)))
+    names = [task.name for task in settled]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise CaseError(f"task[{index}].name", "is used by an earlier task", name)
+    return tuple(settled)
+
+
+def _checked(
+    value: Value,
+    key: str,
+    dimension: Dimension,
+    units: Units,
+    domain: tuple[float, float] = (-math.inf, math.inf),
+) -> Value:
+    """The value, once it is finite, not crossed and inside the domain."""
+    if not isinstance(value, Free):
+        return _number(value, key, dimension, units, domain)
+    lower = _number(value.lower, f"{key}.min", dimension, units, domain)
+    upper = _number(value.upper, f"{key}.max", dimension, units, domain)
+    if not lower < upper:
+        raise CaseError(
+            f"{key}.min", f"must be below max = {units.text(upper, dimension)}", units.shown(lower, dimension)
+        )
+    start = None if value.start is None else _number(value.start, f"{key}.start", dimension, units, (lower, upper))
+    return Free(lower, upper, start)
+
+
+def _number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise CaseError(key, "must be finite", number)
+    lower, upper = domain
+    # A bound written in degrees may differ from the same bound in radians by rounding.
+    slack = 1e-12 * max(1.0, abs(number))
+    if not lower - slack <= number <= upper + slack:
+        ends = [units.text(end, dimension) for end in domain]
+        allowed = (
+            f"at least {ends[0]}"
+            if math.isinf(upper)
+            else f"at most {ends[1]}"
+            if math.isinf(lower)
+            else f"between {ends[0]} and {ends[1]}"
+        )
+        raise CaseError(key, f"must be {allowed}", units.shown(number, dimension))
+    return min(max(number, lower), upper)

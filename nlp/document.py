@@ -1,0 +1,246 @@
+"""A case file as it is written: the tables and keys, and nothing else than these.
+
+The classes mirror the file, in the user's units and words. They check what can be checked without knowing the robot:
+keys, types, finite numbers. Everything else is checked once, by :class:`screwsynth.nlp.case.Case`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from screwsynth.nlp.errors import CaseError, nearest
+
+#: Keys of the format that this version does not act on yet. They are refused, so that no limit is silently ignored.
+NOT_YET = ("limits", "combine", "tolerance")
+
+
+class Table(BaseModel):
+    """A TOML table with its known keys only."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_known_keys(cls, table: object) -> object:
+        if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
+            for key in table:
+                if key not in cls.model_fields:
+                    allowed = nearest(str(key), cls.model_fields)
+                    raise PydanticCustomError(
+                        "unknown_key", "{fault}", {"key": key, "fault": f"no such key; {allowed}"}
+                    )
+        return table
+
+
+class Range(Table):
+    """A number that is free between its bounds."""
+
+    min: FiniteFloat = Field(description="lower bound")
+    max: FiniteFloat = Field(description="upper bound, above min")
+    start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
+
+
+def _number_or_range(value: object) -> str:
+    return "<range>" if isinstance(value, dict | Range) else "<number>"
+
+
+def _value_or_list(value: object) -> str:
+    return "<list>" if isinstance(value, list | tuple) else _number_or_range(value)
+
+
+Value = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_number_or_range)
+]
+VectorOrValue = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
+    Discriminator(_value_or_list),
+]
+Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class UnitsTable(Table):
+    """Units of every number in the file."""
+
+    length: Annotated[str, Field(min_length=1, max_length=20)] = Field(
+        default="m", description="label of the length unit"
+    )
+    angle: Literal["deg", "rad"] = Field(default="deg", description="unit of angles")
+
+
+class RobotTable(Table):
+    """The robot: its model, the model's own options, and its dimensions."""
+
+    model_config = ConfigDict(strict=True, extra="allow", frozen=True)
+
+    model: str = Field(description="name of the robot; `screwsynth models` lists them")
+    parameters: dict[str, VectorOrValue] = Field(
+        default_factory=dict, description="a number or { min, max } for each parameter; a list of three for a point"
+    )
+    characteristic_length: FiniteFloat = Field(
+        default=1.0, gt=0, description="length by which unit couples are made comparable with unit forces"
+    )
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The model's own options."""
+        return dict(self.model_extra or {})
+
+
+class RotationTable(Table):
+    """Rotation of the platform about an axis of the world frame."""
+
+    axis: Vector | None = Field(default=None, description="held axis; left out, the axis is free")
+    angle: Value = Field(description="angle, fixed or free")
+
+
+class PoseTable(Table):
+    """Pose of the platform in the world frame."""
+
+    position: Annotated[list[Value], Field(min_length=3, max_length=3)] = Field(
+        description="origin of the platform frame"
+    )
+    rotation: RotationTable | None = Field(default=None, description="left out: no rotation")
+
+
+class TaskTable(Table):
+    """A motion that the platform must make: axis, point and pitch, or the six numbers of a twist."""
+
+    name: str | None = Field(default=None, min_length=1, description="a few words")
+    sense: Literal["max", "min"] = Field(description="maximise or minimise F")
+    axis: Vector | None = Field(default=None, description="direction of the screw axis, any length but zero")
+    point: Vector | None = Field(default=None, description="any point on the axis")
+    pitch: float | None = Field(
+        default=None, description="translation per radian; inf is a pure translation along the axis"
+    )
+    weight: FiniteFloat = Field(default=1.0, gt=0, description="what the task counts for beside others")
+    twist: Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)] | None = Field(
+        default=None, description="angular velocity and velocity at the world origin, instead of axis, point and pitch"
+    )
+
+
+class SolveTable(Table):
+    """How the solver searches."""
+
+    starts: int = Field(default=32, ge=1, le=100_000, description="number of starting points")
+    seed: int = Field(default=0, ge=0, description="seed of the random ones")
+    max_iterations: int = Field(default=500, ge=1, le=1_000_000, description="limit for each start")
+
+
+class ExpectTable(Table):
+    """What a regression holds the case to."""
+
+    F: FiniteFloat | None = Field(default=None, ge=0, description="objective at the optimum")
+    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="relative; absolute where F is 0")
+    singular: bool | None = Field(default=None, description="whether J is rank deficient at the optimum")
+
+
+class PublishedTable(Table):
+    """A number that the literature prints."""
+
+    quantity: str = Field(min_length=1, description="what it is")
+    value: FiniteFloat | list[FiniteFloat] = Field(description="as printed")
+    source: str = Field(min_length=1, description="where")
+    reproduced: bool = Field(description="whether this program reproduces it")
+    because: str = Field(default="", description="the reason, where it does not")
+
+    @model_validator(mode="after")
+    def _reason_given(self) -> PublishedTable:
+        if not self.reproduced and not self.because:
+            raise PydanticCustomError(
+                "reason", "{fault}", {"key": "because", "fault": "is missing: say why the number is not reproduced"}
+            )
+        return self
+
+
+class Document(Table):
+    """A whole case file."""
+
+    model_config = ConfigDict(title="screwsynth case file")
+
+    title: str = Field(default="", description="one line for people")
+    units: UnitsTable = UnitsTable()
+    robot: RobotTable
+    pose: PoseTable
+    task: Annotated[list[TaskTable], Field(min_length=1)]
+    solve: SolveTable = SolveTable()
+    expect: ExpectTable = ExpectTable()
+    published: list[PublishedTable] = Field(default_factory=list)
+
+
+def parse_document(tables: dict[str, Any]) -> Document:
+    """The document, or its first fault as a sentence.
+
+    Raises:
+        CaseError: with the dotted key of the fault.
+    """
+    for key in NOT_YET:
+        if key in tables:
+            raise CaseError(key, "is not supported yet by this version; take it out")
+    try:
+        return Document.model_validate(tables)
+    except ValidationError as error:
+        raise _case_error(error.errors(include_url=False)[0]) from None
+
+
+def _case_error(fault: ErrorDetails) -> CaseError:
+    context = fault.get("ctx", {})
+    location = [*fault["loc"], *([context["key"]] if "key" in context else [])]
+    value = fault["input"]
+    shown = value if isinstance(value, str | int | float | bool) and "key" not in context else None
+    return CaseError(dotted_key(location), _sentence(fault, context), shown)
+
+
+def dotted_key(location: list[int | str]) -> str:
+    """``robot.parameters.x4.min`` or ``pose.position[0]`` from a path into the document."""
+
+    def parts() -> Iterator[str]:
+        for part in location:
+            if isinstance(part, int):
+                yield f"[{part}]"
+            elif not part.startswith("<"):
+                yield f".{part}"
+
+    return "".join(parts()).lstrip(".") or "the file"
+
+
+_KINDS = {
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "string_type": "must be text in quotes",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "float_type": "must be a number",
+    "finite_number": "must be finite",
+    "string_too_short": "must not be empty",
+}
+
+
+def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
+    kind = fault["type"]
+    if kind == "missing":
+        return "is missing"
+    if kind == "literal_error":
+        return f"must be one of {context['expected']}"
+    if kind in ("too_short", "too_long"):
+        limit = context["min_length"] if kind == "too_short" else context["max_length"]
+        few = "at least " if kind == "too_short" and limit == 1 else ""
+        return f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
+    if kind == "float_type" and fault["loc"][-1] == "<number>":
+        return "must be a number or { min, max }"
+    if kind in ("unknown_key", "reason"):
+        return str(context["fault"])
+    return _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))

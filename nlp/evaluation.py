@@ -1,0 +1,127 @@
+"""The robot at one point, in numbers: pose, Jacobian, rates, F, and what singularity there is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
+from screwsynth.nlp.case import Free
+from screwsynth.nlp.errors import EvaluationError
+from screwsynth.nlp.program import Nlp
+
+#: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
+ZERO_F = 1e-12
+#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. It is
+#: the square root of the double precision's rounding unit: a point known to rounding error gives no better.
+ZERO_SINGULAR_VALUE = 1.5e-8
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """The robot at one point.
+
+    Attributes:
+        parameters: components of each parameter, by parameter name; radians for angles.
+        position: (3,) ``p``, length.
+        rotation: (3, 3) ``R``.
+        axis, angle: the rotation as a unit axis (3,) and radians; the held axis with a signed angle where there is one.
+        jacobian: (m, 6) unit wrenches, force then moment about the world origin.
+        rates: (m,) ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
+        F: ``sum(rates^2)``.
+        size: what F would be without cancellation; F is zero when it is small beside this.
+        singular_values: (min(m, 6),) of the Jacobian as it stands, largest first.
+        rank: of the Jacobian with moments divided by their longest arm.
+        free_twists: (6 - rank, 6) orthonormal basis of the twists that no row of the Jacobian resists.
+        quantities: the model's named measures, each (n,); radians for angles.
+    """
+
+    parameters: Mapping[str, FloatArray]
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+    jacobian: FloatArray
+    rates: FloatArray
+    F: float
+    size: float
+    singular_values: FloatArray
+    rank: int
+    free_twists: FloatArray
+    quantities: Mapping[str, FloatArray]
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether F is zero: the platform can make the task's motion with every actuator locked."""
+        return ZERO_F * self.size >= self.F
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether some motion of the platform meets no resistance."""
+        return self.rank < 6
+
+
+def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
+    """The robot at a point of the program.
+
+    Args:
+        nlp: the program.
+        x: (n,) values of its free variables.
+        task: index of the task whose rates are wanted.
+
+    Raises:
+        EvaluationError: a number is not finite there, as when a limb has zero length.
+    """
+    model, case = nlp.program.model, nlp.case
+    outputs = [output.full() for output in nlp.program.robot_state(x, nlp.arguments)]
+    components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
+    for row, square in zip(model.wrenches, squares.ravel(), strict=True):
+        if not square > 0:
+            raise EvaluationError(f"limb {row.limb!r} has zero length at this point: its two joints coincide")
+    if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
+        raise EvaluationError("the robot's equations give no finite Jacobian at this point")
+    axis, angle = axis_angle_from_matrix(rotation)
+    if case.axis is not None:
+        held = case.rotation.angle
+        axis, angle = case.axis, float(x[nlp.program.index("angle")]) if isinstance(held, Free) else held
+    rank, free_twists = _rank(jacobian)
+    singular_values = np.linalg.svd(jacobian, compute_uv=False)
+    sizes = [len(parameter.typical) for parameter in model.parameters]
+    parts = np.split(components.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
+    return RobotState(
+        parameters=MappingProxyType(
+            {item.name: frozen_array(part, part.shape) for item, part in zip(model.parameters, parts, strict=True)}
+        ),
+        position=frozen_array(position.ravel(), (3,)),
+        rotation=frozen_array(rotation, (3, 3)),
+        axis=axis,
+        angle=angle,
+        jacobian=frozen_array(jacobian, jacobian.shape),
+        rates=frozen_array(rates[:, task], (len(model.wrenches),)),
+        F=float(F[task, 0]),
+        size=float(size[task, 0]),
+        singular_values=frozen_array(singular_values, singular_values.shape),
+        rank=rank,
+        free_twists=frozen_array(free_twists, free_twists.shape),
+        quantities=MappingProxyType(
+            {
+                item.name: frozen_array(values.ravel(), (len(item.owners),))
+                for item, values in zip(model.quantities, quantities, strict=True)
+            }
+        ),
+    )
+
+
+def _rank(jacobian: FloatArray) -> tuple[int, FloatArray]:
+    """Rank and free twists of J with its moments divided by their longest arm."""
+    arm = float(np.max(np.linalg.norm(jacobian[:, 3:], axis=1))) or 1.0
+    # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
+    resistance = np.hstack([jacobian[:, 3:] / arm, jacobian[:, :3]])
+    _, values, rows = np.linalg.svd(resistance)
+    rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
+    null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
+    basis = np.linalg.qr(null.T)[0].T if len(null) else np.zeros((0, 6))
+    return rank, np.asarray(basis, dtype=np.float64)

@@ -1,0 +1,244 @@
+"""From a case to its nonlinear program.
+
+The objective is the sum over the rows of the Jacobian of the squared reciprocal product with the task's twist,
+
+    F = sum_i (L_i ^ chi)^2,        L_i ^ chi = m_i . omega + f_i . v            (equations 5 and 14)
+
+where ``L_i = (f_i, m_i)`` is the unit wrench that limb ``i`` applies to the platform, its moment taken about the world
+origin. The variables are the free components of the parameters, of the position ``p``, and of the rotation:
+
+* axis and angle fixed: none;
+* axis held, angle free: the angle;
+* axis free: the vector part ``q`` of the unit quaternion, with ``|q|^2`` between the squared sines of half of the
+  smallest and half of the largest allowed angle, one smooth constraint named ``angle``.
+
+Source: A. Wolf and co-workers, *Screw theory tools for the synthesis of the geometry of a parallel robot for a given
+instantaneous task*; equation and section numbers throughout this package are that paper's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from screwsynth.models import (
+    Dimension,
+    FloatArray,
+    Model,
+    WrenchKind,
+    component_names,
+    frozen_array,
+    matrix_from_axis_angle,
+    matrix_from_quaternion_vector,
+)
+from screwsynth.nlp.case import Case, Free, Value
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, RobotExpressions, Scalar
+
+#: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
+ROTATION_ANGLE = Reading(
+    Dimension.ANGLE,
+    from_value=lambda value: 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0))),
+    slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
+)
+
+
+@dataclass
+class _Sheet:
+    """What is being laid out: free variables and fixed arguments in the order they are met."""
+
+    variables: list[Scalar] = field(default_factory=list)
+    x: list[SX] = field(default_factory=list)
+    bounds: list[Free] = field(default_factory=list)
+    arguments: list[Scalar] = field(default_factory=list)
+    p: list[SX] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+    def place(self, name: str, dimension: Dimension, value: Value) -> SX:
+        """The symbol of a number, which becomes a variable or an argument as the case has it."""
+        symbol = SX.sym(name)
+        scalar = Scalar(name, dimension)
+        if isinstance(value, Free):
+            self.variables.append(scalar)
+            self.x.append(symbol)
+            self.bounds.append(value)
+        else:
+            self.arguments.append(scalar)
+            self.p.append(symbol)
+            self.values.append(value)
+        return symbol
+
+    def place_all(self, name: str, dimension: Dimension, values: Sequence[Value]) -> SX:
+        """The (n, 1) vector of several numbers."""
+        names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
+        return ca.vertcat(*[self.place(part, dimension, value) for part, value in zip(names, values, strict=True)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Bounded:
+    """A constraint with its bounds."""
+
+    constraint: Constraint
+    lower: float
+    upper: float
+
+
+def formulate(case: Case) -> Nlp:
+    """The nonlinear program of a case with one task.
+
+    Raises:
+        CaseError: a limb has zero length whatever the solver chooses.
+    """
+    sheet = _Sheet()
+    model = case.model
+    parameters = ca.vertcat(
+        SX(0, 1),
+        *[sheet.place_all(item.name, item.dimension, case.components(item.name)) for item in model.parameters],
+    )
+    position = sheet.place_all("p", Dimension.LENGTH, tuple(case.position))
+    rotation, constraints = _rotation(case, sheet)
+    unknowns = ca.vertcat(
+        SX(0, 1),
+        *[sheet.place(item.name, item.dimension, Free(item.lower, item.upper)) for item in model.unknowns],
+    )
+    length = sheet.place("characteristic_length", Dimension.LENGTH, case.characteristic_length)
+    twists = [
+        sheet.place_all(
+            f"twist{index}" if index else "twist", Dimension.NUMBER, [float(c) for c in np.asarray(t.twist)]
+        )
+        for index, t in enumerate(case.tasks)
+    ]
+    robot, closure = _robot(model, _Symbols(parameters, unknowns, rotation, position), length, twists)
+    constraints += [
+        _Bounded(Constraint(equation.name, closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0)
+        for index, equation in enumerate(model.closure)
+    ]
+    program = Program(
+        variables=tuple(sheet.variables),
+        arguments=tuple(sheet.arguments),
+        x=ca.vertcat(SX(0, 1), *sheet.x),
+        p=ca.vertcat(SX(0, 1), *sheet.p),
+        objective=robot.F[0],
+        constraints=tuple(item.constraint for item in constraints),
+        robot=robot,
+        model=model,
+    )
+    nlp = Nlp(
+        program=program,
+        case=case,
+        sense=case.tasks[0].sense,
+        arguments=_vector(sheet.values),
+        lower=_vector([bound.lower for bound in sheet.bounds]),
+        upper=_vector([bound.upper for bound in sheet.bounds]),
+        start=_vector([bound.first for bound in sheet.bounds]),
+        g_lower=_vector([item.lower for item in constraints]),
+        g_upper=_vector([item.upper for item in constraints]),
+    )
+    _check_limbs(nlp)
+    return nlp
+
+
+def _vector(values: Sequence[float]) -> FloatArray:
+    return frozen_array(values, (len(values),))
+
+
+def _rotation(case: Case, sheet: _Sheet) -> tuple[SX, list[_Bounded]]:
+    axis, angle = case.axis, case.rotation.angle
+    if axis is not None:
+        n = sheet.place_all("axis", Dimension.NUMBER, [float(c) for c in axis])
+        return matrix_from_axis_angle(n, sheet.place("angle", Dimension.ANGLE, angle)), []
+    smallest, largest = _angle_range(angle)
+    radius = math.sin(largest / 2)
+    if radius == 0:
+        q = sheet.place_all("q", Dimension.NUMBER, (0.0, 0.0, 0.0))
+        return matrix_from_quaternion_vector(q), []
+    inner = math.sin(smallest / 2)
+    q = sheet.place_all("q", Dimension.NUMBER, (*[Free(-radius, radius)] * 2, Free(-radius, radius, inner)))
+    ball = Constraint("angle", ca.sumsqr(q), ROTATION_ANGLE)
+    return matrix_from_quaternion_vector(q), [_Bounded(ball, inner**2 if inner else -math.inf, radius**2)]
+
+
+def _angle_range(angle: Value) -> tuple[float, float]:
+    """Smallest and largest size of a rotation whose axis is free, where an angle's sign means nothing."""
+    if not isinstance(angle, Free):
+        return abs(angle), abs(angle)
+    sizes = sorted((abs(angle.lower), abs(angle.upper)))
+    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Symbols:
+    """What the program puts in place of a model's symbols."""
+
+    parameters: SX
+    unknowns: SX
+    rotation: SX
+    position: SX
+
+
+def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tuple[RobotExpressions, SX]:
+    """The model's expressions with its symbols replaced by the program's, and the closure equations likewise."""
+    force = ca.horzcat(*[row.force for row in model.wrenches])
+    moment = ca.horzcat(*[row.moment for row in model.wrenches])
+    square = ca.vertcat(*[row.square for row in model.wrenches])
+    closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
+    symbols = [
+        ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
+        ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
+        model.pose.rotation,
+        model.pose.position,
+    ]
+    quantities = [quantity.values for quantity in model.quantities]
+    inlined = ca.Function("model", symbols, [force, moment, square, closure, *quantities])
+    force, moment, square, closure, *quantities = inlined.call(
+        [put.parameters, put.unknowns, put.rotation, put.position]
+    )
+    couple_scale = [length if row.kind is WrenchKind.COUPLE else SX(1) for row in model.wrenches]
+    rows, rates, objectives, magnitudes = [], [], [], []
+    for i, scale in enumerate(couple_scale):
+        rows.append(scale * ca.vertcat(force[:, i], moment[:, i]).T / ca.sqrt(square[i]))
+    for twist in twists:
+        omega, v = twist[:3], twist[3:]
+        # (m . omega + f . v)^2 / square, rather than the square of a normalised product: smoother, tighter enclosures.
+        products = [s * (ca.dot(moment[:, i], omega) + ca.dot(force[:, i], v)) for i, s in enumerate(couple_scale)]
+        rates.append(ca.vertcat(*[product / ca.sqrt(square[i]) for i, product in enumerate(products)]))
+        objectives.append(sum((product**2 / square[i] for i, product in enumerate(products)), SX(0)))
+        magnitudes.append(
+            sum(
+                (
+                    scale**2
+                    * (ca.norm_2(moment[:, i]) * ca.norm_2(omega) + ca.norm_2(force[:, i]) * ca.norm_2(v)) ** 2
+                    / square[i]
+                    for i, scale in enumerate(couple_scale)
+                ),
+                SX(0),
+            )
+        )
+    robot = RobotExpressions(
+        parameters=put.parameters,
+        rotation=put.rotation,
+        position=put.position,
+        jacobian=ca.vertcat(*rows),
+        rates=ca.horzcat(*rates),
+        F=ca.vertcat(*objectives),
+        squares=square,
+        magnitude=ca.vertcat(*magnitudes),
+        quantities=tuple(quantities),
+    )
+    return robot, closure
+
+
+def _check_limbs(nlp: Nlp) -> None:
+    """Refuse a limb whose direction vanishes whatever the solver chooses."""
+    program = nlp.program
+    squares = ca.Function("squares", [program.x, program.p], [program.robot.squares])
+    values = squares(nlp.start, nlp.arguments).full().ravel()
+    free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
+    for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
+        if not varies and not value > 0:
+            raise CaseError("robot.parameters", f"limb {row.limb!r} has zero length: its two joints coincide")

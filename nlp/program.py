@@ -1,0 +1,198 @@
+"""The nonlinear program: a :class:`Program` of symbols, and an :class:`Nlp` that gives it numbers.
+
+A program is built once for a *structure*, which is a robot and the choice of what is free. Everything a case fixes
+(dimensions, pose, twist) is an argument, so one program serves every start, every task and every point of a sweep.
+Variables are in the units of the case (radians for angles); :attr:`Nlp.scale` brings them to order 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from screwsynth.models import Dimension, FloatArray, Model
+from screwsynth.nlp.case import Case, Sense
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A named scalar of a program: a free variable or an argument that a case fixes."""
+
+    name: str
+    dimension: Dimension
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a constraint's limit reads in the words of a case.
+
+    A limit on an angle may be a limit on a smoother function of it in the program.
+
+    Attributes:
+        dimension: what the limit measures for people.
+        from_value: the number for people (radians for angles) from the program's limit.
+        slope: derivative of the program's limit with respect to the number for people, at the program's limit.
+    """
+
+    dimension: Dimension
+    from_value: Callable[[float], float] = lambda value: value
+    slope: Callable[[float], float] = lambda _: 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`."""
+
+    name: str
+    expression: SX
+    reading: Reading
+
+
+@dataclass(frozen=True, eq=False)
+class RobotExpressions:
+    """The robot at the program's point: every expression in the program's variables and arguments.
+
+    Attributes:
+        parameters: (n, 1) components of all parameters, in the model's order.
+        rotation: (3, 3) ``R``.
+        position: (3, 1) ``p``, length.
+        jacobian: (m, 6) unit wrenches ``J``, couple rows scaled by the characteristic length.
+        rates: (m, tasks) ``L_i ^ chi_j``.
+        F: (tasks, 1) objective of each task (equation 14).
+        squares: (m, 1) squared length of each row's direction: a limb of zero length has 0.
+        magnitude: (tasks, 1) what F would be without cancellation, ``sum (|m_i| |omega| + |f_i| |v|)^2``.
+        quantities: each of the model's quantities.
+    """
+
+    parameters: SX
+    rotation: SX
+    position: SX
+    jacobian: SX
+    rates: SX
+    F: SX
+    squares: SX
+    magnitude: SX
+    quantities: tuple[SX, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A nonlinear program without its numbers.
+
+    Attributes:
+        variables: what is free, in the order of ``x``.
+        arguments: what is fixed, in the order of ``p``.
+        x: (n, 1) symbols of the free variables.
+        p: (k, 1) symbols of the arguments.
+        objective: (1, 1) expression that is maximised or minimised.
+        constraints: beside the variables' bounds.
+        robot: the robot's expressions.
+        model: the robot itself.
+    """
+
+    variables: tuple[Scalar, ...]
+    arguments: tuple[Scalar, ...]
+    x: SX
+    p: SX
+    objective: SX
+    constraints: tuple[Constraint, ...]
+    robot: RobotExpressions
+    model: Model
+
+    def index(self, name: str) -> int:
+        """Place of a free variable in ``x``."""
+        return [variable.name for variable in self.variables].index(name)
+
+    @cached_property
+    def g(self) -> SX:
+        """(c, 1) expressions of all constraints."""
+        return ca.vertcat(SX(0, 1), *[constraint.expression for constraint in self.constraints])
+
+    @cached_property
+    def values(self) -> ca.Function:
+        """``(x, p) -> (F, g)``."""
+        return ca.Function("values", [self.x, self.p], [self.objective, self.g])
+
+    @cached_property
+    def derivatives(self) -> ca.Function:
+        """``(x, p) -> (F, dF/dx as a row, g, dg/dx)``."""
+        outputs = [self.objective, ca.jacobian(self.objective, self.x), self.g, ca.jacobian(self.g, self.x)]
+        return ca.Function("derivatives", [self.x, self.p], [ca.densify(output) for output in outputs])
+
+    @cached_property
+    def hessian(self) -> ca.Function:
+        """``(x, p, weight, multipliers) -> Hessian of weight * F + multipliers . g``, (n, n)."""
+        weight, multipliers = SX.sym("weight"), SX.sym("multipliers", len(self.constraints))
+        lagrangian = weight * self.objective + ca.dot(multipliers, self.g)
+        hessian = ca.densify(ca.hessian(lagrangian, self.x)[0])
+        return ca.Function("hessian", [self.x, self.p, weight, multipliers], [hessian])
+
+    @cached_property
+    def robot_state(self) -> ca.Function:
+        """``(x, p) ->`` every expression of :class:`RobotExpressions`, in its order."""
+        robot = self.robot
+        outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
+        outputs += [robot.squares, robot.magnitude, *robot.quantities]
+        return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A program with its numbers: what every solver, certificate and report reads.
+
+    Attributes:
+        program: the symbols.
+        case: where the numbers come from, for names and units.
+        sense: whether the objective is maximised or minimised.
+        arguments: (k,) values of the program's arguments.
+        lower, upper: (n,) bounds of the variables, ``lower < upper``.
+        start: (n,) first starting point.
+        g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
+    """
+
+    program: Program
+    case: Case
+    sense: Sense
+    arguments: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    start: FloatArray
+    g_lower: FloatArray
+    g_upper: FloatArray
+
+    @property
+    def n(self) -> int:
+        """Number of free variables."""
+        return len(self.program.variables)
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """(n,) half of each variable's range: a step of 1 in scaled variables goes from the middle to a bound."""
+        return (self.upper - self.lower) / 2
+
+    @property
+    def centre(self) -> FloatArray:
+        """(n,) middle of the box."""
+        return (self.upper + self.lower) / 2
+
+    @property
+    def sign(self) -> float:
+        """What makes the objective one to be minimised: -1 for a maximum."""
+        return -1.0 if self.sense is Sense.MAX else 1.0
+
+    def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Objective and constraints, (c,), at a point (n,)."""
+        F, g = self.program.values(x, self.arguments)
+        return float(F), g.full().ravel()
+
+    @cached_property
+    def objective_scale(self) -> float:
+        """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0."""
+        outputs = self.program.robot_state(self.start, self.arguments)
+        size = float(np.max(outputs[7].full()))
+        return size if np.isfinite(size) and size > 0 else 1.0
