@@ -1,0 +1,213 @@
+"""Evidence that a point is an optimum, recomputed from the program and the point alone.
+
+The paper checks each of its solutions by the derivatives and the Hessian's eigenvalues of the objective. With bounds
+that is not enough, so this module checks the whole of the first- and second-order conditions (J. Nocedal and
+S. Wright, *Numerical Optimization*, 2nd edition, sections 12.3 to 12.5), in the scaled terms of
+:mod:`screwsynth.nlp.kkt`, and says in words what holds.
+
+Sign convention of multipliers: a multiplier is the rate at which the optimal F **improves** (grows for a maximum, falls
+for a minimum) per unit by which the limit is **relaxed**, in F per the case's unit of that limit. It is never negative
+on a bound; on an equation it is the improvement per unit by which the equation's right-hand side grows.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from screwsynth.models import FloatArray, frozen_array
+from screwsynth.nlp.case import Sense
+from screwsynth.nlp.kkt import Linearisation, correct, lagrangian_hessian, limit_of, linearise, multipliers
+from screwsynth.nlp.program import Nlp
+
+#: Largest scaled derivative of the Lagrangian that counts as none: F can then still improve by about this part of its
+#: size, at most, over the whole range of a variable along which it is straight.
+STATIONARY = 1e-7
+#: Largest distance outside a limit, in half ranges, of a point that is feasible.
+FEASIBLE = 1e-9
+#: A multiplier below this, in scaled terms, does not hold the point at its side: the side is weakly active.
+STRONG = 1e-9
+#: An eigenvalue of the scaled reduced Hessian below this is zero: over half a variable's range F would change by less
+#: than this part of its size.
+CURVED = 1e-8
+#: How far a flat direction is followed to see whether F really stays, in half ranges.
+_PROBE = 0.02
+#: A component of a flat direction below this is left out of its description.
+_TRACE = 1e-6
+
+
+class Kind(enum.Enum):
+    """What a point is."""
+
+    STRICT_MAXIMUM = "strict local maximum"
+    STRICT_MINIMUM = "strict local minimum"
+    NOT_ISOLATED = "not isolated: F keeps its optimal value along the flat directions"
+    UNDECIDED = "stationary, and the second-order test does not decide: F is flat there to second order"
+    SADDLE = "saddle: stationary, but F improves along some direction"
+    NOT_STATIONARY = "not stationary: F improves to first order"
+    INFEASIBLE = "infeasible: a limit is violated"
+
+    @property
+    def is_optimum(self) -> bool:
+        """Whether the point may be reported as an optimum."""
+        return self in (Kind.STRICT_MAXIMUM, Kind.STRICT_MINIMUM, Kind.NOT_ISOLATED, Kind.UNDECIDED)
+
+
+@dataclass(frozen=True)
+class ActiveSide:
+    """A limit that the point lies on.
+
+    Attributes:
+        name: the variable or constraint.
+        bound: ``min``, ``max`` or ``equal``.
+        value: the limit, radians for angles.
+        multiplier: improvement of F per unit by which the limit is relaxed, in the same unit.
+    """
+
+    name: str
+    bound: str
+    value: float
+    multiplier: float
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What holds at a point.
+
+    Attributes:
+        kind: the verdict.
+        stationarity: largest scaled derivative of the Lagrangian, with the best multipliers there are.
+        feasibility: largest distance outside a limit, in half ranges; 0 inside.
+        complementarity: largest product of a multiplier and its side's slack, scaled.
+        active: limits that the point lies on, with multipliers.
+        violated: names of the limits that the point lies outside of.
+        licq: whether the active normals are linearly independent, so that the multipliers are unique.
+        eigenvalues: of the scaled Lagrangian's Hessian on the tangent space of the strongly active limits, ascending;
+            positive means that F gets worse on leaving the point, for a maximum as for a minimum.
+        flat: directions along which F keeps its optimal value: rates of the variables, in their units, by name.
+    """
+
+    kind: Kind
+    stationarity: float
+    feasibility: float
+    complementarity: float
+    active: tuple[ActiveSide, ...]
+    violated: tuple[str, ...]
+    licq: bool
+    eigenvalues: FloatArray
+    flat: tuple[Mapping[str, float], ...]
+
+
+def examine(nlp: Nlp, x: FloatArray) -> Evidence:
+    """Examine a point (n,) of a program."""
+    at = linearise(nlp, x)
+    active = at.active()
+    mu, stationarity = multipliers(at, active)
+    feasibility = at.violation
+    normals = at.normals[list(active)]
+    kind = Kind.INFEASIBLE if feasibility > FEASIBLE else Kind.NOT_STATIONARY
+    eigenvalues: FloatArray = np.zeros(0)
+    flat: list[FloatArray] = []
+    if feasibility <= FEASIBLE and stationarity <= STATIONARY:
+        kind, eigenvalues, flat = _second_order(nlp, at, mu)
+    return Evidence(
+        kind=kind,
+        stationarity=stationarity,
+        feasibility=feasibility,
+        complementarity=float(np.max(np.abs(mu * at.slack), initial=0.0)),
+        active=tuple(_active_side(nlp, at, j, mu[j]) for j in active),
+        violated=tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE)),
+        licq=bool(np.linalg.matrix_rank(normals, tol=1e-9) == len(active)) if active else True,
+        eigenvalues=frozen_array(eigenvalues, eigenvalues.shape),
+        flat=tuple(_named(nlp, direction) for direction in flat),
+    )
+
+
+def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
+    side = at.sides[j]
+    limit = limit_of(nlp, side)
+    multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
+    if side.constraint is not None:
+        reading = nlp.program.constraints[side.constraint].reading
+        return ActiveSide(side.name, side.bound, reading.from_value(limit), multiplier * reading.slope(limit))
+    return ActiveSide(side.name, side.bound, limit, multiplier)
+
+
+def _second_order(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[Kind, FloatArray, list[FloatArray]]:
+    strict = Kind.STRICT_MAXIMUM if nlp.sense is Sense.MAX else Kind.STRICT_MINIMUM
+    active = at.active()
+    strong = [j for j in active if mu[j] > STRONG or at.sides[j].bound == "equal"]
+    H = lagrangian_hessian(nlp, at, mu)
+    eigenvalues, directions = _reduced(H, at.normals[strong])
+    if np.all(eigenvalues > CURVED):
+        return strict, eigenvalues, []
+    # Weakly active limits cut the tangent space down to a cone; the subspace inside it is what can be tested.
+    if len(strong) < len(active):
+        inner, directions = _reduced(H, at.normals[list(active)])
+    else:
+        inner = eigenvalues
+    if np.any(inner < -CURVED):
+        return Kind.SADDLE, eigenvalues, []
+    candidates = [directions[:, k] for k in np.flatnonzero(np.abs(inner) <= CURVED)]
+    flat = [direction for direction in candidates if _stays_flat(nlp, at, direction)]
+    if flat:
+        return Kind.NOT_ISOLATED, eigenvalues, _plain_basis(np.array(flat))
+    return Kind.UNDECIDED, eigenvalues, []
+
+
+def _reduced(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Eigenvalues of H on the null space of the normals, ascending, and their directions as columns (n, .)."""
+    if len(normals):
+        _, sizes, rows = np.linalg.svd(normals)
+        Z = rows[int(np.count_nonzero(sizes > 1e-9)) :].T
+    else:
+        Z = np.eye(len(H))
+    values, vectors = np.linalg.eigh(Z.T @ H @ Z)
+    return np.asarray(values, dtype=np.float64), np.asarray(Z @ vectors, dtype=np.float64)
+
+
+def _stays_flat(nlp: Nlp, at: Linearisation, direction: FloatArray) -> bool:
+    """Whether some way along a direction, after correction onto the optimal set, F is still the same."""
+    for sign in (1.0, -1.0):
+        away = at.x + sign * _PROBE * nlp.scale * direction
+        if np.any(away < nlp.lower) or np.any(away > nlp.upper):
+            continue
+        back = linearise(nlp, correct(nlp, away, at.active()))
+        moved = float(np.linalg.norm((back.x - at.x) / nlp.scale))
+        if back.violation <= FEASIBLE and moved > _PROBE / 2 and abs(back.phi - at.phi) <= 1e-11:
+            return True
+    return False
+
+
+def _plain_basis(directions: FloatArray) -> list[FloatArray]:
+    """The same span in as few names as possible a direction: reduced row echelon form, largest entry 1."""
+    rows = directions.copy()
+    pivot_row = 0
+    for _ in range(len(rows)):
+        rest = np.abs(rows[pivot_row:])
+        if rest.max() < _TRACE:
+            break
+        i, j = divmod(int(np.argmax(rest)), rows.shape[1])
+        rows[[pivot_row, pivot_row + i]] = rows[[pivot_row + i, pivot_row]]
+        rows[pivot_row] /= rows[pivot_row, j]
+        for other in range(len(rows)):
+            if other != pivot_row:
+                rows[other] -= rows[other, j] * rows[pivot_row]
+        pivot_row += 1
+    return [row / row[int(np.argmax(np.abs(row)))] for row in rows[:pivot_row]]
+
+
+def _named(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:
+    """A scaled direction as rates of the named variables in their units."""
+    steps = direction * nlp.scale
+    return MappingProxyType(
+        {
+            variable.name: float(step)
+            for variable, step, part in zip(nlp.program.variables, steps, direction, strict=True)
+            if abs(part) > _TRACE
+        }
+    )

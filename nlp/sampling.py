@@ -1,0 +1,36 @@
+"""Starting points: the user's first, then a Latin hypercube, uniform in the ball where a rotation's axis is free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp.program import Nlp
+
+
+def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
+    """Starting points inside the bounds, and inside the rotation's ball.
+
+    Args:
+        nlp: the program.
+        count: how many, at least 1.
+        seed: of the generator; the same seed gives the same points.
+
+    Returns:
+        (count, n) array; the first row is the case's own start.
+    """
+    generator = np.random.default_rng(seed)
+    strata = np.array([generator.permutation(count - 1) for _ in range(nlp.n)]).reshape(nlp.n, count - 1).T
+    unit = (strata + generator.random(strata.shape)) / max(count - 1, 1)
+    points = nlp.lower + unit * (nlp.upper - nlp.lower)
+    names = [variable.name for variable in nlp.program.variables]
+    if "q_x" in names:
+        at = names.index("q_x")
+        ball = [constraint.name for constraint in nlp.program.constraints].index("angle")
+        inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
+        directions = generator.normal(size=(count - 1, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
+        radii = np.cbrt(inner + unit[:, at] * (outer - inner))
+        points[:, at : at + 3] = radii[:, None] * directions
+    return np.vstack([nlp.start, points])
