@@ -1,1 +1,78 @@
-"""Programs over the robots of :mod:`screwsynth.models`: cases, formulation, solution, evidence and output."""
+"""Programs over the robots of :mod:`screwsynth.models`: cases, formulation, solution, evidence and output.
+
+The names below are the public ones. Each is imported when it is first used, so that the command line starts at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from screwsynth.nlp.case import Case, Expectation, Free, Published, Rotation, Search, Sense, Task
+    from screwsynth.nlp.casefile import build_model, case_from_tables, load_case, shipped_cases
+    from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
+    from screwsynth.nlp.evaluation import RobotState, evaluate
+    from screwsynth.nlp.formulation import formulate
+    from screwsynth.nlp.optimality import ActiveSide, Evidence, Kind, examine
+    from screwsynth.nlp.program import Nlp, Program
+    from screwsynth.nlp.result import result_of
+    from screwsynth.nlp.solver import Optimum, Solution, Start, StartStatus, Status, solve
+    from screwsynth.nlp.units import Units
+
+__all__ = [
+    "ActiveSide",
+    "Case",
+    "CaseError",
+    "EvaluationError",
+    "Evidence",
+    "Expectation",
+    "Free",
+    "InputError",
+    "Kind",
+    "Nlp",
+    "Optimum",
+    "Program",
+    "Published",
+    "RobotState",
+    "Rotation",
+    "ScrewsynthError",
+    "Search",
+    "Sense",
+    "Solution",
+    "Start",
+    "StartStatus",
+    "Status",
+    "Task",
+    "Units",
+    "build_model",
+    "case_from_tables",
+    "evaluate",
+    "examine",
+    "formulate",
+    "load_case",
+    "result_of",
+    "shipped_cases",
+    "solve",
+]
+
+_HOMES = {
+    "case": ("Case", "Expectation", "Free", "Published", "Rotation", "Search", "Sense", "Task"),
+    "casefile": ("build_model", "case_from_tables", "load_case", "shipped_cases"),
+    "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
+    "evaluation": ("RobotState", "evaluate"),
+    "formulation": ("formulate",),
+    "optimality": ("ActiveSide", "Evidence", "Kind", "examine"),
+    "program": ("Nlp", "Program"),
+    "result": ("result_of",),
+    "solver": ("Optimum", "Solution", "Start", "StartStatus", "Status", "solve"),
+    "units": ("Units",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value

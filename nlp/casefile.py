@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 import screwsynth.cases
-from screwsynth.models import Dimension, Model, component_names, model_names, robot_function
+from screwsynth.models import Dimension, Model, RobotFunction, component_names, model_names, robot_function
 from screwsynth.nlp import document
 from screwsynth.nlp.case import Case, Expectation, Free, Published, Rotation, Search, Sense, Task, Value
 from screwsynth.nlp.errors import CaseError, InputError, listing, nearest
@@ -95,7 +95,7 @@ def case_from_tables(
 
 def _case(written: document.Document, name: str) -> Case:
     units = Units(written.units.length, written.units.angle)
-    model = _model(written.robot)
+    model = build_model(written.robot.model, written.robot.options)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
@@ -130,14 +130,17 @@ def _case(written: document.Document, name: str) -> Case:
     )
 
 
-def _model(robot: document.RobotTable) -> Model:
-    try:
-        function = robot_function(robot.model)
-    except KeyError:
-        raise CaseError("robot.model", f"no such robot; {nearest(robot.model, model_names())}", robot.model) from None
-    declared = inspect.signature(function).parameters
+def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
+    """The robot of a name, with its options checked against what its function declares.
+
+    Raises:
+        CaseError: no such robot or option, or an option has a value that is not allowed.
+    """
+    options = options or {}
+    function = _function(name)
     hints = typing.get_type_hints(function)
-    for key, value in robot.options.items():
+    declared = inspect.signature(function).parameters
+    for key, value in options.items():
         if key not in declared:
             allowed = [*declared, *document.RobotTable.model_fields]
             raise CaseError(f"robot.{key}", f"no such key; {nearest(key, allowed)}")
@@ -146,10 +149,30 @@ def _model(robot: document.RobotTable) -> Model:
         except ValidationError as error:
             fault = error.errors()[0]["msg"].replace("Input should be", "must be")
             raise CaseError(f"robot.{key}", fault, value) from None
-    missing = [key for key, option in declared.items() if option.default is option.empty and key not in robot.options]
-    if missing:
-        raise CaseError(f"robot.{missing[0]}", f"is missing: {robot.model!r} needs {listing(missing)}")
-    return function(**robot.options)
+    for key, option in declared.items():
+        if option.default is option.empty and key not in options:
+            raise CaseError(f"robot.{key}", f"is missing: {name!r} needs it")
+    return function(**options)
+
+
+def model_options(name: str) -> list[tuple[str, str, str]]:
+    """Options of a robot: name, what is allowed, default."""
+    function = _function(name)
+    hints = typing.get_type_hints(function)
+    rows = []
+    for key, option in inspect.signature(function).parameters.items():
+        hint = hints.get(key, Any)
+        choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
+        allowed = listing(f'"{choice}"' for choice in choices) if choices else getattr(hint, "__name__", str(hint))
+        rows.append((key, allowed, "none: must be given" if option.default is option.empty else f'"{option.default}"'))
+    return rows
+
+
+def _function(name: str) -> RobotFunction:
+    try:
+        return robot_function(name)
+    except KeyError:
+        raise CaseError("robot.model", f"no such robot; {nearest(name, model_names())}", name) from None
 
 
 def _value(written: float | document.Range, units: Units, dimension: Dimension) -> Value:

@@ -11,6 +11,7 @@ import numpy as np
 from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
 from screwsynth.nlp.case import Free
 from screwsynth.nlp.errors import EvaluationError
+from screwsynth.nlp.linear import plain_basis
 from screwsynth.nlp.program import Nlp
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
@@ -35,7 +36,7 @@ class RobotState:
         size: what F would be without cancellation; F is zero when it is small beside this.
         singular_values: (min(m, 6),) of the Jacobian as it stands, largest first.
         rank: of the Jacobian with moments divided by their longest arm.
-        free_twists: (6 - rank, 6) orthonormal basis of the twists that no row of the Jacobian resists.
+        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in plain terms.
         quantities: the model's named measures, each (n,); radians for angles.
     """
 
@@ -123,5 +124,4 @@ def _rank(jacobian: FloatArray) -> tuple[int, FloatArray]:
     _, values, rows = np.linalg.svd(resistance)
     rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
     null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
-    basis = np.linalg.qr(null.T)[0].T if len(null) else np.zeros((0, 6))
-    return rank, np.asarray(basis, dtype=np.float64)
+    return rank, plain_basis(null) if len(null) else np.zeros((0, 6))

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.linear import nonnegative_least_squares
+from screwsynth.nlp.program import Nlp, Side
 
 #: A side closer than this, in scaled variables, is active: well above the rounding error of a corrected point, well
 #: below any clearance that means something in a design.
@@ -30,28 +30,8 @@ _NEWTON_STEPS = 12
 _LONGEST_STEP = 0.1
 #: Singular values below this part of the largest are zero in the Newton system: it may be singular (flat optima).
 _NEWTON_RCOND = 1e-11
-
-
-@dataclass(frozen=True)
-class Side:
-    """One side of a bound or constraint.
-
-    Attributes:
-        name: the variable or constraint.
-        bound: which side of it.
-        variable: index of the variable, or None for a constraint.
-        constraint: index of the constraint, or None for a variable's bound.
-    """
-
-    name: str
-    bound: Literal["min", "max", "equal"]
-    variable: int | None = None
-    constraint: int | None = None
-
-    @property
-    def sign(self) -> float:
-        """Direction, along the bounded expression, that leaves the feasible side."""
-        return -1.0 if self.bound == "min" else 1.0
+#: A residual of the stationarity conditions that further steps cannot bring down: a few rounding errors.
+_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,54 +72,26 @@ class Linearisation:
         return tuple(int(j) for j in np.flatnonzero(self.slack <= tolerance))
 
 
-def sides_of(nlp: Nlp) -> tuple[Side, ...]:
-    """Every side of a program, variables' bounds first."""
-    sides: list[Side] = []
-    for index, variable in enumerate(nlp.program.variables):
-        sides += [Side(variable.name, "min", variable=index), Side(variable.name, "max", variable=index)]
-    for index, constraint in enumerate(nlp.program.constraints):
-        lower, upper = nlp.g_lower[index], nlp.g_upper[index]
-        if lower == upper:
-            sides.append(Side(constraint.name, "equal", constraint=index))
-            continue
-        if np.isfinite(lower):
-            sides.append(Side(constraint.name, "min", constraint=index))
-        if np.isfinite(upper):
-            sides.append(Side(constraint.name, "max", constraint=index))
-    return tuple(sides)
-
-
-def limit_of(nlp: Nlp, side: Side) -> float:
-    """The limit of a side, in the program's terms."""
-    if side.variable is not None:
-        return float((nlp.lower if side.bound == "min" else nlp.upper)[side.variable])
-    return float((nlp.g_lower if side.bound == "min" else nlp.g_upper)[side.constraint or 0])
-
-
 def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     """The program at a point (n,), to first order."""
     F, gradient, g, jacobian = (output.full() for output in nlp.program.derivatives(x, nlp.arguments))
-    scale, sides = nlp.scale, sides_of(nlp)
-    residual, normals, per_unit = np.zeros(len(sides)), np.zeros((len(sides), nlp.n)), np.zeros(len(sides))
-    for j, side in enumerate(sides):
-        if side.variable is not None:
-            row, value = np.zeros(nlp.n), x[side.variable]
-            row[side.variable] = scale[side.variable]
-        else:
-            row, value = jacobian[side.constraint or 0] * scale, g[side.constraint or 0, 0]
-        # Where a constraint has no gradient there is no distance to it; its own residual then stands for one.
-        size = float(np.linalg.norm(row)) if np.any(np.abs(row) > 1e-9) else 1.0
-        residual[j] = side.sign * (value - limit_of(nlp, side)) / size
-        normals[j], per_unit[j] = side.sign * row / size, 1 / size
-    slack = np.array([-abs(r) if s.bound == "equal" else -r for r, s in zip(residual, sides, strict=True)])
+    table, scale = nlp.sides, nlp.scale
+    rows = jacobian * scale
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    # Where a constraint has no gradient there is no distance to it; its own residual then stands for one.
+    sizes = np.where(sizes > 1e-9, sizes, 1.0)
+    per_unit = 1 / np.concatenate([scale, sizes])[table.place]
+    residual = table.sign * (np.concatenate([x, g.ravel()])[table.place] - table.limit) * per_unit
+    outward = table.sign * per_unit
+    normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[table.place]
     weight = nlp.sign / nlp.objective_scale
     return Linearisation(
         x=np.asarray(x, dtype=np.float64),
         F=float(F[0, 0]),
         phi=weight * float(F[0, 0]),
         gradient=weight * gradient.ravel() * scale,
-        sides=sides,
-        slack=slack,
+        sides=table.sides,
+        slack=np.where(table.equal, -np.abs(residual), -residual),
         residual=residual,
         normals=normals,
         per_unit=per_unit,
@@ -170,42 +122,11 @@ def multipliers(at: Linearisation, active: Sequence[int]) -> tuple[FloatArray, f
     return mu, float(np.max(np.abs(left), initial=0.0))
 
 
-def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
-    """``argmin |A y - b|`` over ``y >= 0`` by the active-set method of Lawson and Hanson (1974, chapter 23).
-
-    Args:
-        A: (n, k) matrix, possibly rank deficient.
-        b: (n,) vector.
-    """
-    k = A.shape[1]
-    y, passive = np.zeros(k), np.zeros(k, dtype=bool)
-    tolerance = 1e-14 * max(1.0, float(np.linalg.norm(b)))
-    for _ in range(3 * k + 3):
-        drive = A.T @ (b - A @ y)
-        drive[passive] = -np.inf
-        if passive.all() or drive.max() <= tolerance:
-            break
-        passive[int(np.argmax(drive))] = True
-        while True:
-            trial = np.zeros(k)
-            trial[passive] = np.linalg.lstsq(A[:, passive], b, rcond=None)[0]
-            blocked = passive & (trial <= 0)
-            if not blocked.any():
-                break
-            step = float(np.min(y[blocked] / np.maximum(y[blocked] - trial[blocked], 1e-300)))
-            y = y + step * (trial - y)
-            passive &= y > 1e-15
-            y[~passive] = 0.0
-        y = trial
-    return y
-
-
 def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArray:
     """Hessian of ``phi + sum mu slack-side`` in scaled variables, (n, n)."""
-    weights = np.zeros(len(nlp.program.constraints))
-    for side, value, per_unit in zip(at.sides, mu, at.per_unit, strict=True):
-        if side.constraint is not None:
-            weights[side.constraint] += side.sign * value * per_unit
+    table = nlp.sides
+    carried = np.bincount(table.place, table.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
+    weights = carried[nlp.n :]
     full = nlp.program.hessian(at.x, nlp.arguments, nlp.sign / nlp.objective_scale, weights).full()
     return np.asarray(full * np.outer(nlp.scale, nlp.scale), dtype=np.float64)
 
@@ -218,47 +139,39 @@ def correct(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> FloatArray:
     Args:
         nlp: the program.
         x: (n,) point near a stationary one.
-        active: indices (into :func:`sides_of`) of the sides to hold at their limits.
+        active: indices (into ``nlp.sides``) of the sides to hold at their limits.
 
     Returns:
         (n,) the corrected point, inside the variables' bounds; the given one where Newton's method does not help.
     """
     rows = list(active)
+    pinned = [(nlp.sides.place[j], nlp.sides.limit[j]) for j in rows if nlp.sides.sides[j].variable is not None]
+    best, least = x, np.inf
     at = linearise(nlp, np.clip(x, nlp.lower, nlp.upper))
-    best, best_error = x, _error(at, rows)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_NEWTON_STEPS + 1):
         A = at.normals[rows]
         mu = np.zeros(len(at.sides))
         if rows:
             mu[rows] = np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
-        H = lagrangian_hessian(nlp, at, mu)
-        k = len(rows)
-        matrix = np.block([[H, A.T], [A, np.zeros((k, k))]])
-        right = -np.concatenate([at.gradient + at.normals.T @ mu, at.residual[rows]])
-        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        left = at.gradient + at.normals.T @ mu
+        error = max(float(np.max(np.abs(left), initial=0.0)), at.violation)
+        if not error < least:
             break
+        best, least = at.x, error
+        if error <= _ROUNDING:
+            break
+        k = len(rows)
+        matrix = np.zeros((nlp.n + k, nlp.n + k))
+        matrix[: nlp.n, : nlp.n] = lagrangian_hessian(nlp, at, mu)
+        matrix[: nlp.n, nlp.n :], matrix[nlp.n :, : nlp.n] = A.T, A
+        if not np.isfinite(matrix).all():
+            break
+        right = -np.concatenate([left, at.residual[rows]])
         step = np.linalg.lstsq(matrix, right, rcond=_NEWTON_RCOND)[0][: nlp.n]
         if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
             break
         moved = np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper)
-        for j in rows:
-            variable = at.sides[j].variable
-            if variable is not None:
-                moved[variable] = limit_of(nlp, at.sides[j])
+        for variable, limit in pinned:
+            moved[variable] = limit
         at = linearise(nlp, moved)
-        error = _error(at, rows)
-        if not error < best_error:
-            break
-        best, best_error = moved, error
     return best
-
-
-def _error(at: Linearisation, rows: Sequence[int]) -> float:
-    """Residual of the stationarity conditions with the given sides held; ``inf`` where it is not defined."""
-    if not np.isfinite(at.violation):
-        return float("inf")
-    A = at.normals[list(rows)]
-    left = at.gradient
-    if rows:
-        left = left + A.T @ np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
-    return max(float(np.max(np.abs(left), initial=0.0)), at.violation)

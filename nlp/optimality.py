@@ -21,7 +21,8 @@ import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
 from screwsynth.nlp.case import Sense
-from screwsynth.nlp.kkt import Linearisation, correct, lagrangian_hessian, limit_of, linearise, multipliers
+from screwsynth.nlp.kkt import Linearisation, correct, lagrangian_hessian, linearise, multipliers
+from screwsynth.nlp.linear import plain_basis
 from screwsynth.nlp.program import Nlp
 
 #: Largest scaled derivative of the Lagrangian that counts as none: F can then still improve by about this part of its
@@ -88,7 +89,8 @@ class Evidence:
         licq: whether the active normals are linearly independent, so that the multipliers are unique.
         eigenvalues: of the scaled Lagrangian's Hessian on the tangent space of the strongly active limits, ascending;
             positive means that F gets worse on leaving the point, for a maximum as for a minimum.
-        flat: directions along which F keeps its optimal value: rates of the variables, in their units, by name.
+        flat: directions along which F keeps its optimal value: rates of the variables, in their units, by name,
+            for a step of half a range in the variable that moves most.
     """
 
     kind: Kind
@@ -129,7 +131,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
 
 def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
     side = at.sides[j]
-    limit = limit_of(nlp, side)
+    limit = float(nlp.sides.limit[j])
     multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
     if side.constraint is not None:
         reading = nlp.program.constraints[side.constraint].reading
@@ -155,7 +157,7 @@ def _second_order(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[Kind, Fl
     candidates = [directions[:, k] for k in np.flatnonzero(np.abs(inner) <= CURVED)]
     flat = [direction for direction in candidates if _stays_flat(nlp, at, direction)]
     if flat:
-        return Kind.NOT_ISOLATED, eigenvalues, _plain_basis(np.array(flat))
+        return Kind.NOT_ISOLATED, eigenvalues, list(plain_basis(np.array(flat)))
     return Kind.UNDECIDED, eigenvalues, []
 
 
@@ -181,24 +183,6 @@ def _stays_flat(nlp: Nlp, at: Linearisation, direction: FloatArray) -> bool:
         if back.violation <= FEASIBLE and moved > _PROBE / 2 and abs(back.phi - at.phi) <= 1e-11:
             return True
     return False
-
-
-def _plain_basis(directions: FloatArray) -> list[FloatArray]:
-    """The same span in as few names as possible a direction: reduced row echelon form, largest entry 1."""
-    rows = directions.copy()
-    pivot_row = 0
-    for _ in range(len(rows)):
-        rest = np.abs(rows[pivot_row:])
-        if rest.max() < _TRACE:
-            break
-        i, j = divmod(int(np.argmax(rest)), rows.shape[1])
-        rows[[pivot_row, pivot_row + i]] = rows[[pivot_row + i, pivot_row]]
-        rows[pivot_row] /= rows[pivot_row, j]
-        for other in range(len(rows)):
-            if other != pivot_row:
-                rows[other] -= rows[other, j] * rows[pivot_row]
-        pivot_row += 1
-    return [row / row[int(np.argmax(np.abs(row)))] for row in rows[:pivot_row]]
 
 
 def _named(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import SX
+from numpy.typing import NDArray
 
 from screwsynth.models import Dimension, FloatArray, Model
 from screwsynth.nlp.case import Case, Sense
@@ -141,6 +143,42 @@ class Program:
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
 
 
+@dataclass(frozen=True)
+class Side:
+    """One side of a bound or constraint.
+
+    Attributes:
+        name: the variable or constraint.
+        bound: which side of it.
+        variable: index of the variable, or None for a constraint.
+        constraint: index of the constraint, or None for a variable's bound.
+    """
+
+    name: str
+    bound: Literal["min", "max", "equal"]
+    variable: int | None = None
+    constraint: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SideTable:
+    """Every side of a program, variables' bounds first, and what arithmetic over all of them needs.
+
+    Attributes:
+        sides: the sides.
+        place: (k,) index of each side's expression among the variables and then the constraints.
+        sign: (k,) direction, along that expression, that leaves the feasible side; +1 for an equation.
+        limit: (k,) limit of each side, in the program's terms.
+        equal: (k,) whether it is an equation.
+    """
+
+    sides: tuple[Side, ...]
+    place: NDArray[np.intp]
+    sign: FloatArray
+    limit: FloatArray
+    equal: NDArray[np.bool_]
+
+
 @dataclass(frozen=True, eq=False)
 class Nlp:
     """A program with its numbers: what every solver, certificate and report reads.
@@ -184,6 +222,33 @@ class Nlp:
     def sign(self) -> float:
         """What makes the objective one to be minimised: -1 for a maximum."""
         return -1.0 if self.sense is Sense.MAX else 1.0
+
+    @cached_property
+    def sides(self) -> SideTable:
+        """Every side of every bound and constraint."""
+        sides: list[Side] = []
+        limits: list[float] = []
+        for index, variable in enumerate(self.program.variables):
+            sides += [Side(variable.name, "min", variable=index), Side(variable.name, "max", variable=index)]
+            limits += [float(self.lower[index]), float(self.upper[index])]
+        for index, constraint in enumerate(self.program.constraints):
+            lower, upper = float(self.g_lower[index]), float(self.g_upper[index])
+            if lower == upper:
+                sides.append(Side(constraint.name, "equal", constraint=index))
+                limits.append(lower)
+                continue
+            for bound, limit in (("min", lower), ("max", upper)):
+                if np.isfinite(limit):
+                    sides.append(Side(constraint.name, "min" if bound == "min" else "max", constraint=index))
+                    limits.append(limit)
+        place = [side.variable if side.variable is not None else self.n + (side.constraint or 0) for side in sides]
+        return SideTable(
+            sides=tuple(sides),
+            place=np.array(place, dtype=np.intp),
+            sign=np.array([-1.0 if side.bound == "min" else 1.0 for side in sides]),
+            limit=np.array(limits, dtype=np.float64),
+            equal=np.array([side.bound == "equal" for side in sides], dtype=bool),
+        )
 
     def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Objective and constraints, (c,), at a point (n,)."""

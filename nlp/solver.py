@@ -277,8 +277,8 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iteration
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
     at = linearise(nlp, stopped)
     if np.isfinite(at.violation):
-        corrected = linearise(nlp, correct(nlp, stopped, _held(at, found["lam_x"], found["lam_g"])))
-        at = min((at, corrected), key=_first_order_error)
+        corrected = linearise(nlp, correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"])))
+        at = min((corrected, at), key=_first_order_error)
     stationarity = multipliers(at, at.active())[1]
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
@@ -295,17 +295,13 @@ def _first_order_error(at: Linearisation) -> float:
     return max(at.violation, multipliers(at, at.active())[1])
 
 
-def _held(at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
+def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
     """Sides that an interior-point solution lies on: those whose multiplier exceeds their slack."""
-    held = []
-    for j, side in enumerate(at.sides):
-        if side.variable is not None:
-            strength = side.sign * bound_multipliers[side.variable]
-        else:
-            strength = side.sign * multipliers_of_g[side.constraint or 0] / at.per_unit[j]
-        if side.bound == "equal" or strength > max(at.slack[j], 0.0):
-            held.append(j)
-    return held
+    table = nlp.sides
+    reported = np.concatenate([bound_multipliers, multipliers_of_g])[table.place]
+    # Ipopt's variables are scaled already, its constraints are not.
+    strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
+    return [int(j) for j in np.flatnonzero(table.equal | (strength > np.maximum(at.slack, 0.0)))]
 
 
 def _distinct(nlp: Nlp, converged: list[Start]) -> list[Optimum]:

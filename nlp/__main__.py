@@ -1,0 +1,5 @@
+"""``python -m screwsynth.nlp`` is the command line."""
+
+from screwsynth.nlp.cli import main
+
+main()

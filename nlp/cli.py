@@ -1,0 +1,182 @@
+"""The command line: words in, words out, no mathematics.
+
+Exit status: 0 done; 1 the answer is not what was asked for; 2 the input is wrong. What a command needs is imported when
+it runs, so that help is there at once.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from screwsynth.nlp.case import Case
+    from screwsynth.nlp.solver import Solution
+
+app = typer.Typer(
+    name="screwsynth",
+    help="Geometry and pose of a parallel robot for a given instantaneous screw motion.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
+JsonFile = Annotated[str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.")]
+
+
+@app.command()
+def solve(
+    case: CaseName,
+    starts: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Starting points instead of the case's.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Maximise or minimise F, and show the evidence."""
+    from screwsynth.nlp.casefile import load_case
+    from screwsynth.nlp.result import result_of
+
+    loaded = load_case(case)
+    solution = _solve(loaded, starts, seed, jobs)
+    result = result_of(solution)
+    if json_file is not None:
+        _write_json(json_file, result)
+    if json_file != "-":
+        from screwsynth.nlp.tables import print_solution
+
+        print_solution(_console(), loaded, result)
+    raise typer.Exit(0 if solution.status.is_answer else 1)
+
+
+@app.command()
+def evaluate(
+    case: CaseName,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),
+    ] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Show F, J, rank and rates at one point; nothing is optimised.
+
+    What is free stands at its start, or in the middle of its range.
+    """
+    from screwsynth.nlp import evaluation
+    from screwsynth.nlp.casefile import load_case
+    from screwsynth.nlp.errors import EvaluationError, InputError
+    from screwsynth.nlp.formulation import formulate
+    from screwsynth.nlp.result import SCHEMA, state_of, versions
+
+    loaded = load_case(case, dict(_setting(text) for text in settings or []))
+    nlp = formulate(loaded)
+    try:
+        state = evaluation.evaluate(nlp, nlp.start)
+    except EvaluationError as error:
+        raise InputError(f"{case}: {error}") from None
+    result: dict[str, Any] = {"schema": SCHEMA, "case": loaded.name, "title": loaded.title, "model": loaded.model.name}
+    result |= {"units": {"length": loaded.units.length, "angle": loaded.units.angle}, "F": state.F}
+    result |= {**state_of(loaded, state), "versions": versions()}
+    if json_file is not None:
+        _write_json(json_file, result)
+    if json_file != "-":
+        from screwsynth.nlp.tables import print_state
+
+        print_state(_console(), loaded, result)
+
+
+@app.command()
+def models(name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None) -> None:
+    """List the robots, or show one with its parameters, options and wrenches."""
+    from screwsynth.models import model_names
+    from screwsynth.nlp.casefile import build_model, model_options
+    from screwsynth.nlp.tables import print_model, print_models
+
+    if name is None:
+        print_models(_console(), [(each, build_model(each).description) for each in model_names()])
+    else:
+        print_model(_console(), build_model(name), model_options(name))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files, with which editors complete and check."""
+    from screwsynth.nlp.document import Document
+
+    typer.echo(json.dumps(Document.model_json_schema(), indent=2))
+
+
+@app.command()
+def new(model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot.")]) -> None:
+    """Print a commented case file to begin with: screwsynth new stewart-gough > my-robot.toml."""
+    from screwsynth.nlp.casefile import build_model
+    from screwsynth.nlp.starter import starter_case
+
+    typer.echo(starter_case(build_model(model)), nl=False)
+
+
+def main() -> None:
+    """Run the command line; errors become one sentence on standard error."""
+    from screwsynth.nlp.errors import ScrewsynthError
+
+    try:
+        app()
+    except ScrewsynthError as error:
+        typer.echo(f"screwsynth: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("screwsynth: interrupted", err=True)
+        sys.exit(130)
+
+
+def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -> Solution:
+    from screwsynth.nlp.solver import solve as solve_case
+
+    if not sys.stderr.isatty():
+        return solve_case(case, starts=starts, seed=seed, jobs=jobs)
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("starts", total=None)
+
+        def show(done: int, total: int, best: float | None) -> None:
+            best_text = "" if best is None else f", best F {best:.7g}"
+            bar.update(line, completed=done, total=total, description=f"starts{best_text}")
+
+        return solve_case(case, starts=starts, seed=seed, jobs=jobs, progress=show)
+
+
+def _setting(text: str) -> tuple[str, float | list[float]]:
+    from screwsynth.nlp.errors import InputError
+
+    name, equals, value = text.partition("=")
+    try:
+        numbers = [float(part) for part in value.split(",")]
+    except ValueError:
+        numbers = []
+    if not (name and equals and numbers):
+        raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
+    return name.strip(), numbers[0] if len(numbers) == 1 else numbers
+
+
+def _write_json(target: str, result: dict[str, Any]) -> None:
+    from screwsynth.nlp.files import write_text
+
+    write_text(target, json.dumps(result, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    # Into a file or a pipe, tables are as wide as they need to be.
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 120)

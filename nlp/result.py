@@ -1,0 +1,201 @@
+"""A solution as plain data, in the case's own words and units: what ``--json`` writes and the tables show.
+
+Nothing in it is ever NaN or infinite, but an infinite pitch, which is the string ``"inf"``. A solve that failed has no
+``F``: what it reached is under ``reached``, and can't be taken for an answer.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections import Counter
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from screwsynth.models import Dimension, FloatArray, axis_from_screw
+from screwsynth.nlp.case import Case
+from screwsynth.nlp.evaluation import RobotState
+from screwsynth.nlp.optimality import Evidence
+from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.solver import Solution, StartStatus
+from screwsynth.nlp.units import Units
+
+SCHEMA = 1
+
+
+def result_of(solution: Solution) -> dict[str, Any]:
+    """The whole result of a solve, ready for JSON."""
+    case = solution.nlp.case
+    answer = solution.status.is_answer
+    state = solution.state
+    reached = None if answer else _reached(solution)
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "title": case.title,
+        "model": case.model.name,
+        "units": {"length": case.units.length, "angle": case.units.angle},
+        "sense": solution.nlp.sense.value,
+        "status": solution.status.value,
+        "F": state.F if answer and state is not None else None,
+        **({} if reached is None else {"reached": reached}),
+        **(state_of(case, state) if state is not None else {}),
+        "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
+        "starts": _starts(solution),
+        "certificate": None,
+        "seed": solution.seed,
+        "versions": versions(),
+        "seconds": solution.seconds,
+    }
+
+
+def state_of(case: Case, state: RobotState, task: int = 0) -> dict[str, Any]:
+    """The robot at a point: parameters, pose, task, Jacobian, rates and rank."""
+    return {
+        "parameters": parameters_of(case, state),
+        "pose": {
+            "position": state.position.tolist(),
+            "axis": state.axis.tolist(),
+            "angle": case.units.shown(state.angle, Dimension.ANGLE),
+            "rotation_matrix": state.rotation.tolist(),
+        },
+        "task": {
+            "name": case.tasks[task].name,
+            "sense": case.tasks[task].sense.value,
+            **motion_of(case.tasks[task].twist),
+        },
+        "limbs": [row.limb for row in case.model.wrenches],
+        "jacobian": state.jacobian.tolist(),
+        "rates": state.rates.tolist(),
+        "rank": state.rank,
+        "singular": state.is_singular,
+        "singular_values": state.singular_values.tolist(),
+        "free_motions": [motion_of(twist) for twist in state.free_twists],
+        "task_is_free": state.is_zero,
+        "quantities": {
+            item.name: {
+                owner: case.units.shown(float(value), item.dimension)
+                for owner, value in zip(item.owners, state.quantities[item.name], strict=True)
+            }
+            for item in case.model.quantities
+            if np.isfinite(state.quantities[item.name]).all()
+        },
+        **({"characteristic_length": case.characteristic_length} if case.model.has_couples else {}),
+    }
+
+
+def parameters_of(case: Case, state: RobotState) -> dict[str, Any]:
+    """Values of the robot's parameters by name, in the case's units; a list for a point or direction."""
+    shown: dict[str, Any] = {}
+    for parameter in case.model.parameters:
+        values = [case.units.shown(float(value), parameter.dimension) for value in state.parameters[parameter.name]]
+        shown[parameter.name] = values[0] if len(values) == 1 else values
+    return shown
+
+
+def motion_of(twist: ArrayLike) -> dict[str, Any]:
+    """A twist with its axis, point and pitch; a pure translation has no point."""
+    screw = axis_from_screw(twist)
+    translation = math.isinf(screw.pitch)
+    return {
+        "twist": np.asarray(twist, dtype=np.float64).tolist(),
+        "axis": screw.axis.tolist(),
+        "point": None if translation else screw.point.tolist(),
+        "pitch": "inf" if translation else screw.pitch,
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of what the numbers depend on."""
+    return {
+        "screwsynth": version("screwsynth"),
+        "casadi": version("casadi"),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def _reached(solution: Solution) -> dict[str, Any]:
+    nlp = solution.nlp
+    F, g = nlp.evaluate(solution.x)
+    return {"F": F if math.isfinite(F) else None, "violated": violations(nlp, solution.x, g)}
+
+
+def violations(nlp: Nlp, x: FloatArray, g: FloatArray) -> list[dict[str, Any]]:
+    """Constraints that a point lies outside of: name, value and limit, in the case's words and units."""
+    rows: list[dict[str, Any]] = []
+    units = nlp.case.units
+    for j, side in enumerate(nlp.sides.sides):
+        value = float(x[side.variable]) if side.variable is not None else float(g[side.constraint or 0])
+        limit = float(nlp.sides.limit[j])
+        outside = abs(value - limit) if side.bound == "equal" else float(nlp.sides.sign[j]) * (value - limit)
+        if not outside > 1e-9 * max(1.0, abs(limit)):
+            continue
+        if side.constraint is None:
+            dimension = nlp.program.variables[side.variable or 0].dimension
+        else:
+            reading = nlp.program.constraints[side.constraint].reading
+            dimension, value, limit = reading.dimension, reading.from_value(value), reading.from_value(limit)
+        rows.append(
+            {
+                "name": side.name,
+                "bound": side.bound,
+                "value": units.shown(value, dimension),
+                "limit": units.shown(limit, dimension),
+            }
+        )
+    return rows
+
+
+def _optimality(nlp: Nlp, evidence: Evidence) -> dict[str, Any]:
+    dimensions = {variable.name: variable.dimension for variable in nlp.program.variables}
+    dimensions |= {constraint.name: constraint.reading.dimension for constraint in nlp.program.constraints}
+    units = nlp.case.units
+    return {
+        "kind": evidence.kind.value,
+        "stationarity": _finite(evidence.stationarity),
+        "feasibility": _finite(evidence.feasibility),
+        "complementarity": _finite(evidence.complementarity),
+        "licq": evidence.licq,
+        "active": [
+            {
+                "name": side.name,
+                "bound": side.bound,
+                "value": units.shown(side.value, dimensions[side.name]),
+                # F per unit of the limit: the unit's own factor divides.
+                "multiplier": side.multiplier * units.to_internal(1.0, dimensions[side.name]),
+            }
+            for side in evidence.active
+        ],
+        "reduced_hessian_eigenvalues": evidence.eigenvalues.tolist(),
+        "flat_directions": [_flat(direction, dimensions, units) for direction in evidence.flat],
+    }
+
+
+def _flat(direction: Mapping[str, float], dimensions: Mapping[str, Dimension], units: Units) -> dict[str, float]:
+    """A flat direction in the case's units, its largest rate 1."""
+    rates = {name: units.shown(rate, dimensions[name]) for name, rate in direction.items()}
+    largest = max(rates.values(), key=abs)
+    return {name: rate / largest for name, rate in rates.items()}
+
+
+def _starts(solution: Solution) -> dict[str, Any]:
+    ended = Counter(start.status for start in solution.starts)
+    return {
+        "run": len(solution.starts),
+        "converged": ended[StartStatus.CONVERGED],
+        "failed": {
+            status.value: ended[status]
+            for status in StartStatus
+            if status is not StartStatus.CONVERGED and ended[status]
+        },
+        "optima": [{"F": found.F, "count": found.count, "spread": found.spread} for found in solution.optima],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

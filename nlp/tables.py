@@ -1,0 +1,222 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from screwsynth.models import Dimension, Model, Parameter, component_names
+from screwsynth.nlp.case import Case, Free, Value
+from screwsynth.nlp.units import Units
+
+
+def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None:
+    """The result of a solve, as :func:`screwsynth.nlp.result.result_of` gives it."""
+    console.print(_headline(case, result))
+    if "parameters" in result:
+        console.print(_design(case, result))
+        console.print(_limbs(case, result))
+    for line in _verdict(case, result):
+        console.print(line)
+
+
+def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
+    """The robot at one point, with its Jacobian."""
+    console.print(_title(case))
+    console.print(_labelled("F", _number(result["F"])))
+    console.print(_design(case, result))
+    console.print(_limbs(case, result))
+    console.print(_jacobian(case, result))
+    console.print(_labelled("singular values", _listed(result["singular_values"])))
+    for line in _singularity(case, result):
+        console.print(line)
+
+
+def print_models(console: Console, models: Iterable[tuple[str, str]]) -> None:
+    """Names and descriptions of robots."""
+    table = _table("robot", "what it is")
+    for name, description in models:
+        table.add_row(name, description)
+    console.print(table)
+
+
+def print_model(console: Console, model: Model, options: Sequence[tuple[str, str, str]]) -> None:
+    """One robot: its options (name, what is allowed, default), parameters, rows and measures."""
+    console.print(Text(model.name, style="bold"), Text(model.description), sep="\n")
+    if options:
+        table = _table("option", "allowed", "default")
+        for option in options:
+            table.add_row(*map(Text, option))
+        console.print(table)
+    table = _table("parameter", "measures", "allowed (angles in deg)", "what it is")
+    for parameter in model.parameters:
+        components = ", ".join(parameter.components)
+        table.add_row(components, parameter.dimension.value, _domain(parameter), parameter.description)
+    console.print(table)
+    table = _table("row", "limb", "wrench")
+    for index, row in enumerate(model.wrenches):
+        table.add_row(str(index + 1), row.limb, row.kind.value)
+    console.print(table)
+    if model.quantities:
+        table = _table("quantity", "measures", "what it is")
+        for quantity in model.quantities:
+            table.add_row(quantity.name, quantity.dimension.value, quantity.description)
+        console.print(table)
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 3, 0, 0))
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _title(case: Case) -> Text:
+    return Text(case.title or case.name, style="bold")
+
+
+def _labelled(label: str, text: str) -> Text:
+    return Text.assemble((f"{label}  ", "dim"), text)
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.7g}"
+
+
+def _listed(values: Iterable[float], separator: str = "  ") -> str:
+    return separator.join(f"{value + 0.0:.5g}" for value in values)
+
+
+def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
+    status = result["status"]
+    if result["F"] is None:
+        return Group(_title(case), Text(f"{status}: this is not an optimum", style="bold red"))
+    word = {"max": "largest", "min": "smallest"}[result["sense"]] if status == "optimal" else "fixed point:"
+    return Group(_title(case), Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status})"))
+
+
+def _design(case: Case, result: dict[str, Any]) -> Table:
+    """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
+    table = _table("", "value", "unit", "free between", "held by")
+    held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", [])}
+    units = case.units
+
+    def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
+        table.add_row(
+            name,
+            _number(value),
+            units.label(dimension),
+            _range(given, units, dimension),
+            _held(held, name, units.label(dimension)),
+        )
+
+    for parameter in case.model.parameters:
+        shown = result["parameters"][parameter.name]
+        values = shown if isinstance(shown, list) else [shown]
+        for name, value, given in zip(parameter.components, values, case.components(parameter.name), strict=True):
+            add(name, parameter.dimension, value, given)
+    for name, value, given in zip(component_names("p", 3), result["pose"]["position"], case.position, strict=True):
+        add(name, Dimension.LENGTH, value, given)
+    axis = _listed(result["pose"]["axis"])
+    table.add_row("axis", axis, "", "" if case.axis is not None else "any direction", "")
+    add("angle", Dimension.ANGLE, result["pose"]["angle"], case.rotation.angle)
+    return table
+
+
+def _range(given: Value, units: Units, dimension: Dimension) -> str:
+    if not isinstance(given, Free):
+        return ""
+    return f"{units.shown(given.lower, dimension):g} .. {units.shown(given.upper, dimension):g}"
+
+
+def _held(held: dict[str, Any], name: str, unit: str) -> str:
+    side = held.get(name)
+    return "" if side is None else f"{side['bound']}, costs F {side['multiplier']:.4g} per {unit or 'unit'}"
+
+
+def _limbs(case: Case, result: dict[str, Any]) -> Table:
+    couples = any(row.kind.value == "couple" for row in case.model.wrenches)
+    measures = list(result["quantities"])
+    labels = [f"{name.replace('_', ' ')}\n{case.units.label(_dimension(case.model, name))}" for name in measures]
+    table = _table("limb", *(["wrench"] if couples else []), "rate", "share of F", *labels)
+    total = sum(rate**2 for rate in result["rates"])
+    for row, rate in zip(case.model.wrenches, result["rates"], strict=True):
+        share = f"{100 * rate**2 / total:.1f} %" if total > 0 and not result["task_is_free"] else ""
+        shown = [f"{result['quantities'][name].get(row.limb, float('nan')):.5g}" for name in measures]
+        table.add_row(row.limb, *([row.kind.value] if couples else []), f"{rate:+.6g}", share, *shown)
+    return table
+
+
+def _dimension(model: Model, name: str) -> Dimension:
+    return next(quantity.dimension for quantity in model.quantities if quantity.name == name)
+
+
+def _jacobian(case: Case, result: dict[str, Any]) -> Table:
+    table = _table("J", "f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
+    for row, values in zip(case.model.wrenches, result["jacobian"], strict=True):
+        table.add_row(row.limb, *(f"{value:+.6g}" for value in values))
+    return table
+
+
+def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+    evidence = result["optimality"]
+    if evidence is not None:
+        yield _labelled("verdict", evidence["kind"])
+        for direction in evidence["flat_directions"]:
+            yield _labelled("flat along", ", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()))
+        if evidence["stationarity"] is not None:
+            checks = f"stationarity {evidence['stationarity']:.1e}, feasibility {evidence['feasibility']:.1e}, "
+            curvature = evidence["reduced_hessian_eigenvalues"]
+            smallest = f"smallest curvature {min(curvature):.2e}" if curvature else "no free direction left"
+            yield _labelled("evidence", checks + smallest)
+    for side in (result.get("reached") or {}).get("violated", []):
+        wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
+        yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
+    starts = result["starts"]
+    if starts["run"]:
+        yield _labelled("starts", f"{starts['converged']} of {starts['run']} converged")
+        for sentence, count in starts["failed"].items():
+            yield Text(f"  {count}: {sentence}", style="yellow")
+        for found in starts["optima"][:5]:
+            spread = f", spread over {100 * found['spread']:.0f} % of the box" if found["spread"] > 1e-3 else ""
+            yield Text(f"  {found['count']} at F = {_number(found['F'])}{spread}")
+        if len(starts["optima"]) > 5:
+            yield Text(f"  and {len(starts['optima']) - 5} worse optima")
+    if "rank" in result:
+        yield from _singularity(case, result)
+
+
+def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+    if result["task_is_free"]:
+        yield Text(
+            f"singular: F is 0, so the platform can make the task's motion ({_motion(result['task'], case.units)}) "
+            "with every actuator locked",
+            style="yellow",
+        )
+    if not result["singular"]:
+        yield _labelled("rank of J", f"{result['rank']}")
+        return
+    yield _labelled("rank of J", f"{result['rank']}: the structure is singular; nothing resists combinations of")
+    for motion in result["free_motions"]:
+        yield Text(f"  {_motion(motion, case.units)}")
+
+
+def _motion(motion: dict[str, Any], units: Units) -> str:
+    axis = _listed(motion["axis"], ", ")
+    if motion["pitch"] == "inf":
+        return f"translation along ({axis})"
+    point = _listed(motion["point"], ", ")
+    pitch = "rotation" if abs(motion["pitch"]) < 1e-9 else f"screw of pitch {motion['pitch']:.5g} {units.length}"
+    return f"{pitch} about ({axis}) through ({point})"
+
+
+def _domain(parameter: Parameter) -> str:
+    units = Units()
+    ends = [units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
+    lower = "" if ends[0] == -float("inf") else f">= {ends[0]:g}"
+    upper = "" if ends[1] == float("inf") else f"<= {ends[1]:g}"
+    return ", ".join(part for part in (lower, upper) if part) or "any"
