@@ -7,6 +7,7 @@ it runs, so that help is there at once.
 from __future__ import annotations
 
 import json
+import os
 import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -128,6 +129,8 @@ def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     from screwsynth.nlp.errors import ScrewsynthError
 
+    # pydantic would look for plugins in every installed distribution, which a command that runs for half a second feels.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         app()
     except ScrewsynthError as error:

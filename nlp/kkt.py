@@ -24,14 +24,20 @@ from screwsynth.nlp.program import Nlp, Side
 #: A side closer than this, in scaled variables, is active: well above the rounding error of a corrected point, well
 #: below any clearance that means something in a design.
 ACTIVE = 1e-7
-#: Newton steps of a correction; from an interior-point solution two or three reach rounding error.
-_NEWTON_STEPS = 12
-#: A correction moves no variable by more than this part of half its range: it polishes, it does not search.
+#: Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a change of the
+#: active set, or an optimum where F is flatter than a parabola, takes more.
+_NEWTON_STEPS = 40
+#: A correction moves no variable by more than this part of half its range at once: it polishes, it does not search.
 _LONGEST_STEP = 0.1
-#: Singular values below this part of the largest are zero in the Newton system: it may be singular (flat optima).
-_NEWTON_RCOND = 1e-11
+#: Singular values below this part of the largest are zero in the Newton system, which is singular at optima that are
+#: not isolated. Where second derivatives are nearly zero but not quite, the first cut gives too long a step and the
+#: next one is taken.
+_NEWTON_RCOND = (1e-11, 1e-8, 1e-6)
 #: A residual of the stationarity conditions that further steps cannot bring down: a few rounding errors.
 _ROUNDING = 1e-15
+#: Newton's method has settled on its active set when the residual is below this, and a multiplier is negative when it
+#: is below minus this.
+_SETTLED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,46 +138,77 @@ def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
 
 
 def correct(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> FloatArray:
-    """Newton's method on the stationarity conditions with a given active set, from a point close to a solution.
+    """Newton's method on the stationarity conditions with an active set, from a point close to a solution.
 
+    A side that a step would cross joins the active set; one that ends up with a multiplier of the wrong sign leaves it.
     The steps are least-norm, so a point on a manifold of optima stays where it is along it.
 
     Args:
         nlp: the program.
         x: (n,) point near a stationary one.
-        active: indices (into ``nlp.sides``) of the sides to hold at their limits.
+        active: indices (into ``nlp.sides``) of the sides to hold at first.
 
     Returns:
-        (n,) the corrected point, inside the variables' bounds; the given one where Newton's method does not help.
+        (n,) the corrected point, inside the variables' bounds; where Newton's method does not help, the best one met.
     """
-    rows = list(active)
-    pinned = [(nlp.sides.place[j], nlp.sides.limit[j]) for j in rows if nlp.sides.sides[j].variable is not None]
-    best, least = x, np.inf
-    at = linearise(nlp, np.clip(x, nlp.lower, nlp.upper))
-    for _ in range(_NEWTON_STEPS + 1):
-        A = at.normals[rows]
-        mu = np.zeros(len(at.sides))
-        if rows:
-            mu[rows] = np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
-        left = at.gradient + at.normals.T @ mu
-        error = max(float(np.max(np.abs(left), initial=0.0)), at.violation)
-        if not error < least:
+    held = list(active)
+    at = linearise(nlp, _pinned(nlp, np.clip(x, nlp.lower, nlp.upper), held))
+    for _ in range(_NEWTON_STEPS):
+        mu, error = _residual(at, held)
+        following = None if error <= _ROUNDING else _newton_step(nlp, at, held, mu, error)
+        if following is not None:
+            at = following
+            continue
+        wrong = np.where(nlp.sides.equal, 0.0, mu)
+        if not error <= _SETTLED or wrong.min(initial=0.0) >= -_SETTLED:
             break
-        best, least = at.x, error
-        if error <= _ROUNDING:
-            break
-        k = len(rows)
-        matrix = np.zeros((nlp.n + k, nlp.n + k))
-        matrix[: nlp.n, : nlp.n] = lagrangian_hessian(nlp, at, mu)
-        matrix[: nlp.n, nlp.n :], matrix[nlp.n :, : nlp.n] = A.T, A
-        if not np.isfinite(matrix).all():
-            break
-        right = -np.concatenate([left, at.residual[rows]])
-        step = np.linalg.lstsq(matrix, right, rcond=_NEWTON_RCOND)[0][: nlp.n]
+        held.remove(int(np.argmin(wrong)))
+    return at.x
+
+
+def _residual(at: Linearisation, held: Sequence[int]) -> tuple[FloatArray, float]:
+    """Least-squares multipliers (k,) of the held sides, and the largest error of the stationarity conditions."""
+    mu = np.zeros(len(at.sides))
+    if held and np.isfinite(at.gradient).all():
+        mu[held] = np.linalg.lstsq(at.normals[held].T, -at.gradient, rcond=None)[0]
+    left = at.gradient + at.normals.T @ mu
+    return mu, max(float(np.max(np.abs(left), initial=0.0)), at.violation)
+
+
+def _pinned(nlp: Nlp, x: FloatArray, held: Sequence[int]) -> FloatArray:
+    """The point with the variables whose bounds are held exactly on them."""
+    table, moved = nlp.sides, x.copy()
+    for j in held:
+        variable = table.sides[j].variable
+        if variable is not None:
+            moved[variable] = table.limit[j]
+    return moved
+
+
+def _newton_step(nlp: Nlp, at: Linearisation, held: list[int], mu: FloatArray, error: float) -> Linearisation | None:
+    """The point after one Newton step; None when no small step brings the residual down.
+
+    Where the step would cross a side, it ends there and the side joins ``held``.
+    """
+    n, k, A = nlp.n, len(held), at.normals[held]
+    left = at.gradient + at.normals.T @ mu
+    matrix = np.zeros((n + k, n + k))
+    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = lagrangian_hessian(nlp, at, mu), A.T, A
+    right = -np.concatenate([left, at.residual[held]])
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return None
+    for rcond in _NEWTON_RCOND:
+        step = np.linalg.lstsq(matrix, right, rcond=rcond)[0][:n]
         if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
-            break
-        moved = np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper)
-        for variable, limit in pinned:
-            moved[variable] = limit
-        at = linearise(nlp, moved)
-    return best
+            continue
+        towards = at.normals @ step
+        towards[held] = 0.0
+        reach = np.where(towards > 1e-12, np.maximum(at.slack, 0.0) / np.maximum(towards, 1e-12), np.inf)
+        part = min(1.0, float(reach.min(initial=1.0)))
+        met = [int(np.argmin(reach))] if part < 1.0 else []
+        moved = np.clip(at.x + part * nlp.scale * step, nlp.lower, nlp.upper)
+        after = linearise(nlp, _pinned(nlp, moved, [*held, *met]))
+        if met or _residual(after, held)[1] < error:
+            held += met
+            return after
+    return None

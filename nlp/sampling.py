@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 
 from screwsynth.models import FloatArray
@@ -11,6 +13,8 @@ from screwsynth.nlp.program import Nlp
 def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
     """Starting points inside the bounds, and inside the rotation's ball.
 
+    The generator is Python's own: importing NumPy's takes longer than a solve's sampling ever does.
+
     Args:
         nlp: the program.
         count: how many, at least 1.
@@ -19,16 +23,18 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
     Returns:
         (count, n) array; the first row is the case's own start.
     """
-    generator = np.random.default_rng(seed)
-    strata = np.array([generator.permutation(count - 1) for _ in range(nlp.n)]).reshape(nlp.n, count - 1).T
-    unit = (strata + generator.random(strata.shape)) / max(count - 1, 1)
+    generator = random.Random(seed)  # noqa: S311 - starting points, not secrets
+    unit = np.empty((count - 1, nlp.n))
+    for column in unit.T:
+        strata = generator.sample(range(count - 1), count - 1)
+        column[:] = [(stratum + generator.random()) / (count - 1) for stratum in strata]
     points = nlp.lower + unit * (nlp.upper - nlp.lower)
     names = [variable.name for variable in nlp.program.variables]
     if "q_x" in names:
         at = names.index("q_x")
         ball = [constraint.name for constraint in nlp.program.constraints].index("angle")
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
-        directions = generator.normal(size=(count - 1, 3))
+        directions = np.array([[generator.gauss() for _ in range(3)] for _ in range(count - 1)]).reshape(-1, 3)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
         radii = np.cbrt(inner + unit[:, at] * (outer - inner))

@@ -32,6 +32,8 @@ from screwsynth.nlp.sampling import starting_points
 
 #: Ipopt's tolerance. The Newton correction behind it converges quadratically, so tighter would only cost iterations.
 _IPOPT_TOLERANCE = 1e-8
+#: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
+_NEAR = 1e-2
 #: Two optima are the same when their scaled objectives and points differ by less than these.
 _SAME_VALUE = 1e-9
 _SAME_POINT = 1e-4
@@ -278,7 +280,9 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iteration
     at = linearise(nlp, stopped)
     if np.isfinite(at.violation):
         corrected = linearise(nlp, correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"])))
-        at = min((corrected, at), key=_first_order_error)
+        # A correction that makes F worse has gone to another stationary point.
+        if corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE:
+            at = min((corrected, at), key=_first_order_error)
     stationarity = multipliers(at, at.active())[1]
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
@@ -296,12 +300,17 @@ def _first_order_error(at: Linearisation) -> float:
 
 
 def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
-    """Sides that an interior-point solution lies on: those whose multiplier exceeds their slack."""
+    """Sides that an interior-point solution may lie on: near, with a multiplier that is not small beside the slack.
+
+    An interior-point method ends with multiplier * slack about equal on all sides. The choice is generous, because a
+    side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
+    """
     table = nlp.sides
     reported = np.concatenate([bound_multipliers, multipliers_of_g])[table.place]
     # Ipopt's variables are scaled already, its constraints are not.
     strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
-    return [int(j) for j in np.flatnonzero(table.equal | (strength > np.maximum(at.slack, 0.0)))]
+    near = (at.slack < _NEAR) & (strength > _NEAR**2 * np.maximum(at.slack, 0.0))
+    return [int(j) for j in np.flatnonzero(table.equal | near)]
 
 
 def _distinct(nlp: Nlp, converged: list[Start]) -> list[Optimum]:
