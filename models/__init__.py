@@ -1,7 +1,7 @@
 """Symbolic robots and the screw algebra they are written in."""
 
 from screwsynth.models.arrays import FloatArray, frozen_array
-from screwsynth.models.catalog import RobotFunction, model_names, robot_function
+from screwsynth.models.catalog import RobotFunction, UnknownModelError, model_names, robot_function
 from screwsynth.models.hexapod import hexapod
 from screwsynth.models.legs import Leg, LeggedPlatform, legged_platform
 from screwsynth.models.model import (
@@ -36,6 +36,7 @@ from screwsynth.models.screws import (
     moved_screw,
     reciprocal_product,
     screw_from_axis,
+    unit_vector,
 )
 from screwsynth.models.stewart_gough import stewart_gough
 
@@ -57,6 +58,7 @@ __all__ = [
     "Scene",
     "Screw",
     "Unknown",
+    "UnknownModelError",
     "Wrench",
     "WrenchKind",
     "axis_angle_from_matrix",
@@ -77,4 +79,5 @@ __all__ = [
     "robot_function",
     "screw_from_axis",
     "stewart_gough",
+    "unit_vector",
 ]

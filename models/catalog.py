@@ -14,6 +14,11 @@ from screwsynth.models.hexapod import hexapod
 from screwsynth.models.model import Model
 from screwsynth.models.stewart_gough import stewart_gough
 
+
+class UnknownModelError(KeyError):
+    """No robot has that name."""
+
+
 RobotFunction = Callable[..., Model]
 
 GROUP = "screwsynth.models"
@@ -25,14 +30,14 @@ def model_names() -> tuple[str, ...]:
     """Names of all robots on this machine, the shipped ones first; nothing is imported to find out."""
     from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs never ask
 
-    return (*SHIPPED, *sorted(point.name for point in entry_points(group=GROUP) if point.name not in SHIPPED))
+    return (*SHIPPED, *sorted({point.name for point in entry_points(group=GROUP)} - set(SHIPPED)))
 
 
 def robot_function(name: str) -> RobotFunction:
     """The function that builds the named robot. A shipped name cannot be taken over by another package.
 
     Raises:
-        KeyError: no robot has that name.
+        UnknownModelError: no robot has that name.
     """
     if name in SHIPPED:
         return SHIPPED[name]
@@ -41,4 +46,4 @@ def robot_function(name: str) -> RobotFunction:
     for point in entry_points(group=GROUP, name=name):
         function: RobotFunction = point.load()
         return function
-    raise KeyError(name)
+    raise UnknownModelError(name)

@@ -48,6 +48,17 @@ class Screw:
     intensity: float
 
 
+def unit_vector(vector: ArrayLike) -> FloatArray:
+    """A vector's direction, (3,) read-only; neither very large nor very small components overflow.
+
+    Args:
+        vector: (3,) finite numbers, not all zero.
+    """
+    v = frozen_array(vector, (3,))
+    scaled = v / np.abs(v).max()
+    return frozen_array(scaled / np.linalg.norm(scaled), (3,))
+
+
 def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: float = 1.0) -> FloatArray:
     """Coordinates of a screw from its axis (equations 3 and 4).
 
@@ -67,14 +78,13 @@ def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: 
     s0 = np.array(point, dtype=np.float64)
     if s.shape != (3,) or s0.shape != (3,):
         raise ValueError(f"axis and point must have 3 components, got shapes {s.shape} and {s0.shape}")
-    size = float(np.linalg.norm(s))
-    if not (math.isfinite(size) and size > 0.0):
+    if not (np.isfinite(s).all() and s.any()):
         raise ValueError("axis must be finite and not zero")
     if not (np.isfinite(s0).all() and math.isfinite(intensity)):
         raise ValueError("point and intensity must be finite")
     if math.isnan(pitch) or pitch == -math.inf:
         raise ValueError("pitch must be a number or +inf")
-    s /= size
+    s = unit_vector(s)
     if math.isinf(pitch):
         return frozen_array(np.concatenate([np.zeros(3), intensity * s]), (6,))
     return frozen_array(intensity * np.concatenate([s, np.cross(s0, s) + pitch * s]), (6,))

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.case import Case, Expectation, Free, Published, Rotation, Search, Sense, Task
-    from screwsynth.nlp.casefile import build_model, case_from_tables, load_case, shipped_cases
+    from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
     from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
     from screwsynth.nlp.optimality import ActiveSide, Evidence, Kind, examine
     from screwsynth.nlp.program import Nlp, Program
     from screwsynth.nlp.result import result_of
+    from screwsynth.nlp.robots import build_model
     from screwsynth.nlp.solver import Optimum, Solution, Start, StartStatus, Status, solve
     from screwsynth.nlp.units import Units
 
@@ -56,7 +57,8 @@ __all__ = [
 
 _HOMES = {
     "case": ("Case", "Expectation", "Free", "Published", "Rotation", "Search", "Sense", "Task"),
-    "casefile": ("build_model", "case_from_tables", "load_case", "shipped_cases"),
+    "robots": ("build_model",),
+    "casefile": ("case_from_tables", "load_case", "shipped_cases"),
     "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
     "evaluation": ("RobotState", "evaluate"),
     "formulation": ("formulate",),

@@ -16,12 +16,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis
+from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis, unit_vector
 from screwsynth.nlp.errors import CaseError, nearest
 from screwsynth.nlp.units import Units
 
 #: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
 MAX_FREE_ROTATION = math.radians(179)
+#: No number of a case may be larger, and no twist smaller than its inverse: squares and fourth powers stay finite.
+LARGEST = 1e30
 
 
 class Sense(enum.Enum):
@@ -60,7 +62,7 @@ class Rotation:
     Attributes:
         axis: (3,) held axis, any length but zero; None leaves the axis free.
         angle: radians. With the axis free the sign of an angle means nothing: ``Free(-0.5, 0.5)`` allows every rotation
-            by at most 0.5, about any axis.
+            by at most 0.5, about any axis; its start is about z.
     """
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
@@ -160,6 +162,7 @@ class Case:
         title, name: for people; the name is the file's.
         expect: what a regression holds the case to.
         published: what the literature prints.
+        source: name of the file it was read from, for messages.
 
     Raises:
         CaseError: a value is missing, unknown, not finite, out of its range, or crossed; the key is in the words of a
@@ -178,6 +181,7 @@ class Case:
     name: str = "case"
     expect: Expectation = field(default_factory=Expectation)
     published: tuple[Published, ...] = ()
+    source: str | None = None
 
     def __post_init__(self) -> None:
         settle = object.__setattr__
@@ -185,8 +189,8 @@ class Case:
         settle(self, "position", _position(self))
         settle(self, "rotation", _rotation(self))
         settle(self, "tasks", _tasks(self))
-        if not (math.isfinite(self.characteristic_length) and self.characteristic_length > 0):
-            raise CaseError("robot.characteristic_length", "must be positive", self.characteristic_length)
+        if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
+            raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
     def components(self, name: str) -> tuple[Value, ...]:
         """Values of a parameter, component by component."""
@@ -211,7 +215,7 @@ def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
             raise CaseError(key, f"is missing: {parameter.description}, {_expected(parameter)}")
         given = case.parameters[name]
         values = tuple(given) if isinstance(given, Sequence) else (given,)
-        if len(values) != len(parameter.typical) or isinstance(given, Sequence) != (len(parameter.typical) > 1):
+        if len(values) != len(parameter.typical):
             raise CaseError(key, f"must be {_expected(parameter)}")
         settled[name] = tuple(
             _checked(
@@ -259,10 +263,9 @@ def _unit(values: ArrayLike, key: str) -> FloatArray:
     vector = np.array(values, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise CaseError(key, "must be three finite numbers")
-    size = float(np.linalg.norm(vector))
-    if size == 0:
+    if not vector.any():
         raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
-    return frozen_array(vector / size, (3,))
+    return unit_vector(vector)
 
 
 def _tasks(case: Case) -> tuple[Task, ...]:
@@ -274,8 +277,12 @@ def _tasks(case: Case) -> tuple[Task, ...]:
         twist = np.array(task.twist, dtype=np.float64)
         if twist.shape != (6,) or not np.isfinite(twist).all():
             raise CaseError(f"{key}.twist", "must be six finite numbers")
-        if not twist.any():
+        size = float(np.abs(twist).max())
+        if size == 0:
             raise CaseError(f"{key}.twist", "must not be zero: the platform would not move", twist.tolist())
+        if not 1 / LARGEST <= size <= LARGEST:
+            fault = f"has a largest component of {size:g}, which must be between {1 / LARGEST:g} and {LARGEST:g}"
+            raise CaseError(f"{key}.twist", fault)
         if not (math.isfinite(task.weight) and task.weight > 0):
             raise CaseError(f"{key}.weight", "must be positive", task.weight)
         settled.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight)))
@@ -310,6 +317,8 @@ def _number(value: float, key: str, dimension: Dimension, units: Units, domain: 
     number = float(value)
     if not math.isfinite(number):
         raise CaseError(key, "must be finite", number)
+    if abs(number) > LARGEST:
+        raise CaseError(key, f"must be at most {LARGEST:g} in size", number)
     lower, upper = domain
     # A bound written in degrees may differ from the same bound in radians by rounding.
     slack = 1e-12 * max(1.0, abs(number))

@@ -5,20 +5,18 @@ A case is named by its path, or, for the ones that come with the package, by its
 
 from __future__ import annotations
 
-import inspect
+import math
 import tomllib
-import typing
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
-
 import screwsynth.cases
-from screwsynth.models import Dimension, Model, RobotFunction, component_names, model_names, robot_function
+from screwsynth.models import Dimension, FloatArray, component_names, screw_from_axis
 from screwsynth.nlp import document
-from screwsynth.nlp.case import Case, Expectation, Free, Published, Rotation, Search, Sense, Task, Value
-from screwsynth.nlp.errors import CaseError, InputError, listing, nearest
+from screwsynth.nlp.case import LARGEST, Case, Expectation, Free, Published, Rotation, Search, Sense, Task, Value
+from screwsynth.nlp.errors import CaseError, InputError, nearest
+from screwsynth.nlp.robots import build_model
 from screwsynth.nlp.units import Units
 
 _SHIPPED = Path(screwsynth.cases.__file__).parent
@@ -35,17 +33,25 @@ def find_case(name: str) -> Path:
     Raises:
         InputError: there is no such file.
     """
+    try:
+        path = _existing(name)
+    except OSError as error:  # such as a name that is too long
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if path is None:
+        hint = nearest(name, shipped_cases())
+        raise InputError(
+            f"{name or 'an empty name'}: no such file, and no case of this name comes with screwsynth; {hint}"
+        )
+    return path
+
+
+def _existing(name: str) -> Path | None:
     path = Path(name)
-    if path.is_file():
-        return path
-    shipped = _SHIPPED / f"{name}.toml"
-    if path.name == name and path.suffix != ".toml" and shipped.is_file():
-        return shipped
-    if path.is_dir():
+    if name and path.is_dir():
         raise InputError(f"{name}: is a folder, not a case file")
-    raise InputError(
-        f"{name}: no such file, and no case of this name comes with screwsynth; {nearest(name, shipped_cases())}"
-    )
+    if name and path.exists():
+        return path
+    return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
 def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
@@ -66,7 +72,7 @@ def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
         raise InputError(f"{path}: cannot be read: {error}") from None
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
     return case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {})
 
@@ -86,14 +92,17 @@ def case_from_tables(
         CaseError: something in it is not allowed.
     """
     try:
-        for key, value in (settings or {}).items():
-            _set(tables, key, value)
-        return _case(document.parse_document(tables), name)
+        written = document.parse_document(tables)
+        if settings:
+            for key, value in settings.items():
+                _set(tables, key, value)
+            written = document.parse_document(tables)
+        return _case(written, name, source)
     except CaseError as error:
         raise error.within(source) from None
 
 
-def _case(written: document.Document, name: str) -> Case:
+def _case(written: document.Document, name: str, source: str) -> Case:
     units = Units(written.units.length, written.units.angle)
     model = build_model(written.robot.model, written.robot.options)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
@@ -103,9 +112,7 @@ def _case(written: document.Document, name: str) -> Case:
     return Case(
         model=model,
         parameters={
-            key: [_value(part, units, dimensions.get(key, Dimension.NUMBER)) for part in given]
-            if isinstance(given, list)
-            else _value(given, units, dimensions.get(key, Dimension.NUMBER))
+            key: _parameter(key, given, units, dimensions.get(key, Dimension.NUMBER))
             for key, given in written.robot.parameters.items()
         },
         position=[_value(part, units, Dimension.LENGTH) for part in written.pose.position],
@@ -127,52 +134,18 @@ def _case(written: document.Document, name: str) -> Case:
             )
             for row in written.published
         ),
+        source=source,
     )
 
 
-def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
-    """The robot of a name, with its options checked against what its function declares.
-
-    Raises:
-        CaseError: no such robot or option, or an option has a value that is not allowed.
-    """
-    options = options or {}
-    function = _function(name)
-    hints = typing.get_type_hints(function)
-    declared = inspect.signature(function).parameters
-    for key, value in options.items():
-        if key not in declared:
-            allowed = [*declared, *document.RobotTable.model_fields]
-            raise CaseError(f"robot.{key}", f"no such key; {nearest(key, allowed)}")
-        try:
-            TypeAdapter(hints.get(key, Any), config=ConfigDict(strict=True)).validate_python(value)
-        except ValidationError as error:
-            fault = error.errors()[0]["msg"].replace("Input should be", "must be")
-            raise CaseError(f"robot.{key}", fault, value) from None
-    for key, option in declared.items():
-        if option.default is option.empty and key not in options:
-            raise CaseError(f"robot.{key}", f"is missing: {name!r} needs it")
-    return function(**options)
-
-
-def model_options(name: str) -> list[tuple[str, str, str]]:
-    """Options of a robot: name, what is allowed, default."""
-    function = _function(name)
-    hints = typing.get_type_hints(function)
-    rows = []
-    for key, option in inspect.signature(function).parameters.items():
-        hint = hints.get(key, Any)
-        choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
-        allowed = listing(f'"{choice}"' for choice in choices) if choices else getattr(hint, "__name__", str(hint))
-        rows.append((key, allowed, "none: must be given" if option.default is option.empty else f'"{option.default}"'))
-    return rows
-
-
-def _function(name: str) -> RobotFunction:
-    try:
-        return robot_function(name)
-    except KeyError:
-        raise CaseError("robot.model", f"no such robot; {nearest(name, model_names())}", name) from None
+def _parameter(
+    key: str, given: float | document.Range | list[float | document.Range], units: Units, dimension: Dimension
+) -> Value | list[Value]:
+    if not isinstance(given, list):
+        return _value(given, units, dimension)
+    if len(given) == 1:
+        raise CaseError(f"robot.parameters.{key}", "must be a number or { min, max }, without brackets")
+    return [_value(part, units, dimension) for part in given]
 
 
 def _value(written: float | document.Range, units: Units, dimension: Dimension) -> Value:
@@ -196,28 +169,33 @@ def _tasks(written: list[document.TaskTable]) -> list[Task]:
 
 def _task(written: document.TaskTable, index: int) -> Task:
     key, name = f"task[{index}]", written.name or f"task {index + 1}"
-    by_axis = {"axis": written.axis, "point": written.point, "pitch": written.pitch}
-    if written.twist is not None:
-        for part, given in by_axis.items():
-            if given is not None:
-                raise CaseError(f"{key}.{part}", "cannot stand beside twist; say the motion in one way")
-        return Task(written.twist, Sense(written.sense), name, written.weight)
-    point = written.point
-    if written.axis is None:
+    if written.twist is None:
+        return Task(_screw(written, key), Sense(written.sense), name, written.weight)
+    for part in ("axis", "point", "pitch"):
+        if getattr(written, part) is not None:
+            raise CaseError(f"{key}.{part}", "cannot stand beside twist; say the motion in one way")
+    return Task(written.twist, Sense(written.sense), name, written.weight)
+
+
+def _screw(written: document.TaskTable, key: str) -> FloatArray:
+    """The unit twist of a task that is given by axis, point and pitch."""
+    axis, point, pitch = written.axis, written.point, written.pitch
+    if axis is None:
         raise CaseError(f"{key}.axis", "is missing: give axis, point and pitch, or twist")
-    if written.pitch is None:
+    if not any(axis):
+        raise CaseError(f"{key}.axis", "must not be zero: it gives no direction", axis)
+    if pitch is None:
         raise CaseError(f"{key}.pitch", "is missing: a number, 0 for a rotation, inf for a translation")
+    if pitch == math.inf:
+        return screw_from_axis(axis, point or (0.0, 0.0, 0.0), pitch)
+    if not math.isfinite(pitch):
+        raise CaseError(f"{key}.pitch", "must be a number or inf", pitch)
     if point is None:
-        if written.pitch != float("inf"):
-            raise CaseError(f"{key}.point", "is missing: any point on the axis")
-        point = [0.0, 0.0, 0.0]
-    if not any(written.axis):
-        raise CaseError(f"{key}.axis", "must not be zero: it gives no direction", written.axis)
-    if written.pitch != written.pitch or written.pitch == float("-inf"):
-        raise CaseError(f"{key}.pitch", "must be a number or inf", written.pitch)
-    return Task.screw(
-        written.sense, axis=written.axis, point=point, pitch=written.pitch, name=name, weight=written.weight
-    )
+        raise CaseError(f"{key}.point", "is missing: any point on the axis")
+    for part, number in (("pitch", pitch), *((f"point[{i}]", each) for i, each in enumerate(point))):
+        if abs(number) > LARGEST:
+            raise CaseError(f"{key}.{part}", f"must be at most {LARGEST:g} in size", number)
+    return screw_from_axis(axis, point, pitch)
 
 
 def _set(tables: dict[str, Any], name: str, value: Any) -> None:  # noqa: ANN401 - whatever TOML can hold

@@ -6,6 +6,7 @@ it runs, so that help is there at once.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -48,6 +49,7 @@ def solve(
     from screwsynth.nlp.result import result_of
 
     loaded = load_case(case)
+    _check_target(json_file)
     solution = _solve(loaded, starts, seed, jobs)
     result = result_of(solution)
     if json_file is not None:
@@ -74,16 +76,13 @@ def evaluate(
     """
     from screwsynth.nlp import evaluation
     from screwsynth.nlp.casefile import load_case
-    from screwsynth.nlp.errors import EvaluationError, InputError
     from screwsynth.nlp.formulation import formulate
     from screwsynth.nlp.result import SCHEMA, state_of, versions
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
+    _check_target(json_file)
     nlp = formulate(loaded)
-    try:
-        state = evaluation.evaluate(nlp, nlp.start)
-    except EvaluationError as error:
-        raise InputError(f"{case}: {error}") from None
+    state = evaluation.evaluate(nlp, nlp.start)
     result: dict[str, Any] = {"schema": SCHEMA, "case": loaded.name, "title": loaded.title, "model": loaded.model.name}
     result |= {"units": {"length": loaded.units.length, "angle": loaded.units.angle}, "F": state.F}
     result |= {**state_of(loaded, state), "versions": versions()}
@@ -99,13 +98,16 @@ def evaluate(
 def models(name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None) -> None:
     """List the robots, or show one with its parameters, options and wrenches."""
     from screwsynth.models import model_names
-    from screwsynth.nlp.casefile import build_model, model_options
+    from screwsynth.nlp.robots import build_model, model_options
     from screwsynth.nlp.tables import print_model, print_models
 
     if name is None:
-        print_models(_console(), [(each, build_model(each).description) for each in model_names()])
-    else:
-        print_model(_console(), build_model(name), model_options(name))
+        print_models(_console(), [(each, _description(each)) for each in model_names()])
+        return
+    options = model_options(name)
+    needed = [option for option, _, default in options if default is None]
+    # Without the options that it cannot do without, a robot has no parameters to show yet.
+    print_model(_console(), name, None if needed else build_model(name), options)
 
 
 @app.command()
@@ -119,7 +121,7 @@ def schema() -> None:
 @app.command()
 def new(model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot.")]) -> None:
     """Print a commented case file to begin with: screwsynth new stewart-gough > my-robot.toml."""
-    from screwsynth.nlp.casefile import build_model
+    from screwsynth.nlp.robots import build_model
     from screwsynth.nlp.starter import starter_case
 
     typer.echo(starter_case(build_model(model)), nl=False)
@@ -129,8 +131,12 @@ def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     from screwsynth.nlp.errors import ScrewsynthError
 
-    # pydantic would look for plugins in every installed distribution, which a command that runs for half a second feels.
+    # pydantic would look for plugins in every installed distribution: a tenth of a short command's time.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that cannot show a letter of a title shows its escape instead.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except ScrewsynthError as error:
@@ -139,6 +145,17 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("screwsynth: interrupted", err=True)
         sys.exit(130)
+
+
+def _description(model: str) -> str:
+    """What a robot is, or why it cannot be used: another package's fault must not hide the others."""
+    from screwsynth.nlp.errors import CaseError
+    from screwsynth.nlp.robots import build_model
+
+    try:
+        return build_model(model).description
+    except CaseError as error:
+        return error.fault
 
 
 def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -> Solution:
@@ -162,24 +179,31 @@ def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -
 def _setting(text: str) -> tuple[str, float | list[float]]:
     from screwsynth.nlp.errors import InputError
 
-    name, equals, value = text.partition("=")
+    name, equals, value = (part.strip() for part in text.partition("="))
     try:
         numbers = [float(part) for part in value.split(",")]
     except ValueError:
         numbers = []
     if not (name and equals and numbers):
         raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
-    return name.strip(), numbers[0] if len(numbers) == 1 else numbers
+    return name, numbers[0] if len(numbers) == 1 else numbers
+
+
+def _check_target(target: str | None) -> None:
+    from screwsynth.nlp.files import check_target
+
+    if target is not None:
+        check_target(target)
 
 
 def _write_json(target: str, result: dict[str, Any]) -> None:
     from screwsynth.nlp.files import write_text
 
-    write_text(target, json.dumps(result, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(target, json.dumps(result, indent=2, allow_nan=False) + "\n")
 
 
 def _console() -> Console:
     from rich.console import Console
 
     # Into a file or a pipe, tables are as wide as they need to be.
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+    return Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 120)

@@ -6,6 +6,7 @@ keys, types, finite numbers. Everything else is checked once, by :class:`screwsy
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
@@ -15,6 +16,7 @@ from pydantic import (
     Discriminator,
     Field,
     FiniteFloat,
+    StringConstraints,
     Tag,
     ValidationError,
     model_validator,
@@ -53,6 +55,10 @@ class Range(Table):
     start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
 
 
+#: What pydantic puts into the path of a fault for the branch of a union; no key of a file.
+_TAGS = ("<number>", "<range>", "<list>")
+
+
 def _number_or_range(value: object) -> str:
     return "<range>" if isinstance(value, dict | Range) else "<number>"
 
@@ -64,6 +70,10 @@ def _value_or_list(value: object) -> str:
 Value = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_number_or_range)
 ]
+Numbers = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
+]
 VectorOrValue = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
     Discriminator(_value_or_list),
@@ -74,7 +84,7 @@ Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 class UnitsTable(Table):
     """Units of every number in the file."""
 
-    length: Annotated[str, Field(min_length=1, max_length=20)] = Field(
+    length: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)] = Field(
         default="m", description="label of the length unit"
     )
     angle: Literal["deg", "rad"] = Field(default="deg", description="unit of angles")
@@ -151,7 +161,7 @@ class PublishedTable(Table):
     """A number that the literature prints."""
 
     quantity: str = Field(min_length=1, description="what it is")
-    value: FiniteFloat | list[FiniteFloat] = Field(description="as printed")
+    value: Numbers = Field(description="as printed")
     source: str = Field(min_length=1, description="where")
     reproduced: bool = Field(description="whether this program reproduces it")
     because: str = Field(default="", description="the reason, where it does not")
@@ -210,7 +220,7 @@ def dotted_key(location: list[int | str]) -> str:
         for part in location:
             if isinstance(part, int):
                 yield f"[{part}]"
-            elif not part.startswith("<"):
+            elif part not in _TAGS:
                 yield f".{part}"
 
     return "".join(parts()).lstrip(".") or "the file"
@@ -227,20 +237,49 @@ _KINDS = {
     "finite_number": "must be finite",
     "string_too_short": "must not be empty",
 }
+#: What stands at keys whose type alone would say too little.
+_FORMS = {
+    "axis": "must be a list of 3 numbers",
+    "point": "must be a list of 3 numbers",
+    "twist": "must be a list of 6 numbers",
+    "position": "must be a list of 3, each a number or { min, max }",
+    "task": "must be a list of tables: write [[task]], with two brackets",
+    "published": "must be a list of tables: write [[published]], with two brackets",
+}
 
 
 def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
-    kind = fault["type"]
-    if kind == "missing":
-        return "is missing"
-    if kind == "literal_error":
-        return f"must be one of {context['expected']}"
-    if kind in ("too_short", "too_long"):
-        limit = context["min_length"] if kind == "too_short" else context["max_length"]
-        few = "at least " if kind == "too_short" and limit == 1 else ""
-        return f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
-    if kind == "float_type" and fault["loc"][-1] == "<number>":
-        return "must be a number or { min, max }"
-    if kind in ("unknown_key", "reason"):
-        return str(context["fault"])
-    return _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
+    """What pydantic found, as the second half of a sentence whose first half is the key."""
+    key = str(fault["loc"][-1]) if fault["loc"] else ""
+    match fault["type"]:
+        case "unknown_key" | "reason":
+            sentence = str(context["fault"])
+        case "literal_error":
+            sentence = f"must be one of {context['expected']}"
+        case "list_type" if key in _FORMS:
+            sentence = _FORMS[key]
+        case "float_type":
+            sentence = _number_wanted(fault)
+        case "missing":
+            sentence = _missing(key, fault["input"])
+        case "too_short" | "too_long" as kind:
+            limit = context["min_length"] if kind == "too_short" else context["max_length"]
+            few = "at least " if kind == "too_short" and limit == 1 else ""
+            sentence = f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
+        case kind:
+            sentence = _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
+    return sentence
+
+
+def _missing(key: str, table: object) -> str:
+    close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
+    return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
+
+
+def _number_wanted(fault: ErrorDetails) -> str:
+    location = fault["loc"]
+    if location[-1] == "pitch":
+        return "must be a number, or inf without quotes"
+    if location[-1] != "<number>":
+        return "must be a number"
+    return "must be a number or a list of numbers" if location[0] == "published" else "must be a number or { min, max }"

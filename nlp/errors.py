@@ -17,7 +17,10 @@ from collections.abc import Iterable
 
 
 class ScrewsynthError(Exception):
-    """Base class of the errors that this package raises on purpose. The message is one sentence for people."""
+    """Base class of the errors that this package raises on purpose. The message is one sentence, on one line."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class InputError(ScrewsynthError):
@@ -44,11 +47,16 @@ class CaseError(InputError):
 
     def __str__(self) -> str:
         where = f"{self.source}: " if self.source else ""
-        return f"{where}{self.key}{'' if self.value is None else f' = {_shown(self.value)}'}: {self.fault}"
+        return one_line(f"{where}{self.key}{'' if self.value is None else f' = {_shown(self.value)}'}: {self.fault}")
 
     def within(self, source: str) -> CaseError:
         """The same fault, found in a named file."""
         return CaseError(self.key, self.fault, self.value, source)
+
+
+def one_line(text: str) -> str:
+    """The text with line breaks and other control characters written as escapes."""
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
 
 
 def listing(names: Iterable[str]) -> str:

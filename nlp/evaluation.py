@@ -77,13 +77,14 @@ def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
         EvaluationError: a number is not finite there, as when a limb has zero length.
     """
     model, case = nlp.program.model, nlp.case
-    outputs = [output.full() for output in nlp.program.robot_state(x, nlp.arguments)]
+    where = f"{case.source}: " if case.source else ""
+    outputs = nlp.program.kernels.robot_state(x, nlp.arguments)
     components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
     for row, square in zip(model.wrenches, squares.ravel(), strict=True):
         if not square > 0:
-            raise EvaluationError(f"limb {row.limb!r} has zero length at this point: its two joints coincide")
+            raise EvaluationError(f"{where}limb {row.limb!r} has zero length at this point: its two joints coincide")
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
-        raise EvaluationError("the robot's equations give no finite Jacobian at this point")
+        raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
     if case.axis is not None:
         held = case.rotation.angle

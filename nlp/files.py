@@ -13,7 +13,7 @@ from screwsynth.nlp.errors import InputError
 def write_text(target: str, text: str) -> None:
     """Write a text to a file, or to standard output for ``-``.
 
-    The file appears under its name only when it is complete.
+    The file appears under its name only when it is complete; a pipe or device is written to, not replaced.
 
     Raises:
         InputError: it cannot be written.
@@ -21,19 +21,52 @@ def write_text(target: str, text: str) -> None:
     if target == "-":
         sys.stdout.write(text)
         return
-    path = Path(target)
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            # A temporary file is for its owner only; the result gets what any new file gets.
-            mask = os.umask(0)
-            os.umask(mask)
-            Path(temporary).chmod(0o666 & ~mask)
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        path = Path(target).resolve()
+        if path.exists() and not path.is_file():
+            path.write_text(text, encoding="utf-8")
+        else:
+            _replace(path, text)
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
+
+
+def _replace(path: Path, text: str) -> None:
+    """Put a complete file in the place of what is there."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        # A temporary file is for its owner only; the result gets what any new file gets.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def check_target(target: str) -> None:
+    """See before the work begins whether its result can be written.
+
+    Raises:
+        InputError: the folder is missing or closed, or the target is a folder.
+    """
+    if target == "-":
+        return
+    path = Path(target)
+    try:
+        fault = _fault(path)
+    except OSError as error:
+        fault = str(error.strerror)
+    if fault:
+        raise InputError(f"{target or 'an empty name'}: cannot be written: {fault}")
+
+
+def _fault(path: Path) -> str:
+    if path.is_dir():
+        return "it is a folder"
+    if not path.parent.is_dir():
+        return f"{path.parent} is no folder"
+    return "" if os.access(path.parent, os.W_OK) else f"no permission in {path.parent}"

@@ -158,7 +158,9 @@ def _rotation(case: Case, sheet: _Sheet) -> tuple[SX, list[_Bounded]]:
         q = sheet.place_all("q", Dimension.NUMBER, (0.0, 0.0, 0.0))
         return matrix_from_quaternion_vector(q), []
     inner = math.sin(smallest / 2)
-    q = sheet.place_all("q", Dimension.NUMBER, (*[Free(-radius, radius)] * 2, Free(-radius, radius, inner)))
+    start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
+    along_z = Free(-radius, radius, math.sin(start / 2))
+    q = sheet.place_all("q", Dimension.NUMBER, (*[Free(-radius, radius)] * 2, along_z))
     ball = Constraint("angle", ca.sumsqr(q), ROTATION_ANGLE)
     return matrix_from_quaternion_vector(q), [_Bounded(ball, inner**2 if inner else -math.inf, radius**2)]
 
@@ -241,4 +243,5 @@ def _check_limbs(nlp: Nlp) -> None:
     free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
     for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
         if not varies and not value > 0:
-            raise CaseError("robot.parameters", f"limb {row.limb!r} has zero length: its two joints coincide")
+            fault = f"limb {row.limb!r} has zero length: its two joints coincide"
+            raise CaseError("robot.parameters", fault, source=nlp.case.source)

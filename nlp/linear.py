@@ -18,6 +18,10 @@ def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
         b: (n,) vector.
     """
     k = A.shape[1]
+    # Mostly the columns are independent and the unconstrained solution is the answer.
+    whole, _, rank, _ = np.linalg.lstsq(A, b, rcond=None)
+    if rank == k and whole.min(initial=0.0) >= 0:
+        return np.asarray(whole, dtype=np.float64)
     y, passive = np.zeros(k), np.zeros(k, dtype=bool)
     tolerance = 1e-14 * max(1.0, float(np.linalg.norm(b)))
     for _ in range(3 * k + 3):

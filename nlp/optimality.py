@@ -13,6 +13,7 @@ on a bound; on an equation it is the improvement per unit by which the equation'
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -51,6 +52,7 @@ class Kind(enum.Enum):
     SADDLE = "saddle: stationary, but F improves along some direction"
     NOT_STATIONARY = "not stationary: F improves to first order"
     INFEASIBLE = "infeasible: a limit is violated"
+    UNDEFINED = "undefined: the robot's equations have no finite value there"
 
     @property
     def is_optimum(self) -> bool:
@@ -112,6 +114,8 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
     feasibility = at.violation
     normals = at.normals[list(active)]
     kind = Kind.INFEASIBLE if feasibility > FEASIBLE else Kind.NOT_STATIONARY
+    if not math.isfinite(feasibility):
+        kind = Kind.UNDEFINED
     eigenvalues: FloatArray = np.zeros(0)
     flat: list[FloatArray] = []
     if feasibility <= FEASIBLE and stationarity <= STATIONARY:
@@ -178,7 +182,7 @@ def _stays_flat(nlp: Nlp, at: Linearisation, direction: FloatArray) -> bool:
         away = at.x + sign * _PROBE * nlp.scale * direction
         if np.any(away < nlp.lower) or np.any(away > nlp.upper):
             continue
-        back = linearise(nlp, correct(nlp, away, at.active()))
+        back = correct(nlp, away, at.active())
         moved = float(np.linalg.norm((back.x - at.x) / nlp.scale))
         if back.violation <= FEASIBLE and moved > _PROBE / 2 and abs(back.phi - at.phi) <= 1e-11:
             return True

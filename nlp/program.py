@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from screwsynth.models import Dimension, FloatArray, Model
 from screwsynth.nlp.case import Case, Sense
+from screwsynth.nlp.kernel import Kernel
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class Program:
     @cached_property
     def values(self) -> ca.Function:
         """``(x, p) -> (F, g)``."""
-        return ca.Function("values", [self.x, self.p], [self.objective, self.g])
+        return ca.Function("values", [self.x, self.p], [ca.densify(self.objective), ca.densify(self.g)])
 
     @cached_property
     def derivatives(self) -> ca.Function:
@@ -141,6 +142,41 @@ class Program:
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
         outputs += [robot.squares, robot.magnitude, *robot.quantities]
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
+
+    @cached_property
+    def kernels(self) -> Kernels:
+        """The functions on NumPy arrays."""
+        return Kernels(self)
+
+
+class Kernels:
+    """A program's functions on NumPy arrays, each made when it is first used.
+
+    Arguments and results are those of the properties of the same names of :class:`Program`.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+
+    @cached_property
+    def values(self) -> Kernel:
+        """Objective and constraints."""
+        return Kernel(self._program.values)
+
+    @cached_property
+    def derivatives(self) -> Kernel:
+        """Objective and constraints with first derivatives."""
+        return Kernel(self._program.derivatives)
+
+    @cached_property
+    def hessian(self) -> Kernel:
+        """Hessian of the Lagrangian."""
+        return Kernel(self._program.hessian)
+
+    @cached_property
+    def robot_state(self) -> Kernel:
+        """The robot's expressions."""
+        return Kernel(self._program.robot_state)
 
 
 @dataclass(frozen=True)
@@ -252,12 +288,11 @@ class Nlp:
 
     def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Objective and constraints, (c,), at a point (n,)."""
-        F, g = self.program.values(x, self.arguments)
-        return float(F), g.full().ravel()
+        F, g = self.program.kernels.values(x, self.arguments)
+        return float(F[0, 0]), g.ravel()
 
     @cached_property
     def objective_scale(self) -> float:
         """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0."""
-        outputs = self.program.robot_state(self.start, self.arguments)
-        size = float(np.max(outputs[7].full()))
+        size = float(np.max(self.program.kernels.robot_state(self.start, self.arguments)[7]))
         return size if np.isfinite(size) and size > 0 else 1.0

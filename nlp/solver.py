@@ -259,6 +259,8 @@ def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
         "print_time": False,
         "show_eval_warnings": False,
         "error_on_fail": False,
+        "calc_multipliers": False,
+        "calc_lam_p": False,
         "ipopt": {
             "print_level": 0,
             "sb": "yes",
@@ -279,10 +281,10 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iteration
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
     at = linearise(nlp, stopped)
     if np.isfinite(at.violation):
-        corrected = linearise(nlp, correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"])))
+        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"]))
         # A correction that makes F worse has gone to another stationary point.
         if corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE:
-            at = min((corrected, at), key=_first_order_error)
+            at = corrected
     stationarity = multipliers(at, at.active())[1]
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
@@ -293,10 +295,6 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iteration
             "Invalid_Number_Detected": StartStatus.UNDEFINED,
         }.get(ipopt_status, StartStatus.STALLED)
     return Start(status, at.x, at.F, stationarity, at.violation, iterations)
-
-
-def _first_order_error(at: Linearisation) -> float:
-    return max(at.violation, multipliers(at, at.active())[1])
 
 
 def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Sequence
+
 from screwsynth.models import Dimension, Model, Parameter
 from screwsynth.nlp.units import Units
 
@@ -17,10 +21,8 @@ def starter_case(model: Model) -> str:
     It solves as it is, and says in comments what may be changed.
     """
     z = model.home[2]
-    reach = abs(z) / 4
-    options = [
-        f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}" for key, value in model.options.items()
-    ]
+    reach = _SPREAD * abs(z) or 1.0
+    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items()]
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -63,14 +65,21 @@ def starter_case(model: Model) -> str:
 
 def _line(parameter: Parameter, *, freed: bool) -> str:
     values = [_UNITS.shown(value, parameter.dimension) for value in parameter.typical]
-    width = _SPREAD * max(abs(value) for value in values)
-    texts = [_free(value, width) if freed else f"{value:g}" for value in values]
+    width = _SPREAD * max(abs(value) for value in values) or 1.0
+    domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
+    texts = [_free(value, width, domain) if freed else f"{value:g}" for value in values]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
     return f"{parameter.name} = {text}   # {parameter.description}, {_measure(parameter.dimension)}"
 
 
-def _free(middle: float, width: float) -> str:
-    return f"{{ min = {middle - width:g}, max = {middle + width:g} }}"
+def _free(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
+    lower, upper = max(middle - width, domain[0]), min(middle + width, domain[1])
+    return f"{{ min = {lower:g}, max = {upper:g} }}" if lower < upper else f"{middle:g}"
+
+
+def toml_value(value: object) -> str:
+    """A robot's option as TOML writes it."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, default=str)
 
 
 def _measure(dimension: Dimension) -> str:

@@ -44,14 +44,23 @@ def print_models(console: Console, models: Iterable[tuple[str, str]]) -> None:
     console.print(table)
 
 
-def print_model(console: Console, model: Model, options: Sequence[tuple[str, str, str]]) -> None:
-    """One robot: its options (name, what is allowed, default), parameters, rows and measures."""
-    console.print(Text(model.name, style="bold"), Text(model.description), sep="\n")
+def print_model(
+    console: Console, name: str, model: Model | None, options: Sequence[tuple[str, str, str | None]]
+) -> None:
+    """One robot: its options (name, what is allowed, default), parameters, rows and measures.
+
+    Without a model, because an option has no default, only the options are shown.
+    """
+    console.print(Text(name, style="bold"))
+    if model is not None:
+        console.print(Text(model.description))
     if options:
         table = _table("option", "allowed", "default")
-        for option in options:
-            table.add_row(*map(Text, option))
+        for option, allowed, default in options:
+            table.add_row(option, allowed, "none: must be given" if default is None else default)
         console.print(table)
+    if model is None:
+        return
     table = _table("parameter", "measures", "allowed (angles in deg)", "what it is")
     for parameter in model.parameters:
         components = ", ".join(parameter.components)

@@ -1,0 +1,319 @@
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from screwsynth.models import (
+    Screw,
+    axis_from_screw,
+    line_through,
+    moved_screw,
+    reciprocal_product,
+    screw_from_axis,
+)
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+many = settings(derandomize=True, deadline=None, max_examples=100)
+
+
+def triples(limit: float) -> st.SearchStrategy[Triple]:
+    coordinate = st.floats(-limit, limit, allow_subnormal=False)
+    return st.tuples(coordinate, coordinate, coordinate)
+
+
+#: Directions of a length that says nothing: from 1e-3 to 1e3.
+directions = st.tuples(triples(1).filter(lambda n: math.hypot(*n) > 0.1), st.floats(-3, 3)).map(
+    lambda parts: 10 ** parts[1] * np.array(parts[0])
+)
+points = triples(100).map(np.array)
+pitches = st.floats(-50, 50, allow_subnormal=False)
+intensities = st.floats(0.01, 100)
+
+
+def unit(n: Array) -> Array:
+    return np.asarray(n / np.linalg.norm(n))
+
+
+def perpendicular(n: Array) -> Array:
+    """A unit vector square to ``n``."""
+    return unit(np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))]))
+
+
+def turn(n: Array, angle: float) -> Array:
+    x, y, z = unit(n)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+
+
+def test_screw_of_finite_pitch_by_hand() -> None:
+    # s0 x s + h s = (0, 2, 0) x (0, 0, 1) + 5 (0, 0, 1) = (2, 0, 5), twice over.
+    screw = screw_from_axis((0, 0, 10), (0, 2, 7), 5, intensity=2)
+    np.testing.assert_array_equal(screw, [0, 0, 2, 4, 0, 10])
+
+
+def test_screw_through_a_point_by_hand() -> None:
+    # The axis (2, 2, 1) / 3 through (2, 3, 6) with pitch 1: (3 - 12, 12 - 2, 4 - 6) / 3 + (2, 2, 1) / 3.
+    expected = [2 / 3, 2 / 3, 1 / 3, -7 / 3, 4, -1 / 3]
+    np.testing.assert_allclose(screw_from_axis((2, 2, 1), (2, 3, 6), 1), expected, rtol=4e-16)
+
+
+def test_screw_of_infinite_pitch_by_hand() -> None:
+    np.testing.assert_allclose(screw_from_axis((3, 0, 4), (1, 2, 3), math.inf, 10), [0, 0, 0, 6, 0, 8], rtol=4e-16)
+
+
+def test_line_by_hand() -> None:
+    # From (1, 0, 0) straight up: (1, 0, 0) x (0, 0, 1) = (0, -1, 0).
+    np.testing.assert_array_equal(line_through((1, 0, 0), (1, 0, 5)), [0, 0, 1, 0, -1, 0])
+
+
+@many
+@given(directions, points, pitches, intensities)
+def test_a_twist_gives_the_velocity_of_every_point(n: Array, s0: Array, h: float, q: float) -> None:
+    twist = screw_from_axis(n, s0, h, q)
+    omega, v = twist[:3], twist[3:]
+    s = unit(n)
+    for along in (-2.0, 0.0, 3.0):
+        # Points of the axis move along it, by the pitch for every radian; terms are of size q * (|s0| + |h| + 3).
+        on_axis = s0 + along * s
+        np.testing.assert_allclose(v + np.cross(omega, on_axis), q * h * s, rtol=0, atol=1e-15 * q * 400)
+
+
+@many
+@given(directions, points, pitches, intensities)
+def test_an_axis_comes_back_from_its_screw(n: Array, s0: Array, h: float, q: float) -> None:
+    screw = axis_from_screw(screw_from_axis(n, s0, h, q))
+    s = unit(n)
+    # Point and pitch are lengths beside arms of up to 173 length units and pitches of 50.
+    np.testing.assert_allclose(screw.axis, s, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(screw.point, s0 - (s0 @ s) * s, rtol=0, atol=2e-13)
+    assert screw.pitch == pytest.approx(h, rel=0, abs=1e-13)
+    assert screw.intensity == pytest.approx(q, rel=1e-15)
+
+
+@many
+@given(directions, points, intensities)
+def test_an_axis_of_infinite_pitch_comes_back_without_a_place(n: Array, s0: Array, q: float) -> None:
+    screw = axis_from_screw(screw_from_axis(n, s0, math.inf, q))
+    np.testing.assert_allclose(screw.axis, unit(n), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(screw.point, np.zeros(3))
+    assert screw.pitch == math.inf
+    assert screw.intensity == pytest.approx(q, rel=1e-15)
+
+
+@many
+@given(directions, points, pitches, intensities)
+def test_a_negative_intensity_is_the_opposite_axis(n: Array, s0: Array, h: float, q: float) -> None:
+    given_so = screw_from_axis(n, s0, h, -q)
+    np.testing.assert_allclose(given_so, screw_from_axis(-n, s0, h, q), rtol=0, atol=1e-13 * q)
+    screw = axis_from_screw(given_so)
+    assert screw.intensity > 0
+    np.testing.assert_allclose(screw.axis, -unit(n), rtol=0, atol=1e-15)
+    assert screw.pitch == pytest.approx(h, rel=0, abs=1e-13)
+
+
+@many
+@given(triples(10).map(np.array), triples(1000).map(np.array))
+def test_a_screw_comes_back_from_its_axis(direction: Array, moment: Array) -> None:
+    assume(np.linalg.norm(direction) > 1e-3)
+    before = np.concatenate([direction, moment])
+    screw = axis_from_screw(before)
+    after = screw_from_axis(screw.axis, screw.point, screw.pitch, screw.intensity)
+    size = float(np.linalg.norm(moment)) + 1e-300
+    np.testing.assert_allclose(after[:3], direction, rtol=0, atol=1e-15 * float(np.linalg.norm(direction)))
+    np.testing.assert_allclose(after[3:], moment, rtol=0, atol=2e-15 * size)
+    # The point is the axis's nearest to the origin.
+    assert abs(float(screw.point @ screw.axis)) <= 1e-15 * size / screw.intensity
+
+
+def test_pitch_is_infinite_only_where_the_direction_is_rounding_error() -> None:
+    # No axis is 1e12 length units away, but one may be 1e9 away or have a pitch of that size.
+    far = axis_from_screw([1e-9, 0, 0, 0, 1, 0])
+    assert (far.pitch, far.intensity) == (0.0, 1e-9)
+    np.testing.assert_allclose(far.point, [0, 0, 1e9], rtol=1e-15)
+    steep = axis_from_screw([0, 0, 1e-9, 0, 0, -1])
+    assert steep.pitch == pytest.approx(-1e9, rel=1e-15)
+    noise = axis_from_screw([1e-16, -1e-16, 0, 0, 3, 4])
+    assert (noise.pitch, noise.intensity) == (math.inf, 5.0)
+    np.testing.assert_allclose(noise.axis, [0, 0.6, 0.8], rtol=1e-15)
+
+
+def test_a_pure_rotation_has_pitch_zero_and_a_couple_no_point() -> None:
+    for screw, pitch in (([0, 0, 2, 0, 0, 0], 0.0), ([0, 0, 0, 0, -3, 0], math.inf)):
+        found = axis_from_screw(screw)
+        assert isinstance(found, Screw)
+        assert found.pitch == pitch
+        np.testing.assert_array_equal(found.point, np.zeros(3))
+
+
+@many
+@given(points, points)
+def test_a_line_is_normal_to_its_moment_and_holds_both_points(first: Array, second: Array) -> None:
+    assume(np.linalg.norm(second - first) > 0.01)
+    line = line_through(first, second)
+    s, moment = line[:3], line[3:]
+    assert np.linalg.norm(s) == pytest.approx(1, rel=4e-16)
+    assert float(s @ (second - first)) == pytest.approx(float(np.linalg.norm(second - first)), rel=1e-15)
+    # Arms of 173 length units; the second point also carries the direction's rounding, over points 0.01 apart or more
+    # whose difference is exact to 1e-14.
+    np.testing.assert_allclose(moment, np.cross(first, s), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(moment, np.cross(second, s), rtol=0, atol=2e-13)
+
+
+@many
+@given(points, points, points)
+def test_intersecting_lines_are_reciprocal(meet: Array, one: Array, other: Array) -> None:
+    assume(min(np.linalg.norm(one - meet), np.linalg.norm(other - meet)) > 0.01)
+    assert abs(float(reciprocal_product(line_through(one, meet), line_through(meet, other)))) < 1e-13
+
+
+@many
+@given(directions, points, points)
+def test_parallel_lines_are_reciprocal(n: Array, one: Array, other: Array) -> None:
+    assert abs(float(reciprocal_product(screw_from_axis(n, one, 0), screw_from_axis(n, other, 0)))) < 1e-13
+
+
+@many
+@given(directions, points, st.floats(0, 50), st.floats(-math.pi, math.pi), pitches, pitches, points)
+def test_work_rate_of_two_screws_from_distance_angle_and_pitches(
+    n: Array, foot: Array, a: float, alpha: float, pitch: float, other_pitch: float, slide: Array
+) -> None:
+    # The second axis is a along the common normal from the first, and turned about it by alpha.
+    s = unit(n)
+    normal = perpendicular(s)
+    t = turn(normal, alpha) @ s
+    # Any point of an axis will do.
+    one, other = foot + slide[0] * s, foot + a * normal + slide[1] * t
+    lines = reciprocal_product(screw_from_axis(s, one, 0), screw_from_axis(t, other, 0))
+    assert float(lines) == pytest.approx(-a * math.sin(alpha), rel=0, abs=2e-13)
+    screws = reciprocal_product(screw_from_axis(s, one, pitch), screw_from_axis(t, other, other_pitch))
+    expected = (pitch + other_pitch) * math.cos(alpha) - a * math.sin(alpha)
+    assert float(screws) == pytest.approx(expected, rel=0, abs=3e-13)
+
+
+@many
+@given(directions, directions, points, points, pitches)
+def test_work_rate_of_translations_and_couples(n: Array, m: Array, here: Array, there: Array, h: float) -> None:
+    force, couple = screw_from_axis(n, here, h), screw_from_axis(n, here, math.inf)
+    turning, sliding = screw_from_axis(m, there, h), screw_from_axis(m, there, math.inf)
+    cosine = float(unit(n) @ unit(m))
+    assert float(reciprocal_product(force, sliding)) == pytest.approx(cosine, rel=0, abs=1e-15)
+    assert float(reciprocal_product(couple, turning)) == pytest.approx(cosine, rel=0, abs=1e-15)
+    assert float(reciprocal_product(couple, sliding)) == 0.0
+
+
+def test_reciprocal_product_pairs_force_with_velocity_and_moment_with_angular_velocity() -> None:
+    # Six unit wrenches against one twist whose components tell themselves apart.
+    twist = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    np.testing.assert_array_equal(reciprocal_product(np.eye(6), twist), [4, 5, 6, 1, 2, 3])
+    assert reciprocal_product(np.eye(6)[4], twist).shape == ()
+    assert reciprocal_product(np.zeros((0, 6)), twist).shape == (0,)
+
+
+@many
+@given(directions, points, pitches, directions, st.floats(-math.pi, math.pi), points)
+def test_a_moved_screw_is_the_screw_of_the_moved_axis(
+    n: Array, s0: Array, h: float, about: Array, angle: float, shift: Array
+) -> None:
+    R = turn(about, angle)
+    moved = moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
+    np.testing.assert_allclose(moved, screw_from_axis(R @ n, R @ s0 + shift, h, 2), rtol=0, atol=5e-13)
+    translation = moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
+    np.testing.assert_allclose(translation, [0, 0, 0, *(2 * R @ unit(n))], rtol=0, atol=2e-15)
+
+
+@many
+@given(triples(10), triples(10), triples(10), triples(10), directions, st.floats(-math.pi, math.pi), points)
+def test_moving_both_screws_keeps_their_work_rate(
+    f: Triple, m: Triple, omega: Triple, v: Triple, about: Array, angle: float, shift: Array
+) -> None:
+    R = turn(about, angle)
+    wrench, twist = np.array([*f, *m]), np.array([*omega, *v])
+    before = float(reciprocal_product(wrench, twist))
+    after = float(reciprocal_product(moved_screw(wrench, R, shift), moved_screw(twist, R, shift)))
+    # Moments grow by arms of 173 times forces of 17, and meet angular velocities of 17.
+    assert after == pytest.approx(before, rel=0, abs=2e-11)
+
+
+def test_moves_compose() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        screw, t, u = rng.normal(size=6), rng.normal(size=3), rng.normal(size=3)
+        R, S = turn(rng.normal(size=3), rng.uniform(-3, 3)), turn(rng.normal(size=3), rng.uniform(-3, 3))
+        twice = moved_screw(moved_screw(screw, R, t), S, u)
+        np.testing.assert_allclose(twice, moved_screw(screw, S @ R, S @ t + u), rtol=0, atol=2e-14)
+        back = moved_screw(moved_screw(screw, R, t), R.T, -R.T @ t)
+        np.testing.assert_allclose(back, screw, rtol=0, atol=2e-14)
+
+
+@pytest.mark.parametrize(
+    ("axis", "point", "pitch", "intensity", "fault"),
+    [
+        ((0, 0, 0), (0, 0, 0), 0.0, 1.0, "axis must be finite and not zero"),
+        ((0, math.nan, 1), (0, 0, 0), 0.0, 1.0, "axis must be finite and not zero"),
+        ((0, math.inf, 1), (0, 0, 0), 0.0, 1.0, "axis must be finite and not zero"),
+        ((0, 0, 0), (0, 0, 0), math.inf, 1.0, "axis must be finite and not zero"),
+        ((0, 0, 1), (0, math.nan, 0), 0.0, 1.0, "point and intensity must be finite"),
+        ((0, 0, 1), (0, math.inf, 0), 0.0, 1.0, "point and intensity must be finite"),
+        ((0, 0, 1), (0, 0, 0), 0.0, math.nan, "point and intensity must be finite"),
+        ((0, 0, 1), (0, 0, 0), 0.0, math.inf, "point and intensity must be finite"),
+        ((0, 0, 1), (0, 0, 0), math.nan, 1.0, r"pitch must be a number or \+inf"),
+        ((0, 0, 1), (0, 0, 0), -math.inf, 1.0, r"pitch must be a number or \+inf"),
+        ((0, 1), (0, 0, 0), 0.0, 1.0, "must have 3 components"),
+        ((0, 0, 1), (0, 0, 0, 0), 0.0, 1.0, "must have 3 components"),
+    ],
+)
+def test_no_screw_without_axis_or_with_numbers_that_are_none(
+    axis: tuple[float, ...], point: tuple[float, ...], pitch: float, intensity: float, fault: str
+) -> None:
+    with pytest.raises(ValueError, match=fault):
+        screw_from_axis(axis, point, pitch, intensity)
+
+
+def test_nothing_comes_back_from_no_screw() -> None:
+    with pytest.raises(ValueError, match="six zeros"):
+        axis_from_screw(np.zeros(6))
+    for bad in (math.nan, math.inf, -math.inf):
+        with pytest.raises(ValueError, match="six finite numbers"):
+            axis_from_screw([1, 0, 0, 0, bad, 0])
+    with pytest.raises(ValueError, match="shape"):
+        axis_from_screw([1, 0, 0])
+
+
+def test_no_line_through_one_point() -> None:
+    with pytest.raises(ValueError, match="not zero"):
+        line_through((1, 2, 3), (1, 2, 3))
+    with warnings.catch_warnings():
+        # What NumPy thinks of inf - inf is its own affair.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        for bad in ((1, math.nan, 0), (1, math.inf, 0)):
+            with pytest.raises(ValueError, match="finite"):
+                line_through(bad, (1, 2, 3))
+
+
+def test_results_cannot_be_written_to() -> None:
+    screw = screw_from_axis((0, 0, 1), (1, 0, 0), 1)
+    parts = axis_from_screw(screw)
+    for array in (
+        screw,
+        parts.axis,
+        parts.point,
+        line_through((0, 0, 0), (1, 0, 0)),
+        moved_screw(screw, np.eye(3), screw[:3]),
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 7
+
+
+def test_arguments_are_left_alone() -> None:
+    axis, point = np.array([0.0, 0.0, 4.0]), np.array([1.0, 0.0, 0.0])
+    screw_from_axis(axis, point, 1)
+    np.testing.assert_array_equal(axis, [0, 0, 4])
+    np.testing.assert_array_equal(point, [1, 0, 0])

@@ -1,0 +1,633 @@
+"""Case files with one fault each: the reader names the file, the key and what is allowed, in one sentence."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import CaseError, InputError, formulate, load_case
+from screwsynth.nlp.cli import main
+
+NAME = "broken.toml"
+
+PAPER = """\
+title = "Pose of a given 6-6 platform"
+
+[units]
+length = "cm"
+angle = "deg"
+
+[robot]
+model = "stewart-gough"
+layout = "aligned"
+
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = { min = 2, max = 20, start = 8 }
+
+[pose]
+position = [{ min = -10, max = 10 }, 0, { min = 20, max = 50 }]
+rotation = { angle = { min = -30, max = 30 } }
+
+[[task]]
+name = "drive the screw"
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+weight = 1
+
+[solve]
+starts = 2
+seed = 0
+max_iterations = 300
+
+[expect]
+F = 407.2107
+tolerance = 1e-6
+singular = false
+
+[[published]]
+quantity = "F"
+value = 400.3
+source = "Section 4.1"
+reproduced = false
+because = "the printed angle is rounded"
+"""
+
+HEXAPOD = """\
+[units]
+length = "mm"
+
+[robot]
+model = "hexapod"
+
+[robot.parameters]
+base_1 = [113, -41, { min = -10, max = 10 }]
+base_2 = [113, 41, 0]
+base_3 = [-21, 118, 0]
+base_4 = [-92, 77, 0]
+base_5 = [-92, -77, 0]
+base_6 = [-21, -118, 0]
+platform_1 = [57, -57, 0]
+platform_2 = [57, 57, 0]
+platform_3 = [21, 77, 0]
+platform_4 = [-77, 21, 0]
+platform_5 = [-77, -21, 0]
+platform_6 = [21, -77, 0]
+
+[pose]
+position = [0, 0, 350]
+rotation = { axis = [0, 0, 1], angle = 0 }
+
+[[task]]
+sense = "min"
+twist = [0, 0.5, 0, 1, 0, 0]
+
+[solve]
+starts = 2
+"""
+
+POSITION = "position = [{ min = -10, max = 10 }, 0, { min = 20, max = 50 }]"
+ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
+MOTION = "axis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n"
+X4 = "x4 = { min = 2, max = 20, start = 8 }"
+TASK = PAPER[PAPER.index("[[task]]") : PAPER.index("[solve]")]
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A case file's bytes, the dotted key of its fault (empty: the whole file), and words that say what is allowed."""
+
+    name: str
+    content: bytes
+    key: str
+    gist: tuple[str, ...]
+
+
+def edited(base: str, *edits: tuple[str, str]) -> str:
+    for old, new in edits:
+        assert base.count(old) >= 1, f"{old!r} is not in the base text"
+        base = base.replace(old, new, 1)
+    return base
+
+
+def paper(name: str, old: str, new: str, key: str, *gist: str) -> Broken:
+    return Broken(name, edited(PAPER, (old, new)).encode(), key, gist)
+
+
+def hexapod(name: str, old: str, new: str, key: str, *gist: str) -> Broken:
+    return Broken(name, edited(HEXAPOD, (old, new)).encode(), key, gist)
+
+
+NOT_TOML = [
+    paper("toml-unclosed-string", 'length = "cm"', 'length = "cm', "", "not valid TOML", "line"),
+    paper("toml-unclosed-list", "point = [2, 3, 6]", "point = [2, 3, 6", "", "not valid TOML", "line"),
+    paper("toml-no-value", "x1 = 12", "x1 =", "", "not valid TOML", "line"),
+    paper("toml-bare-word", 'sense = "max"', "sense = max", "", "not valid TOML", "line"),
+    paper("toml-colon", "x1 = 12", "x1: 12", "", "not valid TOML", "line"),
+    paper("toml-decimal-comma", "x1 = 12", "x1 = 12,5", "", "not valid TOML", "line"),
+    paper("toml-key-twice", "x1 = 12", "x1 = 12\nx1 = 13", "", "not valid TOML", "line"),
+    paper("toml-table-twice", "[expect]", "[solve]\nstarts = 3\n[expect]", "", "not valid TOML", "line"),
+    paper("toml-inline-table-over-lines", X4, "x4 = { min = 2,\nmax = 20 }", "", "not valid TOML", "line"),
+    paper("toml-unclosed-header", "[pose]", "[pose", "", "not valid TOML", "line"),
+    Broken("file-is-json", b'{"title": "a case"}', "", ("not valid TOML",)),
+    Broken("file-of-nul", b"\0\0\0\0", "", ("not valid TOML",)),
+    Broken("file-is-binary", bytes(range(256)), "", ("cannot be read", "utf-8")),
+    Broken("file-is-utf16", PAPER.encode("utf-16"), "", ("cannot be read", "utf-8")),
+    Broken("file-is-latin1", PAPER.replace("Pose", "Größe").encode("latin-1"), "", ("cannot be read", "utf-8")),
+    paper("number-of-5000-digits", "x1 = 12", f"x1 = 1{'0' * 5000}", ""),
+    paper("list-nested-5000-deep", "x1 = 12", f"x1 = {'[' * 5000}{']' * 5000}", ""),
+]
+
+MISSING = [
+    Broken("file-empty", b"", "robot", ("missing",)),
+    Broken("file-of-comments", b"# nothing\n\n", "robot", ("missing",)),
+    Broken("no-robot", (PAPER[: PAPER.index("[robot]")] + PAPER[PAPER.index("[pose]") :]).encode(), "robot", ("miss",)),
+    Broken("no-pose", (PAPER[: PAPER.index("[pose]")] + PAPER[PAPER.index("[[task]]") :]).encode(), "pose", ("miss",)),
+    paper("no-task", TASK, "", "task", "missing"),
+    Broken("empty-task-list", ("task = []\n" + PAPER.replace(TASK, "")).encode(), "task", ("at least 1",)),
+    paper("no-model", 'model = "stewart-gough"\n', "", "robot.model", "missing"),
+    paper("no-parameter", "x2 = 8\n", "", "robot.parameters.x2", "missing", "radius", "{ min, max }"),
+    hexapod("no-joint", "platform_4 = [-77, 21, 0]\n", "", "robot.parameters.platform_4", "missing", "list of 3"),
+    paper("no-position", f"{POSITION}\n", "", "pose.position", "missing"),
+    paper("no-angle", ROTATION, "rotation = { axis = [0, 0, 1] }", "pose.rotation.angle", "missing"),
+    paper("no-sense", 'sense = "max"\n', "", "task[0].sense", "missing"),
+    paper("no-motion", MOTION, "", "task[0].axis", "missing", "axis, point and pitch", "twist"),
+    paper("no-task-axis", "axis = [2, 2, 1]\n", "", "task[0].axis", "missing", "axis, point and pitch"),
+    paper("no-point", "point = [2, 3, 6]\n", "", "task[0].point", "missing", "any point on the axis"),
+    paper("no-pitch", "pitch = 1\n", "", "task[0].pitch", "missing", "inf"),
+    paper("only-min", X4, "x4 = { min = 2 }", "robot.parameters.x4.max", "missing"),
+    paper("only-max", X4, "x4 = { max = 2 }", "robot.parameters.x4.min", "missing"),
+    paper("only-start", X4, "x4 = { start = 2 }", "robot.parameters.x4.m", "missing"),
+    paper("empty-range", X4, "x4 = {}", "robot.parameters.x4.m", "missing"),
+    hexapod(
+        "only-min-in-list", "{ min = -10, max = 10 }", "{ min = -10 }", "robot.parameters.base_1[2].max", "missing"
+    ),
+    paper("only-min-position", "{ min = -10, max = 10 }", "{ min = -10 }", "pose.position[0].max", "missing"),
+    paper(
+        "published-without-reason",
+        'because = "the printed angle is rounded"\n',
+        "",
+        "published[0].because",
+        "missing",
+        "why",
+    ),
+    paper(
+        "published-with-empty-reason",
+        'because = "the printed angle is rounded"',
+        'because = ""',
+        "published[0].because",
+        "missing",
+        "why",
+    ),
+    paper("published-without-value", "value = 400.3\n", "", "published[0].value", "missing"),
+    paper("published-without-source", 'source = "Section 4.1"\n', "", "published[0].source", "missing"),
+    paper("published-without-verdict", "reproduced = false\n", "", "published[0].reproduced", "missing"),
+]
+
+UNKNOWN = [
+    paper("unknown-top-key", "title =", "titel =", "titel", "no such key", "'title'"),
+    paper("unknown-table", "[solve]", "[solver]", "solver", "no such key", "'solve'"),
+    paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "no such key", "'task'"),
+    paper("unknown-in-units", "length =", "lenght =", "units.lenght", "no such key", "'length'"),
+    paper("unknown-option", "layout =", "layuot =", "robot.layuot", "no such key", "'layout'"),
+    paper("option-of-another-robot", "layout =", "arrangement =", "robot.arrangement", "no such key", "layout"),
+    hexapod(
+        "option-where-there-is-none",
+        'model = "hexapod"',
+        'model = "hexapod"\nlayout = "aligned"',
+        "robot.layout",
+        "no such key",
+        "parameters",
+    ),
+    paper("unknown-in-robot", "[robot.parameters]", "[robot.paramters]", "robot.paramters", "no such", "'parameters'"),
+    paper("unknown-parameter", "x1 = 12", "x1 = 12\nx5 = 3", "robot.parameters.x5", "no such parameter", "x1, x2"),
+    paper("parameter-in-capitals", "x1 = 12", "X1 = 12", "robot.parameters.X1", "no such parameter", "x1"),
+    hexapod("misspelt-joint", "base_4", "bass_4", "robot.parameters.bass_4", "no such parameter", "'base_4'"),
+    hexapod("component-as-key", "base_4 =", "base_4_x = 1\nbase_4 =", "robot.parameters.base_4_x", "no such parameter"),
+    paper("unknown-in-range", X4, "x4 = { mim = 2, max = 20 }", "robot.parameters.x4.mim", "no such key", "'min'"),
+    paper("unknown-in-pose", "rotation =", "rotaton =", "pose.rotaton", "no such key", "'rotation'"),
+    paper("unknown-in-position", "max = 50", "mx = 50", "pose.position[2].mx", "no such key", "'max'"),
+    paper("unknown-in-rotation", ROTATION, "rotation = { angel = 3 }", "pose.rotation.angel", "no such key", "'angle'"),
+    paper("unknown-in-task", "pitch = 1", "picth = 1", "task[0].picth", "no such key", "'pitch'"),
+    paper("unknown-in-solve", "starts = 2", "start = 2", "solve.start", "no such key", "'starts'"),
+    paper("unknown-in-expect", "F = 407", "f = 407", "expect.f", "no such key", "F, tolerance"),
+    paper("unknown-in-published", "because =", "becuase =", "published[0].becuase", "no such key", "'because'"),
+    paper("unknown-model", '"stewart-gough"', '"stewart-goug"', "robot.model", "no such robot", "'stewart-gough'"),
+    paper("model-of-no-name", '"stewart-gough"', '""', "robot.model", "no such robot", "hexapod"),
+    paper("wrong-layout", '"aligned"', '"alligned"', "robot.layout", "'aligned'", "'octahedral'"),
+    paper("layout-is-number", '"aligned"', "1", "robot.layout", "'aligned'", "'octahedral'"),
+    paper("layout-is-list", '"aligned"', '["aligned"]', "robot.layout", "'aligned'", "'octahedral'"),
+    paper("unknown-angle-unit", '"deg"', '"degrees"', "units.angle", "'deg'", "'rad'"),
+    paper("angle-unit-in-capitals", '"deg"', '"DEG"', "units.angle", "'deg'", "'rad'"),
+    paper("bad-sense", '"max"', '"maximise"', "task[0].sense", "'max'", "'min'"),
+    paper("sense-is-number", '"max"', "1", "task[0].sense", "'max'", "'min'"),
+    paper("couple-length-without-couples", "layout =", "characteristic_length = 2\nlayout =", "robot.characteristic_"),
+]
+
+ONE = ("a number or { min, max }",)
+WRONG_TYPES = [
+    paper("title-is-number", '"Pose of a given 6-6 platform"', "3", "title", "text"),
+    paper("units-is-number", '[units]\nlength = "cm"\nangle = "deg"', "units = 3", "units", "table"),
+    paper("length-is-number", '"cm"', "3", "units.length", "text"),
+    Broken("robot-is-text", b'robot = "hexapod"\npose = { position = [0, 0, 3] }\ntask = []', "robot", ("table",)),
+    paper("robot-is-list", "[robot]", "[[robot]]", "robot", "table"),
+    paper("model-is-number", '"stewart-gough"', "3", "robot.model", "text"),
+    paper("model-is-list", '"stewart-gough"', '["stewart-gough"]', "robot.model", "text"),
+    paper(
+        "parameters-is-list",
+        PAPER[PAPER.index("[robot.parameters]") : PAPER.index("[pose]")],
+        "parameters = [12, 8, 30, 8]\n",
+        "robot.parameters",
+        "table",
+    ),
+    paper("parameter-is-text", "x1 = 12", 'x1 = "12"', "robot.parameters.x1", *ONE),
+    paper("parameter-is-bool", "x1 = 12", "x1 = true", "robot.parameters.x1", *ONE),
+    paper("parameter-is-date", "x1 = 12", "x1 = 2024-01-01", "robot.parameters.x1", *ONE),
+    paper("parameter-is-list", "x1 = 12", "x1 = [12]", "robot.parameters.x1", *ONE),
+    paper("parameter-is-list-of-3", "x1 = 12", "x1 = [12, 12, 12]", "robot.parameters.x1", *ONE),
+    paper("parameter-is-empty-list", "x1 = 12", "x1 = []", "robot.parameters.x1", *ONE),
+    paper("parameter-with-unit", "x1 = 12", 'x1 = "12 cm"', "robot.parameters.x1", *ONE),
+    paper("parameter-of-400-digits", "x1 = 12", f"x1 = 1{'0' * 400}", "robot.parameters.x1"),
+    paper("min-is-text", "min = 2,", 'min = "2",', "robot.parameters.x4.min", "must be a number"),
+    paper("max-is-bool", "max = 20,", "max = true,", "robot.parameters.x4.max", "must be a number"),
+    paper("min-is-range", "min = 2,", "min = { min = 1, max = 2 },", "robot.parameters.x4.min", "must be a number"),
+    paper("start-is-list", "start = 8", "start = [8]", "robot.parameters.x4.start", "must be a number"),
+    hexapod("joint-is-number", "base_2 = [113, 41, 0]", "base_2 = 5", "robot.parameters.base_2", "list of 3", *ONE),
+    hexapod(
+        "joint-is-range",
+        "base_2 = [113, 41, 0]",
+        "base_2 = { min = 1, max = 2 }",
+        "robot.parameters.base_2",
+        "list of 3",
+        *ONE,
+    ),
+    hexapod("joint-of-two", "[113, 41, 0]", "[113, 41]", "robot.parameters.base_2", "list of 3"),
+    hexapod("joint-of-four", "[113, 41, 0]", "[113, 41, 0, 0]", "robot.parameters.base_2", "list of 3"),
+    hexapod("joint-nested", "[113, 41, 0]", "[[113, 41, 0]]", "robot.parameters.base_2", *ONE),
+    hexapod("joint-with-text", "[113, 41, 0]", '[113, "41", 0]', "robot.parameters.base_2[1]", *ONE),
+    hexapod("joint-with-bool", "[113, 41, 0]", "[113, 41, false]", "robot.parameters.base_2[2]", *ONE),
+    Broken("pose-is-list", edited(HEXAPOD, ("[pose]", "[[pose]]")).encode(), "pose", ("table",)),
+    paper("position-is-number", POSITION, "position = 3", "pose.position", "list"),
+    paper("position-is-range", POSITION, "position = { min = 0, max = 3 }", "pose.position", "list"),
+    paper("position-of-two", POSITION, "position = [0, 35]", "pose.position", "3 entries", "got 2"),
+    paper("position-of-four", POSITION, "position = [0, 0, 35, 0]", "pose.position", "3 entries", "got 4"),
+    paper("position-nested", POSITION, "position = [[0, 0, 35]]", "pose.position"),
+    paper("position-nested-inside", POSITION, "position = [[0], 0, 35]", "pose.position[0]", *ONE),
+    paper("position-with-text", POSITION, 'position = [0, 0, "35"]', "pose.position[2]", *ONE),
+    paper("position-with-bool", POSITION, "position = [0, true, 35]", "pose.position[1]", *ONE),
+    paper("rotation-is-number", ROTATION, "rotation = 10", "pose.rotation", "table"),
+    paper("angle-is-text", ROTATION, 'rotation = { angle = "10" }', "pose.rotation.angle", *ONE),
+    paper("angle-is-list", ROTATION, "rotation = { angle = [-30, 30] }", "pose.rotation.angle", *ONE),
+    paper("axis-is-letter", ROTATION, 'rotation = { axis = "z", angle = 10 }', "pose.rotation.axis", "list"),
+    paper("axis-of-two", ROTATION, "rotation = { axis = [0, 1], angle = 10 }", "pose.rotation.axis", "3 entries"),
+    paper("axis-with-text", ROTATION, 'rotation = { axis = [0, 0, "1"], angle = 3 }', "pose.rotation.axis[2]", "numb"),
+    paper(
+        "axis-with-range",
+        ROTATION,
+        "rotation = { axis = [0, 0, { min = 0, max = 1 }], angle = 3 }",
+        "pose.rotation.axis[2]",
+        "must be a number",
+    ),
+    paper("task-is-table", "[[task]]", "[task]", "task", "list"),
+    paper("task-name-is-number", '"drive the screw"', "3", "task[0].name", "text"),
+    paper("task-name-empty", '"drive the screw"', '""', "task[0].name", "not be empty"),
+    paper("task-axis-is-number", "axis = [2, 2, 1]", "axis = 3", "task[0].axis", "list"),
+    paper("task-axis-of-two", "axis = [2, 2, 1]", "axis = [2, 2]", "task[0].axis", "3 entries"),
+    paper("task-axis-nested", "axis = [2, 2, 1]", "axis = [[2, 2, 1]]", "task[0].axis"),
+    paper("point-of-four", "point = [2, 3, 6]", "point = [2, 3, 6, 1]", "task[0].point", "3 entries"),
+    paper("point-is-text", "point = [2, 3, 6]", 'point = "origin"', "task[0].point", "list"),
+    paper("point-with-bool", "point = [2, 3, 6]", "point = [2, 3, true]", "task[0].point[2]", "must be a number"),
+    paper("pitch-is-text", "pitch = 1", 'pitch = "inf"', "task[0].pitch", "must be a number"),
+    paper("pitch-is-bool", "pitch = 1", "pitch = true", "task[0].pitch", "must be a number"),
+    paper("pitch-is-range", "pitch = 1", "pitch = { min = 0, max = 1 }", "task[0].pitch", "must be a number"),
+    paper("weight-is-text", "weight = 1", 'weight = "1"', "task[0].weight", "must be a number"),
+    hexapod("twist-of-five", "[0, 0.5, 0, 1, 0, 0]", "[0, 0.5, 0, 1, 0]", "task[0].twist", "6 entries", "got 5"),
+    hexapod("twist-of-seven", "[0, 0.5, 0, 1, 0, 0]", "[0, 0.5, 0, 1, 0, 0, 0]", "task[0].twist", "6 entries", "got 7"),
+    hexapod("twist-nested", "[0, 0.5, 0, 1, 0, 0]", "[[0, 0.5, 0], [1, 0, 0]]", "task[0].twist"),
+    hexapod(
+        "twist-with-text", "[0, 0.5, 0, 1, 0, 0]", '["0", 0.5, 0, 1, 0, 0]', "task[0].twist[0]", "must be a number"
+    ),
+    paper("solve-is-number", PAPER[PAPER.index("[solve]") : PAPER.index("[expect]")], "[[solve]]\n", "solve", "table"),
+    paper("starts-is-float", "starts = 2", "starts = 2.0", "solve.starts", "whole number"),
+    paper("starts-is-text", "starts = 2", 'starts = "2"', "solve.starts", "whole number"),
+    paper("starts-is-bool", "starts = 2", "starts = true", "solve.starts", "whole number"),
+    paper("seed-is-float", "seed = 0", "seed = 0.5", "solve.seed", "whole number"),
+    paper("iterations-is-text", "max_iterations = 300", 'max_iterations = "many"', "solve.max_iterations", "whole"),
+    paper("expected-F-is-text", "F = 407.2107", 'F = "407"', "expect.F", "must be a number"),
+    paper("singular-is-number", "singular = false", "singular = 0", "expect.singular", "true or false"),
+    paper("published-is-table", "[[published]]", "[published]", "published", "list"),
+    paper("quantity-empty", 'quantity = "F"', 'quantity = ""', "published[0].quantity", "not be empty"),
+    paper("verdict-is-text", "reproduced = false", 'reproduced = "no"', "published[0].reproduced", "true or false"),
+    paper("published-value-is-text", "value = 400.3", 'value = "400.3"', "published[0].value", "number"),
+    paper("published-value-has-text", "value = 400.3", 'value = [1, "2"]', "published[0].value", "number"),
+]
+
+OUT_OF_RANGE = [
+    paper("min-above-max", "min = 2, max = 20", "min = 20, max = 2", "robot.parameters.x4.min", "below max = 2 deg"),
+    paper("min-equals-max", "min = 2, max = 20", "min = 2, max = 2", "robot.parameters.x4.min", "below max = 2 deg"),
+    paper("crossed-position", "min = 20, max = 50", "min = 50, max = 20", "pose.position[2].min", "below max = 20 cm"),
+    paper("equal-position", "min = 20, max = 50", "min = 50, max = 50", "pose.position[2].min", "below max = 50 cm"),
+    paper("crossed-angle", "min = -30, max = 30", "min = 30, max = -30", "pose.rotation.angle.min", "below max = -30"),
+    hexapod(
+        "crossed-joint", "min = -10, max = 10", "min = 10, max = -10", "robot.parameters.base_1[2].min", "max = -10 mm"
+    ),
+    paper("start-below-min", "start = 8", "start = 1", "robot.parameters.x4.start", "between 2 deg and 20 deg"),
+    paper("start-above-max", "start = 8", "start = 21", "robot.parameters.x4.start", "between 2 deg and 20 deg"),
+    paper("position-start-outside", "max = 50", "max = 50, start = 51", "pose.position[2].start", "20 cm and 50 cm"),
+    paper("angle-start-outside", "max = 30 } }", "max = 30, start = 31 } }", "pose.rotation.angle.start", "30 deg"),
+    hexapod(
+        "joint-start-outside", "max = 10", "max = 10, start = -11", "robot.parameters.base_1[2].start", "-10 mm and 10"
+    ),
+    paper("x3-above-domain", "x3 = 30", "x3 = 40", "robot.parameters.x3", "= 40", "between 0 deg and 30 deg"),
+    paper("x3-below-domain", "x3 = 30", "x3 = -1", "robot.parameters.x3", "between 0 deg and 30 deg"),
+    paper("x1-negative", "x1 = 12", "x1 = -1", "robot.parameters.x1", "at least 0 cm"),
+    paper("x4-range-past-domain", "max = 20,", "max = 31,", "robot.parameters.x4.max", "between 0 deg and 30 deg"),
+    paper("x1-range-past-domain", "x1 = 12", "x1 = { min = -1, max = 2 }", "robot.parameters.x1.min", "at least 0 cm"),
+    paper("zero-task-axis", "axis = [2, 2, 1]", "axis = [0, 0.0, -0.0]", "task[0].axis", "must not be zero"),
+    paper("zero-task-axis-translation", MOTION, "axis = [0, 0, 0]\npitch = inf\n", "task[0].axis", "must not be zero"),
+    paper("zero-rotation-axis", ROTATION, "rotation = { axis = [0, 0, 0], angle = 3 }", "pose.rotation.axis", "zero"),
+    hexapod("zero-twist", "[0, 0.5, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, -0.0]", "task[0].twist", "must not be zero"),
+    hexapod("twist-and-axis", "twist =", "axis = [0, 0, 1]\ntwist =", "task[0].axis", "beside twist", "one way"),
+    hexapod("twist-and-point", "twist =", "point = [0, 0, 1]\ntwist =", "task[0].point", "beside twist", "one way"),
+    hexapod("twist-and-pitch", "twist =", "pitch = inf\ntwist =", "task[0].pitch", "beside twist", "one way"),
+    paper("twist-and-all", "axis = [2", "twist = [0, 0, 1, 0, 0, 0]\naxis = [2", "task[0].axis", "beside twist"),
+    paper("free-axis-half-turn", "max = 30 } }", "max = 180 } }", "pose.rotation.angle", "at most 179 deg", "free"),
+    paper("free-axis-more", "min = -30", "min = -270", "pose.rotation.angle", "at most 179 deg", "axis free"),
+    paper("free-axis-fixed", ROTATION, "rotation = { angle = 180 }", "pose.rotation.angle", "at most 179 deg", "free"),
+    paper("held-axis-over-a-turn", ROTATION, "rotation = { axis = [0, 0, 1], angle = 361 }", "pose.rotation.a", "360"),
+    paper("rad-read-as-deg", '"deg"', '"rad"', "robot.parameters.x3", "between 0 rad and 0.523"),
+    paper("length-label-empty", '"cm"', '""', "units.length", "not be empty"),
+    paper("length-label-blank", '"cm"', '"  "', "units.length", "not be empty"),
+    paper("length-label-long", '"cm"', f'"{"cm" * 20}"', "units.length", "20 characters"),
+    paper("weight-zero", "weight = 1", "weight = 0", "task[0].weight", "greater than 0"),
+    paper("weight-negative", "weight = 1", "weight = -1", "task[0].weight", "greater than 0"),
+    paper("starts-zero", "starts = 2", "starts = 0", "solve.starts", "greater than or equal to 1"),
+    paper("starts-negative", "starts = 2", "starts = -3", "solve.starts", "greater than or equal to 1"),
+    paper("starts-too-many", "starts = 2", "starts = 100_001", "solve.starts", "less than or equal to 100000"),
+    paper("seed-negative", "seed = 0", "seed = -1", "solve.seed", "greater than or equal to 0"),
+    paper("iterations-zero", "max_iterations = 300", "max_iterations = 0", "solve.max_iterations", "or equal to 1"),
+    paper("expected-F-negative", "F = 407.2107", "F = -1", "expect.F", "greater than or equal to 0"),
+    paper("tolerance-zero", "tolerance = 1e-6", "tolerance = 0", "expect.tolerance", "greater than 0"),
+]
+
+NOT_YET = [
+    paper("limits", "[expect]", "[limits]\nbase_joint_angle = 45\n[expect]", "limits", "not supported yet"),
+    paper("limits-empty", "[expect]", "[limits]\n[expect]", "limits", "not supported yet"),
+    paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "not supported yet"),
+    paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance", "not supported yet"),
+    paper("two-tasks", TASK, TASK + TASK.replace("drive", "stop"), "task", "not supported yet", "one"),
+    paper("fault-in-second-task", TASK, TASK + '[[task]]\nsense = "most"\n', "task[1].sense", "'max'", "'min'"),
+]
+
+LINES = [
+    paper("line-break-in-model", '"stewart-gough"', '"stewart\\ngough"', "robot.model", "no such robot"),
+    paper("line-break-in-key", "x1 = 12", 'x1 = 12\n"x\\n5" = 1', "robot.parameters.", "no such parameter"),
+    paper("line-break-in-top-key", "title =", '"ti\\ntle" =', "", "no such key"),
+    paper("line-break-in-sense", '"max"', '"max\\r\\n"', "task[0].sense", "'max'", "'min'"),
+    paper("key-in-angle-brackets", "x1 = 12", 'x1 = 12\n"<x>" = "a"', "robot.parameters.<x>"),
+    paper("key-of-no-name", "x1 = 12", 'x1 = 12\n"" = 1', "robot.parameters.", "no such parameter"),
+    paper("line-break-in-text", "x1 = 12", 'x1 = """\n12\n"""', "robot.parameters.x1", *ONE),
+]
+
+COINCIDING = edited(
+    PAPER, ("x1 = 12", "x1 = 8"), (X4, "x4 = 30"), (POSITION, "position = [0, 0, 0]"), (f"{ROTATION}\n", "")
+)
+LIMBS = [
+    Broken("legs-of-no-length", COINCIDING.encode(), "robot.parameters", ("'1-'", "zero length", "coincide")),
+    Broken(
+        "legs-of-no-length-turned",
+        edited(COINCIDING, ("[0, 0, 0]", "[0, 0, 0]\nrotation = { axis = [0, 0, 3], angle = 120 }"))
+        .replace("x1 = 8", "x1 = 0")
+        .replace("x2 = 8", "x2 = 0")
+        .encode(),
+        "robot.parameters",
+        ("'1-'", "zero length"),
+    ),
+    Broken(
+        "leg-of-no-length",
+        edited(HEXAPOD, ("platform_4 = [-77, 21, 0]", "platform_4 = [-92, 77, -350]")).encode(),
+        "robot.parameters",
+        ("'4'", "zero length", "coincide"),
+    ),
+]
+
+
+def not_finite() -> list[Broken]:
+    places = {
+        "parameter": (PAPER, "x1 = 12", "x1 = {}", "robot.parameters.x1"),
+        "min": (PAPER, "min = 2,", "min = {},", "robot.parameters.x4.min"),
+        "max": (PAPER, "max = 20,", "max = {},", "robot.parameters.x4.max"),
+        "start": (PAPER, "start = 8", "start = {}", "robot.parameters.x4.start"),
+        "position": (PAPER, ", 0, {", ", {}, {{", "pose.position[1]"),
+        "position-min": (PAPER, "min = -10", "min = {}", "pose.position[0].min"),
+        "position-max": (PAPER, "max = 50", "max = {}", "pose.position[2].max"),
+        "angle-max": (PAPER, "max = 30 }", "max = {} }}", "pose.rotation.angle.max"),
+        "angle": (HEXAPOD, "angle = 0", "angle = {}", "pose.rotation.angle"),
+        "axis": (HEXAPOD, "axis = [0,", "axis = [{},", "pose.rotation.axis[0]"),
+        "joint": (HEXAPOD, "[113, 41, 0]", "[113, 41, {}]", "robot.parameters.base_2[2]"),
+        "joint-min": (HEXAPOD, "min = -10", "min = {}", "robot.parameters.base_1[2].min"),
+        "twist": (HEXAPOD, "twist = [0,", "twist = [{},", "task[0].twist[0]"),
+        "task-axis": (PAPER, "[2, 2, 1]", "[2, {}, 1]", "task[0].axis[1]"),
+        "point": (PAPER, "[2, 3, 6]", "[{}, 3, 6]", "task[0].point[0]"),
+        "weight": (PAPER, "weight = 1", "weight = {}", "task[0].weight"),
+        "expected-F": (PAPER, "F = 407.2107", "F = {}", "expect.F"),
+        "expected-tolerance": (PAPER, "tolerance = 1e-6", "tolerance = {}", "expect.tolerance"),
+        "published": (PAPER, "value = 400.3", "value = {}", "published[0].value"),
+        "published-list": (PAPER, "value = 400.3", "value = [1, {}]", "published[0].value"),
+    }
+    found = []
+    for place, (base, old, new, key) in places.items():
+        for value in ("nan", "inf", "-inf"):
+            text = edited(base, (old, new.format(value)))
+            found.append(Broken(f"{value}-{place}", text.encode(), key, ("finite",)))
+    found += [
+        paper("nan-pitch", "pitch = 1", "pitch = nan", "task[0].pitch", "a number or inf"),
+        paper("-inf-pitch", "pitch = 1", "pitch = -inf", "task[0].pitch", "a number or inf"),
+        paper("inf-starts", "starts = 2", "starts = inf", "solve.starts", "whole number"),
+        paper("nan-seed", "seed = 0", "seed = nan", "solve.seed", "whole number"),
+    ]
+    return found
+
+
+BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *NOT_YET, *LINES, *LIMBS, *not_finite()]
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture
+def written(tmp_path: Path, broken: Broken) -> Path:
+    path = tmp_path / NAME
+    path.write_bytes(broken.content)
+    return path
+
+
+each_broken = pytest.mark.parametrize("broken", BROKEN, ids=lambda broken: broken.name)
+
+
+def check_sentence(broken: Broken, text: str) -> None:
+    assert NAME in text
+    assert broken.key in text
+    for words in broken.gist:
+        assert words in text
+    for foreign in (
+        "Traceback",
+        "pydantic",
+        "Input should",
+        "<number>",
+        "<range>",
+        "<list>",
+        ".float",
+        "list[",
+        "type=",
+        "np.float64",
+    ):
+        assert foreign not in text
+
+
+def test_the_ids_differ() -> None:
+    names = [broken.name for broken in BROKEN]
+    assert len(set(names)) == len(names) >= 60
+
+
+@pytest.mark.parametrize("text", [PAPER, HEXAPOD], ids=["paper", "hexapod"])
+def test_the_texts_are_good_before_they_are_broken(tmp_path: Path, text: str) -> None:
+    path = tmp_path / NAME
+    path.write_text(text, encoding="utf-8")
+    assert formulate(load_case(str(path))).n > 0
+
+
+@each_broken
+def test_the_library_refuses_with_an_input_error(broken: Broken, written: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        formulate(load_case(str(written)))
+    check_sentence(broken, str(refused.value))
+    if isinstance(refused.value, CaseError):
+        assert broken.key in refused.value.key
+        assert refused.value.source == NAME
+
+
+def check_refused(broken: Broken, folder: Path, ended: tuple[int, str, str]) -> None:
+    code, out, err = ended
+    assert code == 2
+    assert out == ""
+    assert err.startswith("screwsynth: ")
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1
+    check_sentence(broken, err)
+    assert [path.name for path in folder.iterdir()] == [NAME]
+
+
+@each_broken
+def test_solve_says_one_sentence_and_writes_nothing(broken: Broken, written: Path, cli: Run) -> None:
+    check_refused(broken, written.parent, cli("solve", str(written), "--json", str(written.parent / "result.json")))
+
+
+@pytest.mark.parametrize("broken", [*NOT_TOML[:2], *UNKNOWN[:2], *LIMBS], ids=lambda broken: broken.name)
+def test_evaluate_says_one_sentence_and_writes_nothing(broken: Broken, written: Path, cli: Run) -> None:
+    check_refused(broken, written.parent, cli("evaluate", str(written), "--json", str(written.parent / "result.json")))
+
+
+STRUCTURES = [broken for broken in WRONG_TYPES if broken.key.startswith(("robot", "pose"))]
+
+
+@pytest.mark.parametrize("broken", STRUCTURES, ids=lambda broken: broken.name)
+def test_a_setting_beside_a_fault_is_still_one_sentence(broken: Broken, written: Path, cli: Run) -> None:
+    # --set replaces numbers in tables that nobody has checked yet. It may mend the fault.
+    for setting in ("base_2_y=8", "x1=8", "p_z=40", "angle=5"):
+        code, _, err = cli("evaluate", str(written), "--set", setting)
+        assert code in (0, 2)
+        assert len(err.splitlines()) == (1 if code else 0), f"{broken.name} with {setting}"
+
+
+def test_json_to_standard_output_stays_empty_for_a_broken_case(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / NAME
+    path.write_text(edited(PAPER, ("x1 = 12", "x1 = -1")), encoding="utf-8")
+    code, out, err = cli("solve", str(path), "--json", "-")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+
+
+def test_an_older_result_survives_a_broken_case(tmp_path: Path, cli: Run) -> None:
+    path, result = tmp_path / NAME, tmp_path / "result.json"
+    path.write_text(edited(PAPER, ("x1 = 12", "x1 = -1")), encoding="utf-8")
+    result.write_text("older", encoding="utf-8")
+    assert cli("solve", str(path), "--json", str(result))[0] == 2
+    assert result.read_text(encoding="utf-8") == "older"
+
+
+def test_only_a_positive_infinite_pitch_is_legal(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    path.write_text(edited(PAPER, ("point = [2, 3, 6]\npitch = 1", "pitch = +inf")), encoding="utf-8")
+    assert [float(number) for number in load_case(str(path)).tasks[0].twist] == pytest.approx(
+        [0, 0, 0, 2 / 3, 2 / 3, 1 / 3]
+    )
+
+
+NO_FILE = {
+    "no-such-file": ("missing.toml", ("missing.toml", "no such file")),
+    "no-such-folder": ("nowhere/case.toml", ("nowhere/case.toml", "no such file")),
+    "folder": (".", ("is a folder",)),
+    "folder-by-name": ("folder", ("folder: is a folder", "not a case file")),
+    "below-a-file": ("file.txt/case.toml", ("file.txt/case.toml", "no such file")),
+    "misspelt-shipped": ("paper-4.1-helcial", ("paper-4.1-helcial", "did you mean 'paper-4.1-helical'?")),
+    "shipped-with-suffix": ("paper-4.1-helical.toml", ("no such file", "did you mean 'paper-4.1-helical'?")),
+    "shipped-in-capitals": ("PAPER-4.1-HELICAL", ("no such file", "paper-4.1-helical")),
+    "shipped-by-a-way-out": ("../cases/paper-4.1-helical", ("no such file",)),
+    "nothing": ("", ("case",)),
+    "long-name": ("x" * 300, ("xxx",)),
+    "name-with-line-break": ("a\nb.toml", ("no such file",)),
+}
+
+
+@pytest.mark.parametrize(("name", "words"), NO_FILE.values(), ids=NO_FILE)
+def test_what_is_no_file(
+    name: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file.txt").write_text("a file", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        load_case(name)
+    code, out, err = cli("solve", name, "--json", "result.json")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    for text in (str(refused.value), err):
+        for word in words:
+            assert word in text
+    assert not (tmp_path / "result.json").exists()
+
+
+PROCESSES = ["toml-no-value", "file-is-binary", "x3-above-domain", "unknown-in-task", "legs-of-no-length"]
+
+
+@pytest.mark.parametrize("name", PROCESSES)
+def test_as_a_process(name: str, tmp_path: Path) -> None:
+    broken = next(broken for broken in BROKEN if broken.name == name)
+    (tmp_path / NAME).write_bytes(broken.content)
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "solve", NAME, "--json", "result.json"]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert len(ended.stderr.splitlines()) == 1
+    check_sentence(broken, ended.stderr)
+    assert not (tmp_path / "result.json").exists()

@@ -1,0 +1,754 @@
+"""What the commands print, write and return."""
+
+import json
+import math
+import os
+import stat
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import screwsynth.cases
+from screwsynth.models import model_names
+from screwsynth.nlp import shipped_cases
+from screwsynth.nlp.cli import main
+
+CASES = Path(screwsynth.cases.__file__).parent
+HELICAL = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8")
+POSITION = "position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 50 }]"
+ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
+MOTION = "axis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n"
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
+        capfd.readouterr()
+        code: object = 0
+        try:
+            main()
+        except SystemExit as ended:
+            code = ended.code
+        out, err = capfd.readouterr()
+        return int(str(code or 0)), out, err
+
+    return run
+
+
+def process(
+    *arguments: str, folder: Path, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
+    env = {**os.environ, **(environment or {})}
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=60)
+
+
+def edited(*edits: tuple[str, str], base: str = HELICAL) -> str:
+    for old, new in edits:
+        assert old in base, f"{old!r} is not in the base text"
+        base = base.replace(old, new, 1)
+    return base
+
+
+def case_file(folder: Path, *edits: tuple[str, str], search: str = "starts = 3") -> str:
+    path = folder / "case.toml"
+    path.write_text(edited(*edits) + f"\n[solve]\n{search}\n", encoding="utf-8")
+    return str(path)
+
+
+def strict(text: str) -> dict[str, Any]:
+    def refuse(constant: str) -> float:
+        raise AssertionError(f"{constant} is not JSON")
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in pairs]
+        assert len(set(keys)) == len(keys)
+        return dict(pairs)
+
+    found = json.loads(text, parse_constant=refuse, object_pairs_hook=once)
+    assert isinstance(found, dict)
+    check_finite(found)
+    return found
+
+
+def check_finite(value: object) -> None:
+    # 1e999 is valid JSON and reads as infinity.
+    if isinstance(value, dict):
+        for part in value.values():
+            check_finite(part)
+    elif isinstance(value, list):
+        for part in value:
+            check_finite(part)
+    elif isinstance(value, float):
+        assert math.isfinite(value)
+
+
+def check_state(result: dict[str, Any], *, rows: int = 6) -> None:
+    """The parts that solve and evaluate share."""
+    assert result["schema"] == 1
+    assert set(result["units"]) == {"length", "angle"}
+    pose, task = result["pose"], result["task"]
+    assert {"position", "axis", "angle", "rotation_matrix"} <= set(pose)
+    assert {"twist", "axis", "point", "pitch"} <= set(task)
+    J, twist, rates = np.array(result["jacobian"]), np.array(task["twist"]), np.array(result["rates"])
+    assert J.shape == (rows, 6)
+    assert twist.shape == (6,)
+    # Rows are force then moment, a twist is angular velocity then velocity.
+    np.testing.assert_allclose(rates, J[:, :3] @ twist[3:] + J[:, 3:] @ twist[:3], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(J[:, :3], axis=1), 1, rtol=1e-12)
+    R, axis = np.array(pose["rotation_matrix"]), np.array(pose["axis"])
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(R @ axis, axis, atol=1e-9)
+    angle = math.radians(pose["angle"]) if result["units"]["angle"] == "deg" else pose["angle"]
+    assert np.trace(R) == pytest.approx(1 + 2 * math.cos(angle), abs=1e-9)
+    assert result["rank"] in range(1, 7)
+    np.testing.assert_allclose(result["singular_values"], np.linalg.svd(J, compute_uv=False), rtol=1e-9, atol=1e-9)
+    assert set(result["versions"]) >= {"screwsynth", "casadi", "numpy", "python"}
+    if result["F"] is not None:
+        assert float(np.sum(rates**2)) == pytest.approx(result["F"], rel=1e-12, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    folder = tmp_path_factory.mktemp("solved")
+    ended = process("solve", "paper-4.1-helical", "--starts", "4", "--json", "result.json", folder=folder)
+    return ended, folder / "result.json"
+
+
+def test_a_solve_as_a_process_prints_only_its_table(
+    solved: tuple[subprocess.CompletedProcess[str], Path],
+) -> None:
+    ended, _ = solved
+    assert ended.returncode == 0
+    assert ended.stderr == ""
+    assert ended.stdout.startswith("Pose of a given 6-6 platform for a screw motion of pitch 1\nlargest F = 407.2107")
+    assert "4 of 4 converged" in ended.stdout
+    for foreign in ("Ipopt", "IPOPT", "EXIT:", "CasADi", "Eclipse", "coin-or", "nlp_f", "solver", "****"):
+        assert foreign not in ended.stdout
+    assert "\x1b" not in ended.stdout
+
+
+def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+    result = strict(solved[1].read_text(encoding="utf-8"))
+    check_state(result)
+    documented = {"schema", "case", "title", "units", "sense", "status", "F", "parameters", "pose", "task", "jacobian"}
+    documented |= {
+        "rates",
+        "rank",
+        "singular_values",
+        "optimality",
+        "starts",
+        "certificate",
+        "seed",
+        "versions",
+        "seconds",
+    }
+    assert documented <= set(result)
+    assert (result["case"], result["units"]) == ("paper-4.1-helical", {"length": "cm", "angle": "deg"})
+    assert (result["sense"], result["status"], result["certificate"], result["seed"]) == ("max", "optimal", None, 0)
+    assert result["F"] == pytest.approx(407.2107, rel=1e-6)
+    assert result["parameters"] == {"x1": 12, "x2": 8, "x3": 30, "x4": 8}
+    assert result["pose"]["position"] == pytest.approx([-10, -10, 50], abs=1e-6)
+    assert abs(result["pose"]["angle"]) <= 30 + 1e-9
+    assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+    assert result["task"]["pitch"] == pytest.approx(1)
+    evidence = result["optimality"]
+    assert evidence["kind"] == "strict local maximum"
+    assert max(evidence[key] for key in ("stationarity", "feasibility", "complementarity")) < 1e-6
+    assert [(side["name"], side["bound"]) for side in evidence["active"]] == [
+        ("p_x", "min"),
+        ("p_y", "min"),
+        ("p_z", "max"),
+    ]
+    for side in evidence["active"]:
+        assert set(side) == {"name", "bound", "value", "multiplier"}
+    assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
+    starts = result["starts"]
+    assert (starts["run"], starts["converged"]) == (4, 4)
+    assert sum(found["count"] for found in starts["optima"]) == 4
+    assert starts["optima"][0]["F"] == pytest.approx(result["F"], rel=1e-9)
+    assert result["seconds"] > 0
+
+
+def test_json_to_standard_output_is_alone_there(
+    tmp_path: Path, cli: Run, solved: tuple[subprocess.CompletedProcess[str], Path]
+) -> None:
+    code, out, err = cli("solve", "paper-4.1-helical", "--starts", "4", "--seed", "0", "--jobs", "1", "--json", "-")
+    assert (code, err) == (0, "")
+    here, there = strict(out), strict(solved[1].read_text(encoding="utf-8"))
+    del here["seconds"], there["seconds"]
+    # The number of threads changes nothing, nor does the process.
+    assert here == there
+    ended = process("evaluate", "paper-4.1-helical", "--json", "-", folder=tmp_path)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    check_state(strict(ended.stdout))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_seed_and_starts_replace_those_of_the_case(tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path, search="starts = 7\nseed = 5")
+    code, out, _ = cli("solve", path, "--json", "-", "--starts", "2", "--seed", "11")
+    result = strict(out)
+    assert (code, result["seed"], result["starts"]["run"]) == (0, 11, 2)
+    code, out, _ = cli("solve", path, "--json", "-", "--starts", "1")
+    result = strict(out)
+    assert (code, result["seed"], result["starts"]["run"]) == (0, 5, 1)
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["--starts=0", "--starts=two", "--starts=1.5", "--seed=-1", "--jobs=0", "--no-such-option", "--starts=100001"],
+)
+def test_options_that_are_not_allowed(option: str, cli: Run) -> None:
+    code, out, err = cli("solve", "paper-4.1-helical", option)
+    assert (code, out) == (2, "")
+    assert option.partition("=")[0] in err
+    assert "Traceback" not in err
+
+
+def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
+    path = case_file(
+        tmp_path,
+        ('length = "cm"', 'length = "mm"\nangle = "rad"'),
+        ("x3 = 30", f"x3 = {math.radians(30)!r}"),
+        ("x4 = 8", f"x4 = {math.radians(8)!r}"),
+        (ROTATION, f"rotation = {{ angle = {{ min = {-math.radians(30)!r}, max = {math.radians(30)!r} }} }}"),
+    )
+    code, out, _ = cli("solve", path, "--json", "-")
+    result = strict(out)
+    check_state(result)
+    assert (code, result["units"]) == (0, {"length": "mm", "angle": "rad"})
+    assert result["F"] == pytest.approx(407.2107, rel=1e-6)
+    assert result["parameters"]["x4"] == pytest.approx(math.radians(8), rel=1e-15)
+    assert abs(result["pose"]["angle"]) <= math.radians(30) + 1e-12
+
+
+def test_an_infinite_pitch_is_a_string(tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path, (MOTION, "axis = [0, 0, 5]\npitch = inf\n"))
+    for command in ("solve", "evaluate"):
+        code, out, _ = cli(command, path, "--json", "-")
+        result = strict(out)
+        check_state(result)
+        assert code == 0
+        assert result["task"]["pitch"] == "inf"
+        assert result["task"]["twist"] == [0, 0, 0, 0, 0, 1]
+
+
+def test_a_case_with_nothing_free(tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path, (POSITION, "position = [1, 2, 35]"), (ROTATION, ""))
+    code, out, _ = cli("solve", path, "--json", "-")
+    result = strict(out)
+    check_state(result)
+    assert (code, result["status"], result["starts"]["run"]) == (0, "evaluated", 0)
+    code, out, err = cli("solve", path)
+    assert (code, err) == (0, "")
+    assert "evaluated" in out
+
+
+def test_a_solve_that_stops_early_is_no_answer(tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path, search="starts = 3\nmax_iterations = 1")
+    target = tmp_path / "result.json"
+    code, out, err = cli("solve", path, "--json", str(target))
+    result = strict(target.read_text(encoding="utf-8"))
+    assert (code, err) == (1, "")
+    assert (result["status"], result["F"]) == ("not converged", None)
+    assert (result["starts"]["converged"], result["starts"]["optima"]) == (0, [])
+    assert sum(result["starts"]["failed"].values()) == 3
+    check_state(result)
+    assert "not converged" in out
+    assert "max_iterations" in out
+    assert "0 of 3 converged" in out
+    for words in ("largest F", "smallest F", "(optimal)", "local maximum", "local minimum"):
+        assert words not in out
+    code, out, _ = cli("solve", path, "--json", "-")
+    assert (code, strict(out)["status"]) == (1, "not converged")
+
+
+def test_a_search_that_meets_no_finite_number_prints_nothing_foreign(tmp_path: Path) -> None:
+    # The middle of x1, where the first search begins, makes every leg's joints coincide.
+    path = case_file(
+        tmp_path,
+        ("x1 = 12", "x1 = { min = 4, max = 12 }"),
+        ("x3 = 30", "x3 = 8"),
+        (POSITION, "position = [0, 0, 0]"),
+        (ROTATION, ""),
+        search="starts = 2",
+    )
+    ended = process("solve", path, "--json", "-", folder=tmp_path)
+    assert ended.returncode in (0, 1)
+    assert ended.stderr == ""
+    result = strict(ended.stdout)
+    assert (result["F"] is None) == (ended.returncode == 1)
+
+
+def test_output_files_are_whole_or_absent(tmp_path: Path, cli: Run) -> None:
+    target = tmp_path / "result.json"
+    target.write_text("older and longer" * 10_000, encoding="utf-8")
+    assert cli("evaluate", "paper-4.1-helical", "--json", str(target))[0] == 0
+    check_state(strict(target.read_text(encoding="utf-8")))
+    fresh = tmp_path / "fresh"
+    fresh.write_text("", encoding="utf-8")
+    assert stat.S_IMODE(target.stat().st_mode) == stat.S_IMODE(fresh.stat().st_mode)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["fresh", "result.json"]
+
+
+@pytest.mark.parametrize("command", ["solve", "evaluate"])
+@pytest.mark.parametrize("target", ["nowhere/result.json", "folder", "file/result.json", "x" * 300, ""])
+def test_output_that_cannot_be_written(
+    command: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("a file", encoding="utf-8")
+    code, out, err = cli(command, case_file(tmp_path, search="starts = 1"), "--json", target)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert "cannot be written" in err
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["case.toml", "file", "folder"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_output_to_a_pipe_or_device_does_not_replace_it(tmp_path: Path, cli: Run) -> None:
+    # As root, `--json /dev/null` must not put a file in the device's place.
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        code, _, err = cli("evaluate", "paper-4.1-helical", "--json", str(pipe))
+        assert stat.S_ISFIFO(pipe.stat().st_mode)
+        if code == 0:
+            check_state(strict(os.read(reader, 100_000).decode()))
+        else:
+            assert (code, len(err.splitlines())) == (2, 1)
+    finally:
+        os.close(reader)
+
+
+def test_output_through_a_link_reaches_its_target(tmp_path: Path, cli: Run) -> None:
+    target, link = tmp_path / "real.json", tmp_path / "link.json"
+    target.write_text("older", encoding="utf-8")
+    link.symlink_to(target)
+    assert cli("evaluate", "paper-4.1-helical", "--json", str(link))[0] == 0
+    assert link.is_symlink()
+    check_state(strict(target.read_text(encoding="utf-8")))
+
+
+def test_evaluate_stands_in_the_middle_or_at_the_start(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("evaluate", "paper-4.1-helical", "--json", "-")
+    result = strict(out)
+    check_state(result)
+    assert (code, result["pose"]["position"], result["pose"]["angle"]) == (0, [0, 0, 35], 0)
+    path = case_file(
+        tmp_path,
+        ("x2 = 8", "x2 = { min = 4, max = 9, start = 5 }"),
+        ("{ min = 20, max = 50 }", "{ min = 20, max = 50, start = 41 }"),
+        (ROTATION, "rotation = { axis = [0, 0, 1], angle = { min = -30, max = 30, start = 12 } }"),
+    )
+    result = strict(cli("evaluate", path, "--json", "-")[1])
+    check_state(result)
+    assert result["parameters"]["x2"] == 5
+    assert result["pose"]["position"] == [0, 0, 41]
+    assert result["pose"]["angle"] == pytest.approx(12, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "expected"),
+    [("{ min = -30, max = 30, start = 12 }", 12), ("{ min = 10, max = 30, start = 12 }", 12), ("-12", 12)],
+)
+def test_a_start_of_the_angle_counts_with_a_free_axis_too(
+    angle: str, expected: float, tmp_path: Path, cli: Run
+) -> None:
+    path = case_file(tmp_path, (ROTATION, f"rotation = {{ angle = {angle} }}"))
+    result = strict(cli("evaluate", path, "--json", "-")[1])
+    check_state(result)
+    assert result["pose"]["angle"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_evaluate_with_settings(cli: Run) -> None:
+    def at(*settings: str, case: str = "paper-4.1-helical") -> dict[str, Any]:
+        code, out, err = cli("evaluate", case, "--json", "-", *(f"--set={setting}" for setting in settings))
+        assert (code, err) == (0, "")
+        result = strict(out)
+        check_state(result)
+        return result
+
+    middle = at()
+    assert at("x4=20")["parameters"] == {"x1": 12, "x2": 8, "x3": 30, "x4": 20}
+    assert at("x4=20")["F"] != pytest.approx(middle["F"])
+    assert at("x4=20.0", "x1 = 9", "x1=10")["parameters"]["x1"] == 10
+    assert at("p_x=-3.5", "p_z=60")["pose"]["position"] == [-3.5, 0, 60]
+    assert at("angle=25")["pose"]["angle"] == pytest.approx(25)
+    turned = at("axis=0,0,2", "angle=-25")
+    assert turned["pose"]["axis"] == [0, 0, 1]
+    assert turned["pose"]["angle"] == pytest.approx(-25)
+    assert at("axis=1,-1,0", "angle=10")["pose"]["axis"] == pytest.approx([math.sqrt(0.5), -math.sqrt(0.5), 0])
+    assert at("angle=10", case="paper-4.2-rotation")["pose"]["axis"] == [0, 0, 1]
+    assert at("x1=3", case="paper-4.2-rotation")["parameters"]["x1"] == 3
+
+
+def test_evaluate_with_one_coordinate_of_a_joint(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "hexapod.toml"
+    path.write_text(cli("new", "hexapod")[1], encoding="utf-8")
+    result = strict(cli("evaluate", str(path), "--json", "-", "--set", "base_1_x=10", "--set", "platform_6_z=1")[1])
+    check_state(result)
+    assert result["parameters"]["base_1"][0] == 10
+    assert result["parameters"]["platform_6"][2] == 1
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("y1=3", ("y1", "cannot be set", "x1")),
+        ("x_1=3", ("x_1", "cannot be set", "did you mean 'x1'?")),
+        ("angel=3", ("angel", "cannot be set", "did you mean 'angle'?")),
+        ("axs=0,0,1", ("axs", "cannot be set", "did you mean 'axis'?")),
+        ("pz=3", ("pz", "cannot be set", "did you mean 'p_z'?")),
+        ("model=3", ("model", "cannot be set")),
+        ("seed=3", ("seed", "cannot be set")),
+        ("x1", ("--set x1", "NAME=NUMBER")),
+        ("x1=", ("--set x1=", "NAME=NUMBER")),
+        ("=3", ("--set =3", "NAME=NUMBER")),
+        (" =3", ("--set", "NAME=NUMBER")),
+        ("", ("--set", "NAME=NUMBER")),
+        ("x1=abc", ("--set x1=abc", "NAME=NUMBER")),
+        ("x1=3cm", ("--set x1=3cm", "NAME=NUMBER")),
+        ("x1=3,", ("--set x1=3,", "NAME=NUMBER")),
+        ("x1==3", ("--set x1==3", "NAME=NUMBER")),
+        ("axis=0 0 1", ("--set axis=0 0 1", "axis=X,Y,Z")),
+        ("x1=nan", ("robot.parameters.x1", "finite")),
+        ("p_x=inf", ("pose.position[0]", "finite")),
+        ("x1=1,2", ("robot.parameters.x1", "must be a number")),
+        ("x3=40", ("robot.parameters.x3", "between 0 deg and 30 deg")),
+        ("x1=-1", ("robot.parameters.x1", "at least 0 cm")),
+        ("p_y=1,2,3", ("pose.position[1]", "must be a number")),
+        ("axis=0,0,0", ("pose.rotation.axis", "zero")),
+        ("axis=1", ("pose.rotation.axis", "list")),
+        ("axis=1,2", ("pose.rotation.axis", "3 entries")),
+        ("angle=180", ("pose.rotation.angle", "at most 179 deg")),
+        ("angle=1,2,3", ("pose.rotation.angle", "must be a number")),
+        ("angle=nan", ("pose.rotation.angle", "finite")),
+    ],
+)
+def test_settings_that_are_not_allowed(setting: str, words: tuple[str, ...], cli: Run) -> None:
+    code, out, err = cli("evaluate", "paper-4.1-helical", "--set", setting, "--json", "-")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    for word in words:
+        assert word in err
+
+
+def test_evaluate_where_a_leg_has_no_length(tmp_path: Path, cli: Run) -> None:
+    path = case_file(
+        tmp_path,
+        ("x1 = 12", "x1 = { min = 4, max = 12 }"),
+        ("x3 = 30", "x3 = 8"),
+        (POSITION, "position = [0, 0, 0]"),
+        (ROTATION, ""),
+    )
+    for setting in ((), ("--set", "x1=8")):
+        code, out, err = cli("evaluate", path, *setting)
+        assert (code, out) == (2, "")
+        assert len(err.splitlines()) == 1
+        assert "case.toml" in err
+        assert "zero length" in err
+
+
+EXTREMES = {
+    "task-axis-large": (("axis = [2, 2, 1]", "axis = [2e200, 2e200, 1e200]"),),
+    "task-axis-small": (("axis = [2, 2, 1]", "axis = [2e-200, 2e-200, 1e-200]"),),
+    "rotation-axis-large": ((ROTATION, "rotation = { axis = [0, 0, 1e200], angle = 10 }"),),
+    "rotation-axis-small": ((ROTATION, "rotation = { axis = [0, 0, 1e-200], angle = 10 }"),),
+    "pitch-large": (("pitch = 1", "pitch = 1e200"),),
+    "pitch-small": (("pitch = 1", "pitch = 1e-320"),),
+    "point-large": (("[2, 3, 6]", "[1e200, 3, 6]"),),
+    "twist-large": ((MOTION, "twist = [1e200, 0, 0, 0, 0, 1]\n"),),
+    "twist-small": ((MOTION, "twist = [1e-200, 0, 0, 0, 0, 0]\n"),),
+    "radius-large": (("x1 = 12", "x1 = 1e200"),),
+    "radius-zero": (("x1 = 12", "x1 = 0"),),
+    "range-large": (("{ min = 20, max = 50 }", "{ min = -1e308, max = 1e308 }"),),
+    "range-small": (("{ min = 20, max = 50 }", "{ min = 20, max = 20.000000000000004 }"),),
+    "point-fixed-large": (
+        ("[2, 3, 6]", "[1e200, 3, 6]"),
+        (POSITION, "position = [0, 0, 35]"),
+        (ROTATION, ""),
+    ),
+    "radius-fixed-large": (("x1 = 12", "x1 = 1e200"), (POSITION, "position = [0, 0, 35]"), (ROTATION, "")),
+}
+
+
+@pytest.mark.parametrize("command", ["solve", "evaluate"])
+@pytest.mark.parametrize("edits", EXTREMES.values(), ids=EXTREMES)
+def test_extreme_numbers_are_answered_or_refused_in_a_sentence(
+    edits: tuple[tuple[str, str], ...], command: str, tmp_path: Path, cli: Run
+) -> None:
+    path, target = case_file(tmp_path, *edits, search="starts = 1"), tmp_path / "result.json"
+    code, _, err = cli(command, path, "--json", str(target))
+    assert code in (0, 1, 2)
+    if code == 2:
+        assert len(err.splitlines()) == 1
+        assert "case.toml" in err
+        assert not target.exists()
+    else:
+        # No warning of NumPy's or CasADi's comes through.
+        assert err == ""
+        strict(target.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", ["rotation-axis-large", "rotation-axis-small", "task-axis-large", "task-axis-small"])
+def test_an_axis_has_any_length_but_zero(name: str, tmp_path: Path, cli: Run) -> None:
+    code, out, err = cli("evaluate", case_file(tmp_path, *EXTREMES[name]), "--json", "-")
+    assert (code, err) == (0, "")
+    result = strict(out)
+    check_state(result)
+    assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+
+
+@pytest.mark.parametrize("label", ["[cm]", "[/cm]", "[bold]", ":ruler:", "µm", "in"])
+def test_a_length_label_is_shown_as_it_is(label: str, tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
+    for command in ("solve", "evaluate"):
+        code, out, err = cli(command, path)
+        assert (code, err) == (0, "")
+        assert next(line for line in out.splitlines() if line.startswith("x1")).split()[2] == label
+        assert f"Pose {label} of a" in out
+
+
+@pytest.mark.parametrize("json_options", [("--json", "-"), ()], ids=["json", "table"])
+def test_a_title_in_any_script_on_a_terminal_without_it(json_options: tuple[str, ...], tmp_path: Path) -> None:
+    path = case_file(tmp_path, ("Pose of a", "Größe of a"), search="starts = 1")
+    ended = process("evaluate", path, *json_options, folder=tmp_path, environment={"PYTHONIOENCODING": "ascii"})
+    assert "Traceback" not in ended.stderr
+    assert ended.returncode == 0
+    if json_options:
+        assert strict(ended.stdout)["title"].startswith("Größe")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux only")
+def test_a_file_name_that_is_no_text(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / os.fsdecode(b"caf\xe9.toml")
+    path.write_text(HELICAL, encoding="utf-8")
+    code, _, err = cli("evaluate", str(path), "--json", str(tmp_path / "result.json"))
+    assert code in (0, 2)
+    assert len(err.splitlines()) == (1 if code else 0)
+    assert (tmp_path / "result.json").exists() == (code == 0)
+
+
+# A validator for the part of JSON Schema that the format needs. It refuses keywords that it does not know.
+_ANNOTATIONS = {"title", "description", "default", "$defs", "$schema", "$id", "examples"}
+_TYPES: dict[str, tuple[type, ...]] = {
+    "object": (dict,),
+    "array": (list,),
+    "string": (str,),
+    "boolean": (bool,),
+    "number": (int, float),
+    "integer": (int,),
+    "null": (type(None),),
+}
+
+
+def accepts(schema: dict[str, Any] | bool, value: object, root: dict[str, Any]) -> bool:
+    if isinstance(schema, bool):
+        return schema
+    return all(
+        _keyword(keyword, argument, schema, value, root)
+        for keyword, argument in schema.items()
+        if keyword not in _ANNOTATIONS
+    )
+
+
+def _keyword(keyword: str, argument: Any, schema: dict[str, Any], value: object, root: dict[str, Any]) -> bool:  # noqa: ANN401, C901, PLR0911, PLR0912
+    def each(part: dict[str, Any] | bool) -> bool:
+        return accepts(part, value, root)
+
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    match keyword:
+        case "$ref":
+            target: Any = root
+            for step in argument.removeprefix("#/").split("/"):
+                target = target[step]
+            return each(target)
+        case "anyOf":
+            return any(map(each, argument))
+        case "oneOf":
+            return sum(map(each, argument)) == 1
+        case "allOf":
+            return all(map(each, argument))
+        case "type":
+            return isinstance(value, _TYPES[argument]) and (argument == "boolean" or not isinstance(value, bool))
+        case "enum":
+            return value in argument
+        case "const":
+            return value == argument
+        case "required":
+            return not isinstance(value, dict) or all(key in value for key in argument)
+        case "properties":
+            return not isinstance(value, dict) or all(
+                accepts(part, value[key], root) for key, part in argument.items() if key in value
+            )
+        case "additionalProperties":
+            others = [] if not isinstance(value, dict) else [k for k in value if k not in schema.get("properties", {})]
+            assert isinstance(value, dict) or not others
+            return all(accepts(argument, value[key], root) for key in others) if isinstance(value, dict) else True
+        case "items":
+            return not isinstance(value, list) or all(accepts(argument, part, root) for part in value)
+        case "minItems":
+            return not isinstance(value, list) or len(value) >= argument
+        case "maxItems":
+            return not isinstance(value, list) or len(value) <= argument
+        case "minLength":
+            return not isinstance(value, str) or len(value) >= argument
+        case "maxLength":
+            return not isinstance(value, str) or len(value) <= argument
+        case "minimum":
+            return not number or bool(value >= argument)  # type: ignore[operator]
+        case "maximum":
+            return not number or bool(value <= argument)  # type: ignore[operator]
+        case "exclusiveMinimum":
+            return not number or bool(value > argument)  # type: ignore[operator]
+    raise AssertionError(f"this test does not know the JSON Schema keyword {keyword!r}")
+
+
+@pytest.fixture
+def schema(cli: Run) -> dict[str, Any]:
+    code, out, err = cli("schema")
+    assert (code, err) == (0, "")
+    return strict(out)
+
+
+def good_documents(cli: Run) -> dict[str, dict[str, Any]]:
+    texts = {name: (CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()}
+    texts |= {f"new {name}": cli("new", name)[1] for name in model_names()}
+    texts["translation"] = edited((MOTION, "axis = [0, 0, 1]\npitch = inf\n"))
+    texts["twist"] = edited((MOTION, "twist = [0, 0, 1, 0, 0, 0]\n"))
+    return {name: tomllib.loads(text) for name, text in texts.items()}
+
+
+def test_the_schema_accepts_every_good_case(schema: dict[str, Any], cli: Run) -> None:
+    assert len(shipped_cases()) >= 8
+    for name, document in good_documents(cli).items():
+        assert accepts(schema, document, schema), name
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("title =", "titel ="),
+        ("x1 = 12", 'x1 = "12"'),
+        ("x1 = 12", "x1 = true"),
+        ("x1 = 12", "x1 = { min = 2 }"),
+        ("x1 = 12", "x1 = { min = 2, max = 3, strat = 2 }"),
+        (POSITION, ""),
+        (POSITION, "position = [0, 0]"),
+        (POSITION, "position = 3"),
+        (ROTATION, "rotation = { axis = [0, 0, 1] }"),
+        (ROTATION, "rotation = { axis = [0, 1], angle = 3 }"),
+        ('sense = "max"', ""),
+        ('sense = "max"', 'sense = "maximum"'),
+        (MOTION, "twist = [0, 0, 1]\n"),
+        ("pitch = 1", 'pitch = "inf"'),
+        ("[[task]]", "[task]"),
+        ("[expect]", "[solve]\nstarts = 0\n[expect]"),
+        ("[expect]", "[solve]\nstarts = 2.5\n[expect]"),
+        ('length = "cm"', 'length = ""'),
+        ('length = "cm"', 'angle = "grad"'),
+        ('model = "stewart-gough"', ""),
+    ],
+)
+def test_the_schema_refuses_what_the_reader_refuses(old: str, new: str, schema: dict[str, Any]) -> None:
+    assert not accepts(schema, tomllib.loads(edited((old, new))), schema)
+
+
+def test_the_schema_by_another_validator(schema: dict[str, Any], cli: Run) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for document in good_documents(cli).values():
+        jsonschema.validate(document, schema)
+
+
+@pytest.mark.parametrize("model", model_names())
+def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
+    code, text, err = cli("new", model)
+    assert (code, err) == (0, "")
+    assert text.endswith("\n")
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    target = tmp_path / "result.json"
+    code, out, err = cli("solve", str(path), "--json", str(target))
+    assert (code, err) == (0, "")
+    assert "(optimal)" in out
+    result = strict(target.read_text(encoding="utf-8"))
+    check_state(result)
+    assert (result["status"], result["model"], result["case"]) == ("optimal", model, "mine")
+    # What its comments offer instead is right as well.
+    lines = text.splitlines()
+    offered = [line.removeprefix("# ") for line in lines if line.startswith("# rotation")]
+    assert offered
+    for line in offered:
+        path.write_text(
+            "\n".join(line if each.startswith("rotation") else each for each in lines) + "\n", encoding="utf-8"
+        )
+        assert cli("evaluate", str(path))[0] == 0
+
+
+def test_models_lists_the_shipped_robots(cli: Run) -> None:
+    code, out, err = cli("models")
+    assert (code, err) == (0, "")
+    rows = [line.split()[0] for line in out.splitlines()]
+    assert rows[1:3] == ["stewart-gough", "hexapod"]
+
+
+def test_models_shows_one_robot(cli: Run) -> None:
+    code, out, err = cli("models", "stewart-gough")
+    assert (code, err) == (0, "")
+    for word in ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+"):
+        assert word in out
+    code, out, err = cli("models", "hexapod")
+    assert (code, err) == (0, "")
+    for word in ("base_1_x", "platform_6_z", "leg_length", "any"):
+        assert word in out
+
+
+@pytest.mark.parametrize("arguments", [("models", "hexapode"), ("new", "hexapode")])
+def test_a_robot_that_does_not_exist(arguments: tuple[str, ...], cli: Run) -> None:
+    code, out, err = cli(*arguments)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert "did you mean 'hexapod'?" in err
+
+
+@pytest.mark.parametrize("arguments", [("frobnicate",), ("solve",), ("evaluate",), ("new",), ("solve", "a", "b"), ()])
+def test_commands_that_do_not_exist_or_lack_something(arguments: tuple[str, ...], cli: Run) -> None:
+    code, out, err = cli(*arguments)
+    assert code == 2
+    assert "Usage: " in out + err
+    assert "Traceback" not in err
+
+
+def test_help(cli: Run) -> None:
+    for option in ("-h", "--help"):
+        code, out, err = cli(option)
+        assert (code, err) == (0, "")
+        for command in ("solve", "evaluate", "models", "schema", "new"):
+            assert command in out
+            assert cli(command, option)[0] == 0
+
+
+@pytest.mark.parametrize("arguments", [("solve", "paper-4.3", "--starts", "2", "--json", "-"), ("models",)])
+def test_a_reader_that_goes_away(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None
+        assert running.stderr is not None
+        running.stdout.close()
+        err = running.stderr.read()
+    assert "Traceback" not in err
+    assert "Exception" not in err

@@ -1,0 +1,420 @@
+"""Robots that another package offers by an entry point."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from screwsynth.models import model_names, robot_function
+from screwsynth.nlp import CaseError, InputError, build_model, formulate, load_case, solve
+from screwsynth.nlp.cli import main
+
+# A robot with a constraint couple and an option of every plain kind. Its hints are text, as in many packages.
+MODULE = '''
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import casadi as ca
+from casadi import SX
+
+from screwsynth.models import Dimension, Model, Parameter, PoseSymbols, couple_about, force_along
+
+
+def tripod(
+    *,
+    legs: int = 3,
+    twisted: bool = False,
+    drive: Literal["fast", "slow"] = "slow",
+    spread: float = 1.0,
+    brand: str = "none",
+) -> Model:
+    """Legs on two circles, and a joint that resists turning."""
+    pose = PoseSymbols()
+    radius, small = SX.sym("radius"), SX.sym("small")
+    rows = []
+    for i in range(legs):
+        azimuth = 2 * math.pi * i / legs
+        other = azimuth + (1.0 if twisted else 0.5)
+        base = ca.vertcat(spread * radius * math.cos(azimuth), spread * radius * math.sin(azimuth), 0)
+        platform = ca.vertcat(small * math.cos(other), small * math.sin(other), 0)
+        rows.append(force_along(f"leg {i + 1}", base, pose.position + pose.rotation @ platform - base))
+    rows.append(couple_about("joint", pose.rotation[:, 2]))
+    return Model(
+        name="tripod",
+        description="legs and a joint",
+        options={"legs": legs, "twisted": twisted, "drive": drive, "spread": spread, "brand": brand},
+        parameters=(
+            Parameter("radius", radius, Dimension.LENGTH, "radius of the base", (10.0,), 0.0),
+            Parameter("small", small, Dimension.LENGTH, "radius of the platform", (6.0,), 0.0),
+        ),
+        pose=pose,
+        home=(0.0, 0.0, 30.0),
+        wrenches=tuple(rows),
+    )
+
+
+def sized(*, size: int) -> Model:
+    """An option without a default."""
+    return renamed("sized", tripod(legs=size), {"size": size})
+
+
+def renamed(name, model, options=None):
+    return Model(
+        name=name,
+        description=model.description,
+        options=options or {},
+        parameters=model.parameters,
+        pose=model.pose,
+        home=model.home,
+        wrenches=model.wrenches,
+    )
+
+
+def hexapod() -> Model:
+    raise RuntimeError("a shipped name was taken over")
+'''
+
+CASE = """\
+[units]
+length = "cm"
+
+[robot]
+model = "tripod"
+legs = 6
+twisted = true
+drive = "fast"
+spread = 1.5
+brand = "any"
+characteristic_length = 5
+
+[robot.parameters]
+radius = { min = 8, max = 12 }
+small = 6
+
+[pose]
+position = [0, 0, 30]
+
+[[task]]
+sense = "max"
+axis = [0, 1, 2]
+point = [1, 0, 30]
+pitch = 2
+
+[solve]
+starts = 3
+"""
+
+Run = Callable[..., tuple[int, str, str]]
+Install = Callable[..., Path]
+
+
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
+        capfd.readouterr()
+        code: object = 0
+        try:
+            main()
+        except SystemExit as ended:
+            code = ended.code
+        out, err = capfd.readouterr()
+        return int(str(code or 0)), out, err
+
+    return run
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Put a package with entry points on the path, as pip would."""
+    packages: list[str] = []
+
+    def put(points: dict[str, str], module: str = MODULE, package: str = "workshop_robots") -> Path:
+        site = tmp_path / f"site-{package}"
+        (site / package).mkdir(parents=True)
+        (site / package / "__init__.py").write_text("", encoding="utf-8")
+        (site / package / "robots.py").write_text(module, encoding="utf-8")
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")
+        lines = [f"{name} = {package}.{target}" for name, target in points.items()]
+        (info / "entry_points.txt").write_text("\n".join(["[screwsynth.models]", *lines, ""]), encoding="utf-8")
+        monkeypatch.syspath_prepend(str(site))
+        packages.append(package)
+        return site
+
+    yield put
+    for name in list(sys.modules):
+        if name.split(".")[0] in packages:
+            del sys.modules[name]
+
+
+@pytest.fixture
+def tripod(install: Install) -> Path:
+    return install({"tripod": "robots:tripod"})
+
+
+def case_file(folder: Path, *edits: tuple[str, str]) -> str:
+    text = CASE
+    for old, new in edits:
+        assert old in text, f"{old!r} is not in the base text"
+        text = text.replace(old, new, 1)
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def check_refused(ended: tuple[int, str, str], *words: str) -> None:
+    code, out, err = ended
+    assert code == 2
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    for word in words:
+        assert word in err
+
+
+@pytest.mark.usefixtures("tripod")
+def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
+    assert model_names() == ("stewart-gough", "hexapod", "tripod")
+    code, out, err = cli("models")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()] == ["robot", "stewart-gough", "hexapod", "tripod"]
+    assert "legs and a joint" in out
+
+
+@pytest.mark.usefixtures("tripod")
+def test_it_is_shown_with_its_options(cli: Run) -> None:
+    code, out, err = cli("models", "tripod")
+    assert (code, err) == (0, "")
+    for word in ("legs", "int", "twisted", "bool", '"fast", "slow"', '"slow"', "radius", "small", "couple", "joint"):
+        assert word in out
+
+
+@pytest.mark.usefixtures("tripod")
+def test_defaults_are_shown_as_a_case_writes_them(cli: Run) -> None:
+    rows = {row[0]: row[-1] for row in (line.split() for line in cli("models", "tripod")[1].splitlines()) if row}
+    assert {key: rows[key] for key in ("legs", "twisted", "spread", "brand")} == {
+        "legs": "3",
+        "twisted": "false",
+        "spread": "1.0",
+        "brand": '"none"',
+    }
+
+
+@pytest.mark.usefixtures("tripod")
+def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
+    path = case_file(tmp_path)
+    code, out, err = cli("solve", path, "--json", "-")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    assert (result["model"], result["status"], len(result["rates"])) == ("tripod", "optimal", 7)
+    assert result["limbs"] == [*(f"leg {i}" for i in range(1, 7)), "joint"]
+    assert result["characteristic_length"] == 5
+    assert sum(rate**2 for rate in result["rates"]) == pytest.approx(result["F"], rel=1e-12)
+    code, out, err = cli("solve", path)
+    assert (code, err) == (0, "")
+    assert "(optimal)" in out
+    assert "couple" in out
+    code, out, err = cli("evaluate", path, "--set", "radius=9", "--json", "-")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["parameters"]["radius"] == 9
+
+
+def test_it_is_found_by_a_new_process(tripod: Path, tmp_path: Path) -> None:
+    program = f"import sys; sys.path.insert(0, {str(tripod)!r}); from screwsynth.nlp.cli import main; main()"
+    command = [sys.executable, "-P", "-c", program, "solve", case_file(tmp_path), "--json", "-"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert json.loads(ended.stdout)["status"] == "optimal"
+
+
+@pytest.mark.usefixtures("tripod")
+def test_its_options_reach_its_function(tmp_path: Path) -> None:
+    few = load_case(case_file(tmp_path, ("legs = 6\n", "")))
+    assert len(few.model.wrenches) == 4
+    assert dict(few.model.options) == {"legs": 3, "twisted": True, "drive": "fast", "spread": 1.5, "brand": "any"}
+    straight = solve(load_case(case_file(tmp_path, ("twisted = true", "twisted = false")))).F
+    assert straight != pytest.approx(solve(load_case(case_file(tmp_path))).F)
+    # A whole number is a number.
+    assert formulate(load_case(case_file(tmp_path, ("spread = 1.5", "spread = 2")))).n == 1
+
+
+@pytest.mark.parametrize(
+    ("edit", "key", "words"),
+    [
+        (("legs = 6", 'legs = "6"'), "robot.legs", ("integer",)),
+        (("legs = 6", "legs = 6.0"), "robot.legs", ("integer",)),
+        (("legs = 6", "legs = true"), "robot.legs", ("integer",)),
+        (("legs = 6", "legs = [6]"), "robot.legs", ("integer",)),
+        (("legs = 6", "legs = { min = 3, max = 6 }"), "robot.legs", ("integer",)),
+        (("twisted = true", "twisted = 1"), "robot.twisted", ("boolean",)),
+        (("twisted = true", 'twisted = "yes"'), "robot.twisted", ("boolean",)),
+        (('drive = "fast"', 'drive = "faster"'), "robot.drive", ("'fast'", "'slow'")),
+        (("spread = 1.5", 'spread = "wide"'), "robot.spread", ("number",)),
+        (("spread = 1.5", "spread = nan"), "robot.spread", ("finite",)),
+        (("spread = 1.5", "spread = inf"), "robot.spread", ("finite",)),
+        (('brand = "any"', "brand = 3"), "robot.brand", ("string",)),
+        (("legs = 6", "leggs = 6"), "robot.leggs", ("no such key", "'legs'")),
+        (("small = 6", "smal = 6"), "robot.parameters.smal", ("no such parameter", "'small'")),
+        (("small = 6", "small = -6"), "robot.parameters.small", ("at least 0 cm",)),
+        (
+            ("characteristic_length = 5", "characteristic_length = 0"),
+            "robot.characteristic_length",
+            ("greater than 0",),
+        ),
+        (("characteristic_length = 5", "characteristic_length = inf"), "robot.characteristic_length", ("finite",)),
+        (('model = "tripod"', 'model = "tripot"'), "robot.model", ("no such robot", "'tripod'")),
+    ],
+)
+@pytest.mark.usefixtures("tripod")
+def test_its_options_are_checked_against_its_signature(
+    edit: tuple[str, str], key: str, words: tuple[str, ...], tmp_path: Path, cli: Run
+) -> None:
+    path = case_file(tmp_path, edit)
+    with pytest.raises(CaseError) as refused:
+        load_case(path)
+    assert refused.value.key == key
+    check_refused(cli("solve", path), "case.toml", key, *words)
+
+
+@pytest.mark.usefixtures("tripod")
+def test_a_new_case_for_it_solves(tmp_path: Path, cli: Run) -> None:
+    code, text, err = cli("new", "tripod")
+    assert (code, err) == (0, "")
+    assert tomllib.loads(text)["robot"]["twisted"] is False
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    assert cli("solve", str(path), "--starts", "4")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("(10.0,), 0.0)", "(10.0,), 9.5, 10.5)"),
+        ("(10.0,), 0.0)", "(10.0,), 10.0)"),
+        ("(10.0,), 0.0)", "(0.0,))"),
+        ("home=(0.0, 0.0, 30.0)", "home=(20.0, 0.0, 0.0)"),
+    ],
+    ids=["narrow-domain", "typical-at-the-end", "typical-zero", "home-in-the-plane"],
+)
+def test_a_new_case_for_unusual_typical_values(old: str, new: str, install: Install, tmp_path: Path, cli: Run) -> None:
+    assert old in MODULE
+    install({"tripod": "robots:tripod"}, MODULE.replace(old, new))
+    path = tmp_path / "mine.toml"
+    # How options are written is another test's matter.
+    path.write_text(cli("new", "tripod")[1].replace("= False", "= false"), encoding="utf-8")
+    assert cli("evaluate", str(path))[::2] == (0, "")
+
+
+def test_a_shipped_name_cannot_be_taken_over(install: Install, cli: Run) -> None:
+    install({"hexapod": "robots:hexapod", "stewart-gough": "robots:hexapod", "tripod": "robots:tripod"})
+    assert model_names() == ("stewart-gough", "hexapod", "tripod")
+    assert robot_function("hexapod").__module__ == "screwsynth.models.hexapod"
+    assert build_model("stewart-gough").parameters[0].name == "x1"
+    code, out, err = cli("models")
+    assert (code, err) == (0, "")
+    assert sum(line.startswith("hexapod") for line in out.splitlines()) == 1
+    assert cli("solve", "paper-4.1-helical", "--starts", "1")[0] == 0
+
+
+def test_a_name_that_two_packages_offer(install: Install, tmp_path: Path, cli: Run) -> None:
+    install({"tripod": "robots:tripod"}, package="first_robots")
+    install({"tripod": "robots:tripod"}, package="second_robots")
+    assert model_names().count("tripod") == 1
+    code, _, err = cli("solve", case_file(tmp_path))
+    assert code in (0, 2)
+    assert len(err.splitlines()) == (1 if code else 0)
+
+
+def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run) -> None:
+    install({"sized": "robots:sized"})
+    edits = [('model = "tripod"\nlegs = 6\n', 'model = "sized"\nsize = 6\n'), ("twisted = true\n", "")]
+    edits += [('drive = "fast"\n', ""), ("spread = 1.5\n", ""), ('brand = "any"\n', "")]
+    path = case_file(tmp_path, *edits)
+    assert cli("solve", path)[0] == 0
+    path = case_file(tmp_path, *edits, ("size = 6\n", ""))
+    check_refused(cli("solve", path), "case.toml", "robot.size", "missing", "'sized'")
+
+
+def test_an_option_without_a_default_does_not_hide_the_other_robots(install: Install, cli: Run) -> None:
+    install({"sized": "robots:sized"})
+    code, out, err = cli("models")
+    assert (code, err) == (0, "")
+    for name in ("stewart-gough", "hexapod", "sized"):
+        assert name in out
+    code, out, _ = cli("models", "sized")
+    assert code == 0
+    assert "must be given" in out
+
+
+def test_text_in_square_brackets_is_shown_as_it_is(install: Install, tmp_path: Path, cli: Run) -> None:
+    module = MODULE.replace('"leg {i + 1}"', '"[leg{i}]"').replace(
+        '"legs and a joint"', '"legs [short] and a [/joint]"'
+    )
+    module = module.replace('"radius of the base"', '"radius [of the base]"')
+    install({"tripod": "robots:tripod"}, module)
+    for arguments, word in (
+        (("models",), "legs [short] and a [/joint]"),
+        (("models", "tripod"), "radius [of the base]"),
+        (("models", "tripod"), "[leg0]"),
+        (("evaluate", case_file(tmp_path)), "[leg0]"),
+    ):
+        code, out, err = cli(*arguments)
+        assert (code, err) == (0, "")
+        assert word in out
+
+
+FAULTY = {
+    "raises-at-import": ("raise RuntimeError('no licence')\n", "robots:tripod", "no licence"),
+    "imports-what-is-not-there": ("import no_such_module_at_all\n", "robots:tripod", "no_such_module_at_all"),
+    "is-no-python": ("def tripod(:\n", "robots:tripod", "robots.py"),
+    "has-no-such-function": (MODULE, "robots:tripot", "tripot"),
+    "has-no-such-module": (MODULE, "robot:tripod", "workshop_robots.robot"),
+    "is-no-function": ("tripod = 3\n", "robots:tripod", "tripod"),
+    "is-a-model-itself": (MODULE + "\ntripod = tripod()\n", "robots:tripod", "tripod"),
+    "returns-nothing": ("def tripod():\n    pass\n", "robots:tripod", "Model"),
+    "returns-text": ("def tripod():\n    return 'tripod'\n", "robots:tripod", "Model"),
+    "raises": ("def tripod():\n    raise ZeroDivisionError('by zero')\n", "robots:tripod", "by zero"),
+    "contradicts-itself": (MODULE.replace('"radius", radius', '"radius", 2 * radius'), "robots:tripod", "expression"),
+    "has-a-hint-that-is-nothing": ("def tripod(*, legs: 'Legs' = 3):\n    pass\n", "robots:tripod", "Legs"),
+    "takes-anything": ("def tripod(**options):\n    return None\n", "robots:tripod", "tripod"),
+    "takes-positions": ("def tripod(legs=3, /):\n    return None\n", "robots:tripod", "by name"),
+    "calls-itself-otherwise": (MODULE.replace('name="tripod"', 'name="quadripod"'), "robots:tripod", "quadripod"),
+}
+OPTIONS = {"legs", "twisted", "drive", "spread", "brand"}
+PLAIN = "\n".join(line for line in CASE.splitlines() if line.partition(" ")[0] not in OPTIONS)
+each_faulty = pytest.mark.parametrize("faulty", FAULTY.values(), ids=FAULTY)
+
+
+@each_faulty
+def test_a_faulty_robot_is_a_sentence(faulty: tuple[str, str, str], install: Install, tmp_path: Path, cli: Run) -> None:
+    module, target, words = faulty
+    install({"tripod": target}, module)
+    path = tmp_path / "case.toml"
+    path.write_text(PLAIN, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        load_case(str(path))
+    for said in (str(refused.value), cli("solve", str(path))[2]):
+        assert "case.toml" in said
+        assert "tripod" in said
+        assert words in said
+    for arguments in (("solve", str(path)), ("models", "tripod"), ("new", "tripod")):
+        check_refused(cli(*arguments), "tripod", words)
+
+
+@each_faulty
+def test_a_faulty_robot_does_not_hide_the_others(faulty: tuple[str, str, str], install: Install, cli: Run) -> None:
+    module, target, _ = faulty
+    install({"tripod": target}, module)
+    assert cli("evaluate", "paper-4.1-helical")[0] == 0
+    code, out, err = cli("models")
+    assert code == 0
+    assert len(err.splitlines()) <= 1
+    for name in ("stewart-gough", "hexapod", "tripod"):
+        assert name in out + err
