@@ -9,13 +9,16 @@ freed together they are redundant, and singular at zero angle.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 from casadi import SX
-from numpy.typing import ArrayLike
 
 from screwsynth.models.arrays import FloatArray, frozen_array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 def matrix_from_quaternion_vector(q: SX) -> SX:

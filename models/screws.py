@@ -18,11 +18,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from screwsynth.models.arrays import FloatArray, frozen_array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 #: A direction part shorter than this times the moment part is rounding error: the pitch is infinite. Lengths of a
 #: screw's two parts differ by the distance of its axis, and no machine is 1e12 of its own length units away.

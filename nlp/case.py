@@ -11,14 +11,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis, unit_vector
 from screwsynth.nlp.errors import CaseError, nearest
 from screwsynth.nlp.units import Units
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 #: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
 MAX_FREE_ROTATION = math.radians(179)

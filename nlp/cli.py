@@ -133,6 +133,8 @@ def main() -> None:
 
     # pydantic would look for plugins in every installed distribution: a tenth of a short command's time.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # The matrices here are a dozen wide: BLAS threads would only cost their start and spin beside the solver's own.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         # A terminal that cannot show a letter of a title shows its escape instead.
         if isinstance(stream, io.TextIOWrapper):

@@ -11,10 +11,9 @@ import platform
 from collections import Counter
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.case import Case
@@ -23,6 +22,9 @@ from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import Solution, StartStatus
 from screwsynth.nlp.units import Units
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SCHEMA = 1
 

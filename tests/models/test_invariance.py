@@ -22,7 +22,7 @@ CIRCLES = {"aligned": stewart_gough(layout="aligned"), "octahedral": stewart_gou
 #: Relative to F without cancellation, so the same for every case; the worst seen is 1e-15, some rounding units.
 ROUNDING = 5e-15
 
-few = settings(derandomize=True, deadline=None, max_examples=25)
+few = settings(derandomize=True, deadline=None, max_examples=20)
 
 
 def triples(limit: float) -> st.SearchStrategy[Triple]:

@@ -19,7 +19,7 @@ from screwsynth.models import (
 
 Array = NDArray[np.float64]
 
-many = settings(derandomize=True, deadline=None, max_examples=150)
+many = settings(derandomize=True, deadline=None, max_examples=80)
 
 _vector, _angle = ca.SX.sym("vector", 3), ca.SX.sym("angle")
 _FROM_QUATERNION = ca.Function("q", [_vector], [matrix_from_quaternion_vector(_vector)])

@@ -16,12 +16,13 @@ from screwsynth.models import (
     moved_screw,
     reciprocal_product,
     screw_from_axis,
+    unit_vector,
 )
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-many = settings(derandomize=True, deadline=None, max_examples=100)
+many = settings(derandomize=True, deadline=None, max_examples=50)
 
 
 def triples(limit: float) -> st.SearchStrategy[Triple]:
@@ -285,6 +286,15 @@ def test_nothing_comes_back_from_no_screw() -> None:
             axis_from_screw([1, 0, 0, 0, bad, 0])
     with pytest.raises(ValueError, match="shape"):
         axis_from_screw([1, 0, 0])
+
+
+@many
+@given(directions, st.integers(-300, 300))
+def test_a_direction_is_found_from_a_vector_of_any_length(n: Array, exponent: int) -> None:
+    # Squares of such components would overflow or vanish.
+    vector = n / np.linalg.norm(n) * 10.0**exponent
+    np.testing.assert_allclose(unit_vector(vector), unit(n), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(screw_from_axis(vector, (0, 0, 0), math.inf)[3:], unit(n), rtol=0, atol=1e-15)
 
 
 def test_no_line_through_one_point() -> None:

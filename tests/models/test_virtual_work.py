@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Joints = Mapping[str, tuple[Array, Array]]
 
 KINDS = ("aligned", "octahedral", "hexapod")
-ROBOTS = 75  # of each kind, each with one twist of finite pitch, one of zero pitch and one pure translation
+ROBOTS = 70  # of each kind, each with one twist of finite pitch, one of zero pitch and one pure translation
 
 MODELS: dict[str, Model] = {
     "aligned": stewart_gough(layout="aligned"),

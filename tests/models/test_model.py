@@ -1,0 +1,432 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+from numpy.typing import NDArray
+
+from screwsynth.models import (
+    Body,
+    Closure,
+    Dimension,
+    Link,
+    Model,
+    ModelError,
+    Parameter,
+    Point,
+    PoseSymbols,
+    Quantity,
+    Scene,
+    Unknown,
+    Wrench,
+    WrenchKind,
+    component_names,
+    couple_about,
+    force_along,
+    hexapod,
+    stewart_gough,
+)
+from screwsynth.nlp import Case, Nlp, RobotState, Rotation, Task, evaluate, formulate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A sound little robot in pieces: one leg from a movable base joint, of unknown length, and one couple."""
+
+    pose: PoseSymbols
+    base: Parameter
+    length: Unknown
+    closure: Closure
+    leg: Wrench
+    couple: Wrench
+    measure: Quantity
+    scene: Scene
+
+    def model(self, **changed: object) -> Model:
+        sound: dict[str, object] = {
+            "name": "toy",
+            "description": "a toy",
+            "parameters": (self.base,),
+            "pose": self.pose,
+            "home": (0.0, 0.0, 1.0),
+            "wrenches": (self.leg, self.couple),
+            "quantities": (self.measure,),
+            "scene": self.scene,
+            "unknowns": (self.length,),
+            "closure": (self.closure,),
+        }
+        return Model(**(sound | changed))  # type: ignore[arg-type]
+
+
+def parts() -> Parts:
+    pose = PoseSymbols()
+    b, t = SX.sym("b", 3), SX.sym("t")
+    span = pose.position + pose.rotation @ ca.DM([1.0, 0.0, 0.0]) - b
+    return Parts(
+        pose=pose,
+        base=Parameter("base", b, Dimension.LENGTH, "base joint", (1.0, 0.0, 0.0)),
+        length=Unknown("t", t, Dimension.LENGTH, "length of the leg", 0.1, 10.0),
+        closure=Closure("loop", t**2 - ca.sumsqr(span)),
+        leg=replace(force_along("leg", b, span), square=t**2),
+        couple=couple_about("guide", pose.rotation[:, 2]),
+        measure=Quantity("reach", ("leg",), t, Dimension.LENGTH, "length of the leg"),
+        scene=Scene(
+            (Point("B", b, Body.BASE), Point("A", b + span, Body.PLATFORM)),
+            (Link("B", "A", Body.LIMB, "leg"), Link("A", "B", Body.BASE)),
+        ),
+    )
+
+
+def test_a_sound_model_is_accepted_and_lists_its_limbs_once() -> None:
+    toy = parts()
+    model = toy.model(wrenches=(toy.leg, toy.couple, toy.leg))
+    assert model.limbs == ("leg", "guide")
+    assert model.has_couples
+    assert not toy.model(wrenches=(toy.leg,)).has_couples
+    assert toy.base.components == ("base_x", "base_y", "base_z")
+
+
+def test_options_are_a_copy_that_cannot_be_written_to() -> None:
+    options = {"layout": "aligned"}
+    model = parts().model(options=options)
+    options["layout"] = "other"
+    assert model.options == {"layout": "aligned"}
+    with pytest.raises(TypeError):
+        model.options["layout"] = "other"  # type: ignore[index]
+
+
+@pytest.mark.parametrize("where", ["wrench", "square", "closure", "quantity", "scene"])
+def test_a_symbol_that_is_not_declared_is_refused_wherever_it_is_used(where: str) -> None:
+    toy, stray = parts(), SX.sym("stray")
+    changed = {
+        "wrench": {"wrenches": (replace(toy.leg, moment=toy.leg.moment + stray), toy.couple)},
+        "square": {"wrenches": (replace(toy.leg, square=toy.leg.square + stray), toy.couple)},
+        "closure": {"closure": (Closure("loop", toy.closure.expression + stray),)},
+        "quantity": {"quantities": (replace(toy.measure, values=toy.measure.values + stray),)},
+        "scene": {"scene": Scene((Point("B", ca.vertcat(stray, 0, 0), Body.BASE),), ())},
+    }[where]
+    with pytest.raises(ModelError, match=r"model 'toy': symbols are used but not declared: stray$"):
+        toy.model(**changed)
+
+
+def test_a_declared_symbol_is_known_by_itself_and_not_by_its_name() -> None:
+    # The same letters, another symbol: what a robot function that builds its parameters twice would do.
+    toy = parts()
+    with pytest.raises(ModelError, match="used but not declared: b_0, b_1, b_2"):
+        toy.model(parameters=(replace(toy.base, symbol=SX.sym("b", 3)),))
+
+
+def test_pose_symbols_of_another_robot_are_refused() -> None:
+    with pytest.raises(ModelError, match=r"used but not declared: .*p_0"):
+        parts().model(pose=PoseSymbols())
+
+
+def test_names_that_appear_twice_are_refused() -> None:
+    toy = parts()
+    other = SX.sym("other")
+    scalar = Parameter("base", other, Dimension.LENGTH, "", (1.0,))
+    twins: list[tuple[dict[str, object], str]] = [
+        ({"parameters": (toy.base, replace(toy.base, symbol=SX.sym("c", 3)))}, "base_x, base_y, base_z"),
+        # A scalar may have the name of one component of a vector.
+        ({"parameters": (toy.base, replace(scalar, name="base_y"))}, "base_y"),
+        ({"parameters": (toy.base, replace(scalar, name="t"))}, "t"),
+        ({"parameters": (toy.base, replace(scalar, name="loop"))}, "loop"),
+        ({"parameters": (toy.base, replace(scalar, name="reach"))}, "reach"),
+        ({"unknowns": (toy.length, replace(toy.length, symbol=other))}, "t"),
+        ({"closure": (toy.closure, toy.closure)}, "loop"),
+        ({"closure": (Closure("t", toy.closure.expression),)}, "t"),
+        ({"quantities": (toy.measure, toy.measure)}, "reach"),
+        ({"quantities": (replace(toy.measure, name="loop"),)}, "loop"),
+    ]
+    for changed, names in twins:
+        with pytest.raises(ModelError, match=f"model 'toy': names appear twice: {names}$"):
+            toy.model(**changed)
+
+
+def test_a_symbol_that_stands_for_two_things_is_refused() -> None:
+    toy = parts()
+    for changed in (
+        {"parameters": (toy.base, replace(toy.base, name="again"))},
+        {"parameters": (toy.base, Parameter("again", toy.length.symbol, Dimension.LENGTH, "", (1.0,)))},
+        {"unknowns": (toy.length, replace(toy.length, name="again"))},
+        {"unknowns": (toy.length, replace(toy.length, name="again", symbol=toy.pose.position[1]))},
+        {"parameters": (toy.base, replace(toy.base, name="again", symbol=toy.pose.position))},
+    ):
+        with pytest.raises(ModelError, match="model 'toy': a symbol stands for two things"):
+            toy.model(**changed)
+
+
+def test_an_expression_where_a_symbol_must_stand_is_refused() -> None:
+    toy = parts()
+    fault = "is an expression where a symbol must stand"
+    for changed in (
+        {"parameters": (replace(toy.base, symbol=2 * toy.base.symbol),)},
+        {"parameters": (replace(toy.base, symbol=SX([1.0, 2.0, 3.0])),)},
+        {"unknowns": (replace(toy.length, symbol=toy.length.symbol + 1),)},
+        {"unknowns": (replace(toy.length, symbol=SX(1)),)},
+        {"pose": PoseSymbols(rotation=SX.eye(3), position=toy.pose.position)},
+        {"pose": PoseSymbols(rotation=toy.pose.rotation, position=-toy.pose.position)},
+    ):
+        with pytest.raises(ModelError, match=fault):
+            toy.model(**changed)
+
+
+def test_a_wrong_shape_is_refused_by_name() -> None:
+    toy = parts()
+    row, column = SX.zeros(1, 3), SX.zeros(3)
+    wrong: list[tuple[dict[str, object], str]] = [
+        ({"wrenches": (replace(toy.leg, force=row),)}, r"wrench 0 force should have shape \(3, 1\), got \(1, 3\)"),
+        ({"wrenches": (toy.leg, replace(toy.couple, moment=SX.zeros(2)))}, r"wrench 1 moment .* got \(2, 1\)"),
+        ({"wrenches": (replace(toy.leg, square=column),)}, r"wrench 0 square should have shape \(1, 1\)"),
+        ({"parameters": (replace(toy.base, typical=(1.0,)),)}, r"base should have shape \(1, 1\), got \(3, 1\)"),
+        ({"unknowns": (replace(toy.length, symbol=SX.sym("t", 2)),)}, r"t should have shape \(1, 1\), got \(2, 1\)"),
+        ({"closure": (Closure("loop", column),)}, r"loop should have shape \(1, 1\), got \(3, 1\)"),
+        ({"quantities": (replace(toy.measure, values=column),)}, r"reach should have shape \(1, 1\), got \(3, 1\)"),
+        ({"quantities": (replace(toy.measure, owners=("a", "b")),)}, r"reach should have shape \(2, 1\)"),
+        ({"scene": Scene((Point("B", row, Body.BASE),), ())}, r"point B should have shape \(3, 1\)"),
+        ({"pose": replace(toy.pose, rotation=SX.sym("R", 9))}, r"pose rotation should have shape \(3, 3\)"),
+        ({"pose": replace(toy.pose, position=SX.sym("p", 1, 3))}, r"pose position should have shape \(3, 1\)"),
+    ]
+    for changed, fault in wrong:
+        with pytest.raises(ModelError, match=f"model 'toy': {fault}"):
+            toy.model(**changed)
+
+
+def test_a_robot_without_wrenches_is_refused() -> None:
+    with pytest.raises(ModelError, match="model 'toy': it has no wrenches"):
+        parts().model(wrenches=())
+
+
+def test_a_drawing_of_what_does_not_exist_is_refused() -> None:
+    toy = parts()
+    for link, fault in (
+        (Link("C", "A", Body.BASE), "a link ends at 'C', which is no point"),
+        (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is no point"),
+        (Link("A", "B", Body.LIMB, "arm"), "a link belongs to limb 'arm', which has no wrench"),
+    ):
+        with pytest.raises(ModelError, match=fault):
+            toy.model(scene=Scene(toy.scene.points, (*toy.scene.links, link)))
+
+
+def test_component_names() -> None:
+    assert component_names("x1", 1) == ("x1",)
+    assert component_names("p", 3) == ("p_x", "p_y", "p_z")
+
+
+@pytest.mark.parametrize(
+    "model", [stewart_gough(), stewart_gough(layout="octahedral"), hexapod()], ids=lambda m: m.name
+)
+def test_shipped_robots_draw_every_leg_between_its_own_joints(model: Model) -> None:
+    # Scene points are checked in numbers: the leg from B to A is the line of its row in the Jacobian.
+    symbols = [*(item.symbol for item in model.parameters), model.pose.rotation, model.pose.position]
+    points = {point.name: point for point in model.scene.points}
+    legs = {link.limb: link for link in model.scene.links if link.limb is not None}
+    assert tuple(legs) == model.limbs
+    rng = np.random.default_rng(0)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for _ in range(5):
+        numbers = [
+            *(np.array(item.typical) * rng.uniform(0.5, 1, size=len(item.typical)) for item in model.parameters),
+            quarter,
+            rng.uniform(20, 30, size=3),
+        ]
+        for row in model.wrenches:
+            link = legs[row.limb]
+            ends = [points[link.start].position, points[link.end].position]
+            drawn = ca.Function("drawn", symbols, [*ends, row.force, row.moment, row.square])
+            b, a, force, moment, square = (part.full().ravel() for part in drawn(*numbers))
+            # Coordinates up to 30, moments up to 30 * 60.
+            np.testing.assert_allclose(a - b, force, rtol=0, atol=2e-14)
+            np.testing.assert_allclose(np.cross(b, force), moment, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(square, [force @ force], rtol=1e-14)
+            assert (points[link.start].body, points[link.end].body) == (Body.BASE, Body.PLATFORM)
+
+
+def turn(axis: Array, angle: float) -> Array:
+    x, y, z = axis / np.linalg.norm(axis)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Six legs in numbers, and the same robot as a model whose legs' lengths are unknowns."""
+
+    base: Array
+    platform: Array
+
+    def lengths(self, position: Array, R: Array) -> Array:
+        return np.asarray(np.linalg.norm(position + self.platform @ R.T - self.base, axis=1))
+
+    def closed(self) -> Model:
+        pose = PoseSymbols()
+        rows, unknowns, closure = [], [], []
+        for i, (b, a) in enumerate(zip(self.base, self.platform, strict=True)):
+            t = SX.sym(f"t{i + 1}")
+            span = pose.position + pose.rotation @ ca.DM(a) - ca.DM(b)
+            rows.append(Wrench(f"{i + 1}", WrenchKind.FORCE, span, ca.cross(ca.DM(b), span), t**2))
+            unknowns.append(Unknown(f"t{i + 1}", t, Dimension.LENGTH, "length of a leg", 1.0, 100.0))
+            closure.append(Closure(f"loop{i + 1}", t**2 - ca.sumsqr(span)))
+        return Model(
+            "closed", "a toy", (), pose, (0, 0, 30), tuple(rows), unknowns=tuple(unknowns), closure=tuple(closure)
+        )
+
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """Parameters of the shipped hexapod with these joints."""
+        rows = zip(self.base.tolist(), self.platform.tolist(), strict=True)
+        return {
+            name: tuple(joint)
+            for i, pair in enumerate(rows, start=1)
+            for name, joint in zip((f"base_{i}", f"platform_{i}"), pair, strict=True)
+        }
+
+
+def at(nlp: Nlp, named: Mapping[str, float]) -> Array:
+    return np.array([named[variable.name] for variable in nlp.program.variables])
+
+
+def test_a_robot_given_by_closure_equations_is_the_direct_one_where_they_hold() -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(10):
+        legs = Legs(rng.uniform([-15, -15, -3], [15, 15, 3], (6, 3)), rng.uniform([-8, -8, -3], [8, 8, 3], (6, 3)))
+        position, axis, angle = rng.uniform([-5, -5, 20], [5, 5, 40]), rng.normal(size=3), float(rng.uniform(-1, 1))
+        task, place = Task(rng.normal(size=6)), position.tolist()
+        direct = evaluate(formulate(Case(hexapod(), legs.values(), place, [task], Rotation(axis, angle))), np.zeros(0))
+        nlp = formulate(Case(legs.closed(), {}, place, [task], Rotation(axis, angle)))
+        assert [constraint.name for constraint in nlp.program.constraints] == [f"loop{i}" for i in range(1, 7)]
+        np.testing.assert_array_equal(nlp.g_lower, np.zeros(6))
+        np.testing.assert_array_equal(nlp.g_upper, np.zeros(6))
+        np.testing.assert_array_equal(nlp.lower, np.full(6, 1.0))
+        np.testing.assert_array_equal(nlp.upper, np.full(6, 100.0))
+
+        lengths = legs.lengths(position, turn(axis, angle))
+        x = at(nlp, {f"t{i}": length for i, length in enumerate(lengths, start=1)})
+        F, g = nlp.evaluate(x)
+        state = evaluate(nlp, x)
+        # Squares of 30 and more, to some rounding units.
+        np.testing.assert_allclose(g, np.zeros(6), rtol=0, atol=4e-15 * float(np.max(lengths)) ** 2)
+        assert pytest.approx(direct.F, rel=1e-14) == F
+        np.testing.assert_allclose(state.rates, direct.rates, rtol=0, atol=1e-14 * math.sqrt(direct.size))
+        np.testing.assert_allclose(state.jacobian, direct.jacobian, rtol=1e-13, atol=1e-13)
+
+        # Elsewhere it is another robot: the unknowns are really in the rows.
+        F, g = nlp.evaluate(2 * x)
+        assert pytest.approx(direct.F / 4, rel=1e-14) == F
+        np.testing.assert_allclose(g, 3 * lengths**2, rtol=1e-14)
+
+
+def three_limbs(axes: str, *, scale: float = 1.0) -> Model:
+    """Three limbs between triangles, each with a universal joint at the platform that keeps it from turning.
+
+    The joint's first axis is fixed in the platform, radial or tangential, its second square to it and to the limb.
+    ``scale`` lengthens the couples' directions, which must not matter.
+    """
+    pose = PoseSymbols()
+    rows = []
+    for i in range(3):
+        azimuth = 2 * math.pi * i / 3
+        radial = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        first = radial if axes == "radial" else np.array([-radial[1], radial[0], 0.0])
+        limb = pose.position + pose.rotation @ ca.DM(0.288675 * radial) - ca.DM(0.57735 * radial)
+        u1 = pose.rotation @ ca.DM(first)
+        u2 = ca.cross(limb, u1)
+        rows.append(force_along(str(i + 1), ca.DM(0.57735 * radial), limb))
+        rows.append(couple_about(str(i + 1), scale * ca.cross(u1, u2)))
+    return Model("three-limbs", "a toy", (), pose, (0.0, 0.0, 0.7), tuple(rows))
+
+
+def three_limb_rows(axes: str, position: Array, R: Array) -> tuple[Array, Array]:
+    """Unit forces and unit couples (3, 6) in plain numbers."""
+    forces, couples = [], []
+    for azimuth in np.deg2rad([0.0, 120.0, 240.0]):
+        radial = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        tangential = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+        end = position + R @ (0.288675 * radial)
+        along = (end - 0.57735 * radial) / np.linalg.norm(end - 0.57735 * radial)
+        u1 = R @ (radial if axes == "radial" else tangential)
+        u2 = np.cross(along, u1) / np.linalg.norm(np.cross(along, u1))
+        forces.append([*along, *np.cross(end, along)])
+        couples.append([0.0, 0.0, 0.0, *np.cross(u1, u2)])
+    return np.array(forces), np.array(couples)
+
+
+def state_of(model: Model, twist: Array, length: float, pose: tuple[Array, Array, float] | None = None) -> RobotState:
+    position, axis, angle = pose or (np.array([0.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]), 0.0)
+    case = Case(model, {}, position.tolist(), [Task(twist)], Rotation(axis, angle), characteristic_length=length)
+    return evaluate(formulate(case), np.zeros(0))
+
+
+@pytest.mark.parametrize("axes", ["radial", "tangential"])
+def test_couple_rows_are_unit_couples_times_the_characteristic_length(axes: str) -> None:
+    rng = np.random.default_rng(13)
+    model, longer = three_limbs(axes), three_limbs(axes, scale=-17.0)
+    assert model.has_couples
+    for _ in range(10):
+        position, axis, angle = (
+            rng.uniform([-0.3, -0.3, 0.6], [0.3, 0.3, 1]),
+            rng.normal(size=3),
+            rng.uniform(-0.5, 0.5),
+        )
+        twist, length = rng.normal(size=6), float(rng.uniform(0.1, 10))
+        forces, couples = three_limb_rows(axes, position, turn(axis, angle))
+        state = state_of(model, twist, length, (position, axis, float(angle)))
+        expected = np.empty((6, 6))
+        expected[0::2], expected[1::2] = forces, length * couples
+        np.testing.assert_allclose(state.jacobian, expected, rtol=0, atol=2e-15 * max(1.0, length))
+        # F = F of the forces + length^2 * (angular velocity along the couples)^2.
+        force_rates = forces[:, 3:] @ twist[:3] + forces[:, :3] @ twist[3:]
+        couple_rates = couples[:, 3:] @ twist[:3]
+        F = force_rates @ force_rates + length**2 * couple_rates @ couple_rates
+        assert pytest.approx(F, rel=1e-13) == state.F
+        np.testing.assert_allclose(state.rates[1::2], length * couple_rates, rtol=0, atol=1e-14 * length)
+        # A couple's direction counts, its length and sign do not.
+        other = state_of(longer, twist, length, (position, axis, float(angle)))
+        assert pytest.approx(state.F, rel=1e-14) == other.F
+        np.testing.assert_allclose(other.rates[1::2], -state.rates[1::2], rtol=0, atol=1e-14 * length)
+
+
+def test_the_characteristic_length_means_nothing_to_robots_without_couples() -> None:
+    rng = np.random.default_rng(14)
+    legs = Legs(rng.uniform(-15, 15, (6, 3)), rng.uniform(-8, 8, (6, 3)))
+    for length in (1e-3, 1.0, 1e3):
+        case = Case(hexapod(), legs.values(), (0, 0, 60), [Task((1, 2, 3, 4, 5, 6))], characteristic_length=length)
+        state = evaluate(formulate(case), np.zeros(0))
+        forces = state.jacobian[:, :3]
+        np.testing.assert_allclose(np.linalg.norm(forces, axis=1), np.ones(6), rtol=1e-15)
+        rates = state.jacobian[:, 3:] @ [1, 2, 3] + forces @ [4, 5, 6]
+        assert pytest.approx(float(rates @ rates), rel=1e-13) == state.F
+
+
+def test_translational_three_limb_robots_have_their_known_ranks_and_work_rates() -> None:
+    vertical = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    # Tangential axes: each couple is along its limb, whose cosine with the vertical is 0.7 over the limb's length.
+    square = 0.7**2 + (0.57735 - 0.288675) ** 2
+    tangential = state_of(three_limbs("tangential"), vertical, 1.0)
+    assert pytest.approx(3 * 0.7**2 / square, rel=1e-14) == tangential.F
+    assert (tangential.rank, tangential.is_singular) == (6, False)
+    # Radial axes: each couple is vertical; the limbs meet at twice the platform's height.
+    radial = state_of(three_limbs("radial"), vertical, 1.0)
+    assert pytest.approx(3.0, rel=1e-14) == radial.F
+    assert (radial.rank, radial.is_singular) == (4, True)
+    for azimuth in np.linspace(0, math.pi, 7):
+        axis = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        through_apex = np.concatenate([axis, np.cross([0.0, 0.0, 1.4], axis)])
+        state = state_of(three_limbs("radial"), through_apex, 1.0)
+        # Rates of rounding size, squared.
+        assert state.F < 1e-30
+        assert state.is_zero
+        # Both freedoms of the robot turn about the apex, and so leave it where it is.
+        assert state.free_twists.shape == (2, 6)
+        for twist in state.free_twists:
+            still = twist[3:] + np.cross(twist[:3], [0.0, 0.0, 1.4])
+            np.testing.assert_allclose(still, np.zeros(3), rtol=0, atol=1e-14 * float(np.linalg.norm(twist)))
+            assert abs(twist[2]) < 1e-14
+        below = np.concatenate([axis, np.cross([0.0, 0.0, 1.3], axis)])
+        assert not state_of(three_limbs("radial"), below, 1.0).is_zero

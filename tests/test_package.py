@@ -1,0 +1,97 @@
+"""The package as a whole: what it exports, what its wheel holds, and that its README is true."""
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import screwsynth.models
+import screwsynth.nlp
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("package", [screwsynth.models, screwsynth.nlp])
+def test_every_public_name_is_there_and_listed_in_order(package: object) -> None:
+    names = package.__all__  # type: ignore[attr-defined]
+    assert list(names) == sorted(names)
+    for name in names:
+        assert getattr(package, name) is not None
+
+
+def test_lazy_names_are_the_public_names() -> None:
+    assert sorted(screwsynth.nlp._HOME_OF) == list(screwsynth.nlp.__all__)
+
+
+def test_help_does_not_import_the_numerical_libraries() -> None:
+    code = "import sys, screwsynth.nlp.cli; sys.exit(any(m in sys.modules for m in ('casadi', 'numpy', 'rich.table')))"
+    assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_module_and_case_and_runs(tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", str(tmp_path), str(ROOT)], check=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    held = set(zipfile.ZipFile(wheel).namelist())
+    for folder in ("models", "nlp", "cases"):
+        for path in (ROOT / folder).iterdir():
+            if path.suffix in (".py", ".toml", ".typed"):
+                assert f"screwsynth/{folder}/{path.name}" in held
+    site = tmp_path / "site"
+    subprocess.run([*pip, "install", "--no-deps", "--target", str(site), str(wheel)], check=True)
+    code = f"import screwsynth.nlp.cli as cli; assert cli.__file__.startswith({str(site)!r}), cli.__file__; cli.main()"
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    command = [sys.executable, "-P", "-c", code, "solve", "paper-4.2-translation", "--starts", "2"]
+    ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert "largest F = 6" in ran.stdout
+
+
+def test_the_readme_python_runs() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 16
+    space: dict[str, object] = {}
+    exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - our own README
+    assert pytest.approx(407.2107, abs=5e-5) == space["solution"].F  # type: ignore[attr-defined]
+
+
+def test_the_readme_output_is_what_the_command_prints() -> None:
+    (shown,) = re.findall(r"```text\n\$ screwsynth solve paper-4.1-helical\n(.*?)```", README, flags=re.DOTALL)
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "solve", "paper-4.1-helical"]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    def lines(text: str) -> list[str]:
+        kept = [line.rstrip() for line in text.strip().splitlines()]
+        return [line for line in kept if not line.startswith("evidence")]  # rounding errors differ by machine
+
+    assert lines(shown) == lines(printed)
+
+
+def test_links_in_the_documentation_lead_somewhere() -> None:
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_the_robot_of_the_documentation_is_a_model() -> None:
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    space: dict[str, object] = {}
+    exec(compile(code, "robots.md", "exec"), space)  # noqa: S102 - our own page
+    model = space["tripod"](crossed=True)  # type: ignore[operator]
+    assert isinstance(model, screwsynth.models.Model)
+    assert model.limbs == ("1", "2", "3")
+
+
+def test_the_case_file_of_the_documentation_is_valid() -> None:
+    text = (ROOT / "docs" / "case-files.md").read_text(encoding="utf-8")
+    (written,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
+    assert case.tasks[0].name == "drive the screw"
