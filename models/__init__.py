@@ -39,6 +39,7 @@ from screwsynth.models.screws import (
     unit_vector,
 )
 from screwsynth.models.stewart_gough import stewart_gough
+from screwsynth.models.three_upu import three_upu
 
 __all__ = [
     "Body",
@@ -79,5 +80,6 @@ __all__ = [
     "robot_function",
     "screw_from_axis",
     "stewart_gough",
+    "three_upu",
     "unit_vector",
 ]

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from screwsynth.models.hexapod import hexapod
 from screwsynth.models.model import Model
 from screwsynth.models.stewart_gough import stewart_gough
+from screwsynth.models.three_upu import three_upu
 
 
 class UnknownModelError(KeyError):
@@ -23,7 +24,9 @@ RobotFunction = Callable[..., Model]
 
 GROUP = "screwsynth.models"
 
-SHIPPED: Mapping[str, RobotFunction] = MappingProxyType({"stewart-gough": stewart_gough, "hexapod": hexapod})
+SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
+    {"stewart-gough": stewart_gough, "hexapod": hexapod, "three-upu": three_upu}
+)
 
 
 def model_names() -> tuple[str, ...]:

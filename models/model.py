@@ -53,6 +53,7 @@ class Parameter:
         description: a few words for people.
         typical: a sensible value for each component, in some length unit and radians: what a starter case begins with.
         lower, upper: the values for which the robot exists, ends included.
+        is_direction: whether it is a unit vector: a fixed one is brought to unit length, a free one held there.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Parameter:
     typical: tuple[float, ...]
     lower: float = -float("inf")
     upper: float = float("inf")
+    is_direction: bool = False
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -290,7 +292,9 @@ def _check_shapes(model: Model) -> None:
             (f"wrench {index} moment", row.moment, (3, 1)),
             (f"wrench {index} square", row.square, (1, 1)),
         ]
-    expected += [(parameter.name, parameter.symbol, (len(parameter.typical), 1)) for parameter in model.parameters]
+    expected += [
+        (item.name, item.symbol, (3 if item.is_direction else len(item.typical), 1)) for item in model.parameters
+    ]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]

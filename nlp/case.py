@@ -210,7 +210,7 @@ def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
     for name in case.parameters:
         if name not in known:
             raise CaseError(f"robot.parameters.{name}", f"no such parameter; {nearest(name, known)}")
-    settled = {}
+    settled: dict[str, tuple[Value, ...]] = {}
     for name, parameter in known.items():
         key = f"robot.parameters.{name}"
         if name not in case.parameters:
@@ -219,6 +219,9 @@ def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
         values = tuple(given) if isinstance(given, Sequence) else (given,)
         if len(values) != len(parameter.typical):
             raise CaseError(key, f"must be {_expected(parameter)}")
+        if parameter.is_direction and not any(isinstance(value, Free) for value in values):
+            settled[name] = tuple(float(part) for part in _unit(values, key))
+            continue
         settled[name] = tuple(
             _checked(
                 value,
@@ -261,8 +264,8 @@ def _rotation(case: Case) -> Rotation:
     return Rotation(axis, angle)
 
 
-def _unit(values: ArrayLike, key: str) -> FloatArray:
-    vector = np.array(values, dtype=np.float64)
+def _unit(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
+    vector: FloatArray = np.array(values, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise CaseError(key, "must be three finite numbers")
     if not vector.any():

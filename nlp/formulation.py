@@ -12,6 +12,10 @@ origin. The variables are the free components of the parameters, of the position
 * axis free: the vector part ``q`` of the unit quaternion, with ``|q|^2`` between the squared sines of half of the
   smallest and half of the largest allowed angle, one smooth constraint named ``angle``.
 
+A parameter that is a direction has its three components as variables and its unit length as an equation: the sphere
+then has no poles. Its bounds of -1 and 1, which the length implies, are moved outwards so that they never hold a point
+that the length already holds.
+
 Source: A. Wolf and co-workers, *Screw theory tools for the synthesis of the geometry of a parallel robot for a given
 instantaneous task*; equation and section numbers throughout this package are that paper's.
 """
@@ -30,6 +34,7 @@ from screwsynth.models import (
     Dimension,
     FloatArray,
     Model,
+    Parameter,
     WrenchKind,
     component_names,
     frozen_array,
@@ -46,6 +51,11 @@ ROTATION_ANGLE = Reading(
     from_value=lambda value: 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0))),
     slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
 )
+
+#: How far a component of a free unit vector may go as a variable.
+_ROOM = 1.25
+#: How well an equation among fixed numbers must hold: they are written with a dozen digits.
+_ROUNDING = 1e-9
 
 
 @dataclass
@@ -96,10 +106,8 @@ def formulate(case: Case) -> Nlp:
     """
     sheet = _Sheet()
     model = case.model
-    parameters = ca.vertcat(
-        SX(0, 1),
-        *[sheet.place_all(item.name, item.dimension, case.components(item.name)) for item in model.parameters],
-    )
+    placed = [sheet.place_all(item.name, item.dimension, _components(case, item)) for item in model.parameters]
+    parameters = ca.vertcat(SX(0, 1), *placed)
     position = sheet.place_all("p", Dimension.LENGTH, tuple(case.position))
     rotation, constraints = _rotation(case, sheet)
     unknowns = ca.vertcat(
@@ -115,18 +123,26 @@ def formulate(case: Case) -> Nlp:
     ]
     robot, closure = _robot(model, _Symbols(parameters, unknowns, rotation, position), length, twists)
     constraints += [
+        _Bounded(Constraint(f"|{item.name}|", ca.sumsqr(symbol), Reading(Dimension.NUMBER)), 1.0, 1.0)
+        for item, symbol in zip(model.parameters, placed, strict=True)
+        if item.is_direction
+    ]
+    constraints += [
         _Bounded(Constraint(equation.name, closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0)
         for index, equation in enumerate(model.closure)
     ]
+    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
+    constraints = _varying(case, constraints, x, p, sheet.values)
     program = Program(
         variables=tuple(sheet.variables),
         arguments=tuple(sheet.arguments),
-        x=ca.vertcat(SX(0, 1), *sheet.x),
-        p=ca.vertcat(SX(0, 1), *sheet.p),
+        x=x,
+        p=p,
         objective=robot.F[0],
         constraints=tuple(item.constraint for item in constraints),
         robot=robot,
         model=model,
+        directions=_free_directions(model, sheet.variables),
     )
     nlp = Nlp(
         program=program,
@@ -145,6 +161,54 @@ def formulate(case: Case) -> Nlp:
 
 def _vector(values: Sequence[float]) -> FloatArray:
     return frozen_array(values, (len(values),))
+
+
+def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:
+    """Values of a parameter; those of a free direction with room beyond -1 and 1 and a start that is not zero."""
+    values = case.components(parameter.name)
+    if not (parameter.is_direction and any(isinstance(value, Free) for value in values)):
+        return values
+    roomy: list[Value] = []
+    undecided = all(isinstance(value, Free) and value.start is None for value in values)
+    for value, typical in zip(values, parameter.typical, strict=True):
+        if isinstance(value, Free):
+            start = min(max(typical, value.lower), value.upper) if undecided else value.start
+            lower = -_ROOM if value.lower == -1.0 else value.lower
+            upper = _ROOM if value.upper == 1.0 else value.upper
+            roomy.append(Free(lower, upper, start))
+        else:
+            roomy.append(value)
+    return tuple(roomy)
+
+
+def _free_directions(model: Model, variables: Sequence[Scalar]) -> tuple[tuple[int, int, int], ...]:
+    """Indices of the components of each direction that is wholly free."""
+    names = [variable.name for variable in variables]
+    found = []
+    for parameter in model.parameters:
+        if parameter.is_direction and all(component in names for component in parameter.components):
+            x, y, z = (names.index(component) for component in parameter.components)
+            found.append((x, y, z))
+    return tuple(found)
+
+
+def _varying(case: Case, constraints: Sequence[_Bounded], x: SX, p: SX, arguments: Sequence[float]) -> list[_Bounded]:
+    """The constraints that the variables can change; one that they cannot must hold.
+
+    Raises:
+        CaseError: one that they cannot change does not hold.
+    """
+    varying = []
+    for item in constraints:
+        expression = item.constraint.expression
+        if x.numel() and any(ca.which_depends(expression, x, 1, True)):
+            varying.append(item)
+            continue
+        value = float(ca.Function("constant", [x, p], [expression])(0, list(arguments)))
+        if not item.lower - _ROUNDING <= value <= item.upper + _ROUNDING:
+            fault = f"is {value:.6g} with these parameters, which are all fixed, and must be {item.lower:g}"
+            raise CaseError(f"robot.parameters: {item.constraint.name}", fault, source=case.source)
+    return varying
 
 
 def _rotation(case: Case, sheet: _Sheet) -> tuple[SX, list[_Bounded]]:

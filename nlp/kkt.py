@@ -154,17 +154,23 @@ def correct(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisation:
     """
     held = list(active)
     at = linearise(nlp, _pinned(nlp, np.clip(x, nlp.lower, nlp.upper), held))
+    best, least = at, np.inf
     for _ in range(_NEWTON_STEPS):
         mu, error = _residual(at, held)
+        if error <= least:
+            best, least = at, error
+        count = len(held)
         following = None if error <= _ROUNDING else _newton_step(nlp, at, held, mu, error)
         if following is not None:
             at = following
+            least = least if len(held) == count else np.inf
             continue
         wrong = np.where(nlp.sides.equal, 0.0, mu)
         if not error <= _SETTLED or wrong.min(initial=0.0) >= -_SETTLED:
             break
         held.remove(int(np.argmin(wrong)))
-    return at
+        least = np.inf
+    return best
 
 
 def _residual(at: Linearisation, held: Sequence[int]) -> tuple[FloatArray, float]:
@@ -209,7 +215,8 @@ def _newton_step(nlp: Nlp, at: Linearisation, held: list[int], mu: FloatArray, e
         met = [int(np.argmin(reach))] if part < 1.0 else []
         moved = np.clip(at.x + part * nlp.scale * step, nlp.lower, nlp.upper)
         after = linearise(nlp, _pinned(nlp, moved, [*held, *met]))
-        if met or _residual(after, held)[1] < error:
+        # Newton's error is about the square of its step: one that grows no further than that falls at the next step.
+        if met or _residual(after, held)[1] < max(error, 4 * float(step @ step)):
             held += met
             return after
     return None

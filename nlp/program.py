@@ -98,6 +98,7 @@ class Program:
         constraints: beside the variables' bounds.
         robot: the robot's expressions.
         model: the robot itself.
+        directions: indices in ``x`` of the three components of each unit vector that is wholly free.
     """
 
     variables: tuple[Scalar, ...]
@@ -108,6 +109,7 @@ class Program:
     constraints: tuple[Constraint, ...]
     robot: RobotExpressions
     model: Model
+    directions: tuple[tuple[int, int, int], ...] = ()
 
     def index(self, name: str) -> int:
         """Place of a free variable in ``x``."""

@@ -1,4 +1,4 @@
-"""Starting points: the user's first, then a Latin hypercube, uniform in the ball where a rotation's axis is free."""
+"""Starting points: the user's first, then a Latin hypercube; uniform on spheres and in the rotation's ball."""
 
 from __future__ import annotations
 
@@ -29,14 +29,20 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
         strata = generator.sample(range(count - 1), count - 1)
         column[:] = [(stratum + generator.random()) / (count - 1) for stratum in strata]
     points = nlp.lower + unit * (nlp.upper - nlp.lower)
+    for triple in nlp.program.directions:
+        points[:, triple] = _sphere(generator, count - 1)
     names = [variable.name for variable in nlp.program.variables]
     if "q_x" in names:
         at = names.index("q_x")
         ball = [constraint.name for constraint in nlp.program.constraints].index("angle")
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
-        directions = np.array([[generator.gauss() for _ in range(3)] for _ in range(count - 1)]).reshape(-1, 3)
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
         radii = np.cbrt(inner + unit[:, at] * (outer - inner))
-        points[:, at : at + 3] = radii[:, None] * directions
-    return np.vstack([nlp.start, points])
+        points[:, at : at + 3] = radii[:, None] * _sphere(generator, count - 1)
+    return np.vstack([nlp.start, np.clip(points, nlp.lower, nlp.upper)])
+
+
+def _sphere(generator: random.Random, count: int) -> FloatArray:
+    """Directions, uniform on the unit sphere, (count, 3)."""
+    vectors = np.array([[generator.gauss() for _ in range(3)] for _ in range(count)]).reshape(-1, 3)
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)

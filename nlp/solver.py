@@ -47,6 +47,7 @@ class StartStatus(enum.Enum):
     CONVERGED = "converged"
     ITERATION_LIMIT = "stopped at the iteration limit: raise solve.max_iterations"
     INFEASIBLE = "found no point within the limits"
+    SADDLE = "ended where F is stationary but neither largest nor smallest"
     UNDEFINED = "met a point where the robot's equations have no finite value"
     STALLED = "stopped before it was stationary"
 
@@ -188,8 +189,7 @@ def solve_nlp(nlp: Nlp, search: Search, *, jobs: int | None = None, progress: Pr
             best = start.F
         if progress is not None:
             progress(len(done), len(points), best)
-    converged = [start for start in done if start.status is StartStatus.CONVERGED]
-    optima = _distinct(nlp, converged)
+    done, optima = _sorted_out(nlp, done)
     x = optima[0].x if optima else min(done, key=lambda start: (start.violation, start.stationarity)).x
     evidence = examine(nlp, x)
     return Solution(
@@ -311,9 +311,14 @@ def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multiplier
     return [int(j) for j in np.flatnonzero(table.equal | near)]
 
 
-def _distinct(nlp: Nlp, converged: list[Start]) -> list[Optimum]:
-    """Optima among the converged starts, best first; a connected set of them counts as one."""
+def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]]:
+    """The starts, with those that ended at a saddle marked, and the distinct optima among the others, best first.
+
+    A connected set of optima counts as one.
+    """
     optima: list[Optimum] = []
+    saddles: list[Start] = []
+    converged = [start for start in done if start.status is StartStatus.CONVERGED]
     remaining = sorted(converged, key=lambda start: nlp.sign * start.F)
     while remaining:
         lead = remaining[0]
@@ -325,14 +330,17 @@ def _distinct(nlp: Nlp, converged: list[Start]) -> list[Optimum]:
                 groups.append([start])
             else:
                 near.append(start)
-        if len(groups) > 1 and examine(nlp, lead.x).kind is Kind.NOT_ISOLATED:
-            groups = [level]
+        kinds = [examine(nlp, group[0].x).kind for group in groups]
+        saddles += [start for kind, group in zip(kinds, groups, strict=True) if not kind.is_optimum for start in group]
+        groups = [group for kind, group in zip(kinds, groups, strict=True) if kind.is_optimum]
+        if Kind.NOT_ISOLATED in kinds:
+            groups = [[start for group in groups for start in group]]
         for group in groups:
             x = np.array([start.x for start in group])
             spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))
             optima.append(Optimum(group[0].F, len(group), group[0].x, spread))
         remaining = [start for start in remaining if start not in level]
-    return optima
+    return [replace(start, status=StartStatus.SADDLE) if start in saddles else start for start in done], optima
 
 
 def _distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:

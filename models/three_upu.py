@@ -1,0 +1,83 @@
+"""The 3-UPU robot: three extensible limbs between universal joints (Section 4.4).
+
+Letters, for limb ``i``: ``s_i`` the direction of the limb from its base joint to its platform joint; ``u1_i``, ``u2_i``
+unit vectors along the two axes of its upper universal joint, orthogonal to each other, in platform coordinates; ``u_i``
+their common normal. A limb drives the platform by a force along ``s_i`` and keeps it from turning about ``u_i``
+(equations 16 to 18), so the Jacobian has three rows of force and three of couple.
+
+The joints lie on two circles at azimuths 0, 120 and 240 degrees. Two known machines fix the first axis on the platform:
+radially (``snu``, the robot of Seoul National University that Park showed in 2001) and tangentially (``tsai``, Tsai's
+translational robot). In a real limb the second axis is also perpendicular to the limb, which both machines respect.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import casadi as ca
+from casadi import SX
+
+from screwsynth.models.legs import Leg, legged_platform
+from screwsynth.models.model import Closure, Dimension, Model, Parameter, PoseSymbols, couple_about
+
+_THIRD = 2 * math.pi / 3
+
+
+def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model:
+    """3-UPU robot with the axes of its upper universal joints (Section 4.4).
+
+    Args:
+        axes: ``free`` makes the axes parameters ``u1_i`` and ``u2_i``, orthogonal within a limb. ``limb`` makes the
+            first axes parameters and takes the second perpendicular to the first and to the limb. ``snu`` and ``tsai``
+            fix the first axes radially or tangentially, with the second as in ``limb``.
+    """
+    base_radius, platform_radius = SX.sym("base_radius"), SX.sym("platform_radius")
+    pose = PoseSymbols()
+    parameters = [
+        Parameter("base_radius", base_radius, Dimension.LENGTH, "radius of the base's joint circle", (50.0,), 0.0),
+        Parameter("platform_radius", platform_radius, Dimension.LENGTH, "radius of the platform's", (25.0,), 0.0),
+    ]
+    legs = [Leg(str(k + 1), base_radius * _radial(k), platform_radius * _radial(k)) for k in range(3)]
+    parts = legged_platform(legs, pose)
+    couples, closure = [], []
+    for k, row in enumerate(parts.wrenches):
+        first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
+        if first is None:
+            parameters.append(_axis(f"u1_{row.limb}", f"first axis of limb {row.limb}'s upper joint", _radial(k)))
+            first = parameters[-1].symbol
+        if axes == "free":
+            parameters.append(_axis(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k)))
+            second = parameters[-1].symbol
+            normal = pose.rotation @ ca.cross(first, second)
+            closure.append(Closure(f"u1_{row.limb} . u2_{row.limb}", ca.dot(first, second)))
+        else:
+            # With u2 along u1 x s, the normal of both is the part of s that is perpendicular to u1.
+            u1, s = pose.rotation @ first, row.force
+            normal = s * ca.sumsqr(u1) - u1 * ca.dot(u1, s)
+        couples.append(couple_about(row.limb, normal))
+    return Model(
+        name="three-upu",
+        description="3-UPU: three limbs, each with a force along it and a couple about its upper joint's normal",
+        options={"axes": axes},
+        parameters=tuple(parameters),
+        pose=pose,
+        home=(0.0, 0.0, 50.0),
+        wrenches=(*parts.wrenches, *couples),
+        quantities=parts.quantities,
+        scene=parts.scene,
+        closure=tuple(closure),
+    )
+
+
+def _radial(k: int) -> SX:
+    return SX([math.cos(k * _THIRD), math.sin(k * _THIRD), 0.0])
+
+
+def _tangential(k: int) -> SX:
+    return SX([-math.sin(k * _THIRD), math.cos(k * _THIRD), 0.0])
+
+
+def _axis(name: str, description: str, typical: SX) -> Parameter:
+    x, y, z = (float(typical[i]) for i in range(3))
+    return Parameter(name, SX.sym(name, 3), Dimension.NUMBER, description, (x, y, z), -1.0, 1.0, is_direction=True)
