@@ -50,8 +50,6 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
     ends = [p + R @ leg.platform for leg in legs]
     spans = [end - leg.base for end, leg in zip(ends, legs, strict=True)]
     lengths = [ca.norm_2(span) for span in spans]
-    base_cosines = [span[2] / length for span, length in zip(spans, lengths, strict=True)]
-    platform_cosines = [ca.dot(R[:, 2], span) / length for span, length in zip(spans, lengths, strict=True)]
     return LeggedPlatform(
         wrenches=tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True)),
         quantities=(
@@ -59,20 +57,25 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
             Quantity(
                 "base_joint_angle",
                 names,
-                ca.acos(ca.vertcat(*base_cosines)),
+                ca.vertcat(*[_angle_between(SX([0, 0, 1]), span) for span in spans]),
                 Dimension.ANGLE,
                 "angle between a leg and the base's normal",
             ),
             Quantity(
                 "platform_joint_angle",
                 names,
-                ca.acos(ca.vertcat(*platform_cosines)),
+                ca.vertcat(*[_angle_between(R[:, 2], span) for span in spans]),
                 Dimension.ANGLE,
                 "angle between a leg and the platform's normal",
             ),
         ),
         scene=_scene(legs, ends, pose),
     )
+
+
+def _angle_between(normal: SX, span: SX) -> SX:
+    """Angle of a leg against a plate's normal; unlike the arc cosine accurate, and defined, for a leg along it."""
+    return ca.atan2(ca.norm_2(ca.cross(normal, span)), ca.dot(normal, span))
 
 
 def _scene(legs: Sequence[Leg], ends: Sequence[SX], pose: PoseSymbols) -> Scene:

@@ -8,6 +8,7 @@ It knows no values, bounds, tasks or solvers; those come from a case.
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -16,6 +17,27 @@ import casadi as ca
 from casadi import SX
 
 _AXES = ("x", "y", "z")
+
+#: Names by which programs call the pose and other numbers of a case.
+RESERVED = frozenset(
+    [
+        "p_x",
+        "p_y",
+        "p_z",
+        "q_x",
+        "q_y",
+        "q_z",
+        "axis",
+        "axis_x",
+        "axis_y",
+        "axis_z",
+        "angle",
+        "twist",
+        "characteristic_length",
+        "level",
+        "ceiling",
+    ]
+)
 
 
 class ModelError(ValueError):
@@ -276,12 +298,22 @@ def _check_names(model: Model) -> None:
     names = [name for parameter in model.parameters for name in parameter.components]
     names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
     names += [quantity.name for quantity in model.quantities]
+    names += [f"point {point.name}" for point in model.scene.points]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise _fail(model, f"names appear twice: {', '.join(repeated)}")
+    reserved = sorted(RESERVED.intersection(names))
+    if reserved:
+        raise _fail(model, f"names are the program's own: {', '.join(reserved)}")
+    for unknown in model.unknowns:
+        if not -math.inf < unknown.lower < unknown.upper < math.inf:
+            raise _fail(model, f"unknown {unknown.name!r} needs finite bounds, lower below upper")
 
 
 def _check_shapes(model: Model) -> None:
+    for parameter in model.parameters:
+        if len(parameter.typical) not in (1, 3):
+            raise _fail(model, f"parameter {parameter.name!r} should have 1 or 3 components")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),

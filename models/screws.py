@@ -105,18 +105,20 @@ def axis_from_screw(screw: ArrayLike) -> Screw:
     coordinates = frozen_array(screw, (6,))
     if not np.isfinite(coordinates).all():
         raise ValueError("a screw must be six finite numbers")
-    direction, moment = coordinates[:3], coordinates[3:]
-    intensity, couple = float(np.linalg.norm(direction)), float(np.linalg.norm(moment))
-    if intensity == 0.0 and couple == 0.0:
+    largest = float(np.abs(coordinates).max())
+    if largest == 0.0:
         raise ValueError("a screw of six zeros has no axis")
+    # Scaled first, so that squares neither overflow nor vanish.
+    direction, moment = coordinates[:3] / largest, coordinates[3:] / largest
+    intensity, couple = float(np.linalg.norm(direction)), float(np.linalg.norm(moment))
     if intensity <= _INFINITE_PITCH * couple:
-        return Screw(frozen_array(moment / couple, (3,)), frozen_array(np.zeros(3), (3,)), math.inf, couple)
+        return Screw(frozen_array(moment / couple, (3,)), frozen_array(np.zeros(3), (3,)), math.inf, couple * largest)
     axis, moment = direction / intensity, moment / intensity
     return Screw(
         axis=frozen_array(axis, (3,)),
         point=frozen_array(np.cross(axis, moment), (3,)),
         pitch=float(axis @ moment),
-        intensity=intensity,
+        intensity=intensity * largest,
     )
 
 

@@ -19,7 +19,7 @@ import casadi as ca
 from casadi import SX
 
 from screwsynth.models.legs import Leg, legged_platform
-from screwsynth.models.model import Dimension, Model, Parameter, PoseSymbols
+from screwsynth.models.model import Dimension, Model, ModelError, Parameter, PoseSymbols
 
 _THIRD = 2 * math.pi / 3
 _SIXTH = math.pi / 3
@@ -32,6 +32,8 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
     Args:
         layout: ``aligned`` as in the paper, or ``octahedral``.
     """
+    if layout not in ("aligned", "octahedral"):
+        raise ModelError(f"model 'stewart-gough': layout must be 'aligned' or 'octahedral', got {layout!r}")
     x1, x2, x3, x4 = (SX.sym(name) for name in ("x1", "x2", "x3", "x4"))
     pose = PoseSymbols()
     legs = []

@@ -19,7 +19,7 @@ import casadi as ca
 from casadi import SX
 
 from screwsynth.models.legs import Leg, legged_platform
-from screwsynth.models.model import Closure, Dimension, Model, Parameter, PoseSymbols, couple_about
+from screwsynth.models.model import Closure, Dimension, Model, ModelError, Parameter, PoseSymbols, couple_about
 
 _THIRD = 2 * math.pi / 3
 
@@ -32,6 +32,8 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
             first axes parameters and takes the second perpendicular to the first and to the limb. ``snu`` and ``tsai``
             fix the first axes radially or tangentially, with the second as in ``limb``.
     """
+    if axes not in ("free", "limb", "snu", "tsai"):
+        raise ModelError(f"model 'three-upu': axes must be 'free', 'limb', 'snu' or 'tsai', got {axes!r}")
     base_radius, platform_radius = SX.sym("base_radius"), SX.sym("platform_radius")
     pose = PoseSymbols()
     parameters = [

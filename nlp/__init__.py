@@ -7,28 +7,33 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from screwsynth.nlp.case import Case, Expectation, Free, Published, Rotation, Search, Sense, Task
+    from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
+    from screwsynth.nlp.case import Case, Expectation, Free, Method, Published, Rotation, Search, Sense, Task
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
     from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
+    from screwsynth.nlp.ipopt import Start, StartStatus
     from screwsynth.nlp.optimality import ActiveSide, Evidence, Kind, examine
     from screwsynth.nlp.program import Nlp, Program
     from screwsynth.nlp.result import result_of
     from screwsynth.nlp.robots import build_model
-    from screwsynth.nlp.solver import Optimum, Solution, Start, StartStatus, Status, solve
+    from screwsynth.nlp.solver import Optimum, Solution, Status, solve
+    from screwsynth.nlp.tasks import Compromise, TaskOutcome, solve_tasks
     from screwsynth.nlp.units import Units
 
 __all__ = [
     "ActiveSide",
     "Case",
     "CaseError",
+    "Compromise",
     "EvaluationError",
     "Evidence",
     "Expectation",
     "Free",
     "InputError",
     "Kind",
+    "Method",
     "Nlp",
     "Optimum",
     "Program",
@@ -43,7 +48,10 @@ __all__ = [
     "StartStatus",
     "Status",
     "Task",
+    "TaskAnalysis",
+    "TaskOutcome",
     "Units",
+    "analyse_tasks",
     "build_model",
     "case_from_tables",
     "evaluate",
@@ -53,10 +61,11 @@ __all__ = [
     "result_of",
     "shipped_cases",
     "solve",
+    "solve_tasks",
 ]
 
 _HOMES = {
-    "case": ("Case", "Expectation", "Free", "Published", "Rotation", "Search", "Sense", "Task"),
+    "case": ("Case", "Expectation", "Free", "Method", "Published", "Rotation", "Search", "Sense", "Task"),
     "robots": ("build_model",),
     "casefile": ("case_from_tables", "load_case", "shipped_cases"),
     "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
@@ -65,7 +74,10 @@ _HOMES = {
     "optimality": ("ActiveSide", "Evidence", "Kind", "examine"),
     "program": ("Nlp", "Program"),
     "result": ("result_of",),
-    "solver": ("Optimum", "Solution", "Start", "StartStatus", "Status", "solve"),
+    "ipopt": ("Start", "StartStatus"),
+    "solver": ("Optimum", "Solution", "Status", "solve"),
+    "tasks": ("Compromise", "TaskOutcome", "solve_tasks"),
+    "analysis": ("TaskAnalysis", "analyse_tasks"),
     "units": ("Units",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -93,8 +93,8 @@ class Task:
         sense: Sense | str,
         *,
         axis: ArrayLike,
-        point: ArrayLike = (0.0, 0.0, 0.0),
-        pitch: float = 0.0,
+        pitch: float,
+        point: ArrayLike | None = None,
         name: str = "task",
         weight: float = 1.0,
     ) -> Task:
@@ -103,12 +103,30 @@ class Task:
         Args:
             sense: ``"max"`` or ``"min"``.
             axis: (3,) direction, any length but zero.
-            point: (3,) any point of the axis, length.
             pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
+            point: (3,) any point of the axis, length; needed unless the pitch is infinite.
             name: a few words.
             weight: positive.
+
+        Raises:
+            CaseError: the sense is another word, or the point is missing.
+            ValueError: the axis is zero, or a number is not finite.
         """
-        return cls(screw_from_axis(axis, point, pitch), Sense(sense), name, weight)
+        if sense not in ("max", "min", Sense.MAX, Sense.MIN):
+            raise CaseError("task.sense", "must be 'max' or 'min'", sense)
+        if point is None and pitch != math.inf:
+            raise CaseError("task.point", "is missing: any point on the axis")
+        return cls(
+            screw_from_axis(axis, (0.0, 0.0, 0.0) if point is None else point, pitch), Sense(sense), name, weight
+        )
+
+
+class Method(enum.Enum):
+    """How several tasks are brought together."""
+
+    AVERAGE = "average"
+    WEIGHTED_SUM = "weighted-sum"
+    WORST_CASE = "worst-case"
 
 
 @dataclass(frozen=True)
@@ -161,6 +179,7 @@ class Case:
         characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
             constraint couples.
         search: how the solver searches.
+        method: how several tasks are brought together; the average is equation 15.
         title, name: for people; the name is the file's.
         expect: what a regression holds the case to.
         published: what the literature prints.
@@ -179,6 +198,7 @@ class Case:
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
     search: Search = field(default_factory=Search)
+    method: Method = Method.AVERAGE
     title: str = ""
     name: str = "case"
     expect: Expectation = field(default_factory=Expectation)
@@ -256,10 +276,15 @@ def _rotation(case: Case) -> Rotation:
     else:
         limit, why = 2 * math.pi, "with the axis held"
     angle = _checked(given.angle, key, Dimension.ANGLE, case.units)
-    for end in (angle.lower, angle.upper) if isinstance(angle, Free) else (angle,):
+    ends = {f"{key}.min": angle.lower, f"{key}.max": angle.upper} if isinstance(angle, Free) else {key: angle}
+    for place, end in ends.items():
         if abs(end) > limit:
             allowed = case.units.text(limit, Dimension.ANGLE)
-            raise CaseError(key, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
+            raise CaseError(place, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
+    lopsided = isinstance(angle, Free) and angle.lower < 0 < angle.upper and not math.isclose(-angle.lower, angle.upper)
+    if given.axis is None and isinstance(angle, Free) and lopsided:
+        fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
+        raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
     axis = None if given.axis is None else _unit(given.axis, "pose.rotation.axis")
     return Rotation(axis, angle)
 
@@ -312,7 +337,9 @@ def _checked(
     upper = _number(value.upper, f"{key}.max", dimension, units, domain)
     if not lower < upper:
         raise CaseError(
-            f"{key}.min", f"must be below max = {units.text(upper, dimension)}", units.shown(lower, dimension)
+            f"{key}.min",
+            f"must be below max = {units.text(upper, dimension)}; a fixed value is a number alone",
+            units.shown(lower, dimension),
         )
     start = None if value.start is None else _number(value.start, f"{key}.start", dimension, units, (lower, upper))
     return Free(lower, upper, start)

@@ -14,7 +14,19 @@ from typing import Any
 import screwsynth.cases
 from screwsynth.models import Dimension, FloatArray, component_names, screw_from_axis
 from screwsynth.nlp import document
-from screwsynth.nlp.case import LARGEST, Case, Expectation, Free, Published, Rotation, Search, Sense, Task, Value
+from screwsynth.nlp.case import (
+    LARGEST,
+    Case,
+    Expectation,
+    Free,
+    Method,
+    Published,
+    Rotation,
+    Search,
+    Sense,
+    Task,
+    Value,
+)
 from screwsynth.nlp.errors import CaseError, InputError, nearest
 from screwsynth.nlp.robots import build_model
 from screwsynth.nlp.units import Units
@@ -38,7 +50,8 @@ def find_case(name: str) -> Path:
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     if path is None:
-        hint = nearest(name, shipped_cases())
+        beside = Path(f"{name}.toml")
+        hint = f"did you mean {beside}?" if name and beside.is_file() else nearest(name, shipped_cases())
         raise InputError(
             f"{name or 'an empty name'}: no such file, and no case of this name comes with screwsynth; {hint}"
         )
@@ -68,8 +81,10 @@ def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
     path = find_case(name)
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -109,6 +124,8 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
     search = written.solve
+    if written.combine is not None and len(written.task) == 1:
+        raise CaseError("combine", "means nothing for one task; take it out, or give another [[task]]")
     return Case(
         model=model,
         parameters={
@@ -121,6 +138,7 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         units=units,
         characteristic_length=written.robot.characteristic_length,
         search=Search(search.starts, search.seed, search.max_iterations),
+        method=Method.AVERAGE if written.combine is None else Method(written.combine.method),
         title=written.title,
         name=name,
         expect=Expectation(written.expect.F, written.expect.tolerance, written.expect.singular),
@@ -162,8 +180,6 @@ def _rotation(written: document.RotationTable | None, units: Units) -> Rotation:
 
 
 def _tasks(written: list[document.TaskTable]) -> list[Task]:
-    if len(written) > 1:
-        raise CaseError("task", "several tasks are not supported yet by this version; keep one")
     return [_task(task, index) for index, task in enumerate(written)]
 
 
@@ -204,10 +220,9 @@ def _set(tables: dict[str, Any], name: str, value: Any) -> None:  # noqa: ANN401
     pose = tables.setdefault("pose", {})
     places: dict[str, tuple[Any, int | str]] = {}
     for key, given in parameters.items():
+        places[key] = (parameters, key)
         if isinstance(given, list):
             places.update({part: (given, i) for i, part in enumerate(component_names(key, len(given)))})
-        else:
-            places[key] = (parameters, key)
     if isinstance(pose.get("position"), list):
         places.update({part: (pose["position"], i) for i, part in enumerate(component_names("p", 3))})
     if name in ("angle", "axis"):

@@ -26,7 +26,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from screwsynth.nlp.errors import CaseError, nearest
 
 #: Keys of the format that this version does not act on yet. They are refused, so that no limit is silently ignored.
-NOT_YET = ("limits", "combine", "tolerance")
+NOT_YET = ("limits", "tolerance")
 
 
 class Table(BaseModel):
@@ -141,6 +141,14 @@ class TaskTable(Table):
     )
 
 
+class CombineTable(Table):
+    """How several tasks are brought together."""
+
+    method: Literal["average", "weighted-sum", "worst-case"] = Field(
+        description="average of the tasks' optima (equation 15), best weighted sum, or best worst task"
+    )
+
+
 class SolveTable(Table):
     """How the solver searches."""
 
@@ -185,6 +193,7 @@ class Document(Table):
     robot: RobotTable
     pose: PoseTable
     task: Annotated[list[TaskTable], Field(min_length=1)]
+    combine: CombineTable | None = Field(default=None, description="several tasks only; average if left out")
     solve: SolveTable = SolveTable()
     expect: ExpectTable = ExpectTable()
     published: list[PublishedTable] = Field(default_factory=list)

@@ -22,11 +22,11 @@ def write_text(target: str, text: str) -> None:
         sys.stdout.write(text)
         return
     try:
-        path = Path(target).resolve()
+        path = Path(target)
         if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
         else:
-            _replace(path, text)
+            _replace(path.resolve(), text)
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
 

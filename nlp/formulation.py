@@ -5,16 +5,8 @@ The objective is the sum over the rows of the Jacobian of the squared reciprocal
     F = sum_i (L_i ^ chi)^2,        L_i ^ chi = m_i . omega + f_i . v            (equations 5 and 14)
 
 where ``L_i = (f_i, m_i)`` is the unit wrench that limb ``i`` applies to the platform, its moment taken about the world
-origin. The variables are the free components of the parameters, of the position ``p``, and of the rotation:
-
-* axis and angle fixed: none;
-* axis held, angle free: the angle;
-* axis free: the vector part ``q`` of the unit quaternion, with ``|q|^2`` between the squared sines of half of the
-  smallest and half of the largest allowed angle, one smooth constraint named ``angle``.
-
-A parameter that is a direction has its three components as variables and its unit length as an equation: the sphere
-then has no poles. Its bounds of -1 and 1, which the length implies, are moved outwards so that they never hold a point
-that the length already holds.
+origin. Several tasks become one program in two ways: the weighted sum of their objectives, and the worst of them as the
+bound of an epigraph.
 
 Source: A. Wolf and co-workers, *Screw theory tools for the synthesis of the geometry of a parallel robot for a given
 instantaneous task*; equation and section numbers throughout this package are that paper's.
@@ -24,136 +16,140 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import casadi as ca
-import numpy as np
 from casadi import SX
 
-from screwsynth.models import (
-    Dimension,
-    FloatArray,
-    Model,
-    Parameter,
-    WrenchKind,
-    component_names,
-    frozen_array,
-    matrix_from_axis_angle,
-    matrix_from_quaternion_vector,
-)
-from screwsynth.nlp.case import Case, Free, Value
+from screwsynth.models import Dimension, FloatArray, frozen_array
+from screwsynth.nlp.case import Case, Free, Sense
 from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, RobotExpressions, Scalar
-
-#: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
-ROTATION_ANGLE = Reading(
-    Dimension.ANGLE,
-    from_value=lambda value: 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0))),
-    slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
-)
-
-#: How far a component of a free unit vector may go as a variable.
-_ROOM = 1.25
-#: How well an equation among fixed numbers must hold: they are written with a dozen digits.
-_ROUNDING = 1e-9
+from screwsynth.nlp.layout import Bounded, Layout, free_directions, lay_out
+from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, Scalar
 
 
-@dataclass
-class _Sheet:
-    """What is being laid out: free variables and fixed arguments in the order they are met."""
+def formulate(case: Case, task: int = 0) -> Nlp:
+    """The nonlinear program of one of a case's tasks.
 
-    variables: list[Scalar] = field(default_factory=list)
-    x: list[SX] = field(default_factory=list)
-    bounds: list[Free] = field(default_factory=list)
-    arguments: list[Scalar] = field(default_factory=list)
-    p: list[SX] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
+    Args:
+        case: the case.
+        task: index of the task.
 
-    def place(self, name: str, dimension: Dimension, value: Value) -> SX:
-        """The symbol of a number, which becomes a variable or an argument as the case has it."""
-        symbol = SX.sym(name)
-        scalar = Scalar(name, dimension)
-        if isinstance(value, Free):
-            self.variables.append(scalar)
-            self.x.append(symbol)
-            self.bounds.append(value)
+    Raises:
+        CaseError: a limb has zero length whatever the solver chooses, or fixed numbers contradict each other.
+    """
+    layout = lay_out(case, [case.tasks[task]])
+    return assemble(layout, layout.robot.F[0], case.tasks[task].sense)
+
+
+def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
+    """The weighted sum of the tasks' objectives as one program.
+
+    With one sense for all tasks it is that sense's optimum of ``sum w_j F_j``. With both, it is the maximum of the same
+    sum in which the tasks to be minimised count negatively.
+
+    Args:
+        case: a case with several tasks.
+        weights: one for each task.
+    """
+    layout = lay_out(case, case.tasks)
+    senses = {task.sense for task in case.tasks}
+    sense = senses.pop() if len(senses) == 1 else Sense.MAX
+    signs = [1.0 if task.sense is sense else -1.0 for task in case.tasks]
+    places = [
+        layout.sheet.place(f"weight{j}", Dimension.NUMBER, s * w)
+        for j, (s, w) in enumerate(zip(signs, weights, strict=True))
+    ]
+    objective = sum((place * layout.robot.F[j] for j, place in enumerate(places)), SX(0))
+    return assemble(layout, objective, sense)
+
+
+def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float], ceiling: float) -> Nlp:
+    """The worst task as one program, by a level that every task keeps: a smooth epigraph.
+
+    * all to be maximised: the largest ``level`` with ``F_j >= w_j level`` for every task;
+    * all to be minimised: the smallest ``level`` with ``w_j F_j <= level``;
+    * both senses: the smallest ``level`` with ``w_j loss_j <= level``, where ``loss_j`` is how far ``F_j`` is from the
+      best that the task can have by itself. (The worst of values of opposite senses would say nothing.)
+
+    Args:
+        case: a case with several tasks.
+        weights: one for each task.
+        best: each task's own optimum, for the losses.
+        ceiling: a level that no answer exceeds, positive.
+    """
+    layout = lay_out(case, case.tasks)
+    sheet, senses = layout.sheet, {task.sense for task in case.tasks}
+    level = sheet.place("level", Dimension.NUMBER, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling))
+    size = sheet.place("ceiling", Dimension.NUMBER, ceiling)
+    constraints = []
+    for j, task in enumerate(case.tasks):
+        F = layout.robot.F[j]
+        weight = sheet.place(f"weight{j}", Dimension.NUMBER, weights[j])
+        own = sheet.place(f"best{j}", Dimension.NUMBER, best[j])
+        if senses == {Sense.MAX}:
+            room = F - weight * level
+        elif senses == {Sense.MIN}:
+            room = level - weight * F
         else:
-            self.arguments.append(scalar)
-            self.p.append(symbol)
-            self.values.append(value)
-        return symbol
-
-    def place_all(self, name: str, dimension: Dimension, values: Sequence[Value]) -> SX:
-        """The (n, 1) vector of several numbers."""
-        names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
-        return ca.vertcat(*[self.place(part, dimension, value) for part, value in zip(names, values, strict=True)])
+            room = level - weight * (own - F if task.sense is Sense.MAX else F - own)
+        # In parts of the ceiling, so that the rows are of order 1 like the scaled variables.
+        constraints.append(Bounded(Constraint(task.name, room / size, Reading(Dimension.NUMBER)), 0.0, math.inf))
+    return assemble(layout, level, Sense.MAX if senses == {Sense.MAX} else Sense.MIN, constraints)
 
 
-@dataclass(frozen=True, eq=False)
-class _Bounded:
-    """A constraint with its bounds."""
+def near(nlp: Nlp, target: FloatArray, strength: float) -> Nlp:
+    """A program whose objective is drawn a little towards a point.
 
-    constraint: Constraint
-    lower: float
-    upper: float
+    Where the optima of the original form a set, the optimum of this one tends to the set's nearest point as the
+    strength tends to zero (distances in half ranges).
+
+    Args:
+        nlp: the original.
+        target: (n,) the point.
+        strength: what a distance of 1 costs, in parts of the objective's scale.
+    """
+    program = nlp.program
+    t, scale, cost = SX.sym("target", nlp.n), SX.sym("scale", nlp.n), SX.sym("cost")
+    drawn = replace(
+        program,
+        objective=program.objective + cost * ca.sumsqr((program.x - t) / scale),
+        p=ca.vertcat(program.p, t, scale, cost),
+        arguments=(*program.arguments, *(Scalar(f"near{i}", Dimension.NUMBER) for i in range(2 * nlp.n + 1))),
+    )
+    values = [*nlp.arguments, *target, *nlp.scale, nlp.sign * strength * nlp.objective_scale]
+    return replace(nlp, program=drawn, arguments=_vector(values))
 
 
-def formulate(case: Case) -> Nlp:
-    """The nonlinear program of a case with one task.
+def assemble(layout: Layout, objective: SX, sense: Sense, constraints: Sequence[Bounded] = ()) -> Nlp:
+    """The program of a layout with its objective, and constraints beside the layout's own.
 
     Raises:
         CaseError: a limb has zero length whatever the solver chooses.
     """
-    sheet = _Sheet()
-    model = case.model
-    placed = [sheet.place_all(item.name, item.dimension, _components(case, item)) for item in model.parameters]
-    parameters = ca.vertcat(SX(0, 1), *placed)
-    position = sheet.place_all("p", Dimension.LENGTH, tuple(case.position))
-    rotation, constraints = _rotation(case, sheet)
-    unknowns = ca.vertcat(
-        SX(0, 1),
-        *[sheet.place(item.name, item.dimension, Free(item.lower, item.upper)) for item in model.unknowns],
-    )
-    length = sheet.place("characteristic_length", Dimension.LENGTH, case.characteristic_length)
-    twists = [
-        sheet.place_all(
-            f"twist{index}" if index else "twist", Dimension.NUMBER, [float(c) for c in np.asarray(t.twist)]
-        )
-        for index, t in enumerate(case.tasks)
-    ]
-    robot, closure = _robot(model, _Symbols(parameters, unknowns, rotation, position), length, twists)
-    constraints += [
-        _Bounded(Constraint(f"|{item.name}|", ca.sumsqr(symbol), Reading(Dimension.NUMBER)), 1.0, 1.0)
-        for item, symbol in zip(model.parameters, placed, strict=True)
-        if item.is_direction
-    ]
-    constraints += [
-        _Bounded(Constraint(equation.name, closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0)
-        for index, equation in enumerate(model.closure)
-    ]
-    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
-    constraints = _varying(case, constraints, x, p, sheet.values)
+    case, sheet = layout.case, layout.sheet
+    bounded = (*layout.constraints, *constraints)
     program = Program(
         variables=tuple(sheet.variables),
         arguments=tuple(sheet.arguments),
-        x=x,
-        p=p,
-        objective=robot.F[0],
-        constraints=tuple(item.constraint for item in constraints),
-        robot=robot,
-        model=model,
-        directions=_free_directions(model, sheet.variables),
+        x=ca.vertcat(SX(0, 1), *sheet.x),
+        p=ca.vertcat(SX(0, 1), *sheet.p),
+        objective=objective,
+        constraints=tuple(item.constraint for item in bounded),
+        robot=layout.robot,
+        model=case.model,
+        directions=free_directions(case.model, sheet.variables),
     )
     nlp = Nlp(
         program=program,
         case=case,
-        sense=case.tasks[0].sense,
+        sense=sense,
         arguments=_vector(sheet.values),
         lower=_vector([bound.lower for bound in sheet.bounds]),
         upper=_vector([bound.upper for bound in sheet.bounds]),
         start=_vector([bound.first for bound in sheet.bounds]),
-        g_lower=_vector([item.lower for item in constraints]),
-        g_upper=_vector([item.upper for item in constraints]),
+        g_lower=_vector([item.lower for item in bounded]),
+        g_upper=_vector([item.upper for item in bounded]),
     )
     _check_limbs(nlp)
     return nlp
@@ -161,142 +157,6 @@ def formulate(case: Case) -> Nlp:
 
 def _vector(values: Sequence[float]) -> FloatArray:
     return frozen_array(values, (len(values),))
-
-
-def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:
-    """Values of a parameter; those of a free direction with room beyond -1 and 1 and a start that is not zero."""
-    values = case.components(parameter.name)
-    if not (parameter.is_direction and any(isinstance(value, Free) for value in values)):
-        return values
-    roomy: list[Value] = []
-    undecided = all(isinstance(value, Free) and value.start is None for value in values)
-    for value, typical in zip(values, parameter.typical, strict=True):
-        if isinstance(value, Free):
-            start = min(max(typical, value.lower), value.upper) if undecided else value.start
-            lower = -_ROOM if value.lower == -1.0 else value.lower
-            upper = _ROOM if value.upper == 1.0 else value.upper
-            roomy.append(Free(lower, upper, start))
-        else:
-            roomy.append(value)
-    return tuple(roomy)
-
-
-def _free_directions(model: Model, variables: Sequence[Scalar]) -> tuple[tuple[int, int, int], ...]:
-    """Indices of the components of each direction that is wholly free."""
-    names = [variable.name for variable in variables]
-    found = []
-    for parameter in model.parameters:
-        if parameter.is_direction and all(component in names for component in parameter.components):
-            x, y, z = (names.index(component) for component in parameter.components)
-            found.append((x, y, z))
-    return tuple(found)
-
-
-def _varying(case: Case, constraints: Sequence[_Bounded], x: SX, p: SX, arguments: Sequence[float]) -> list[_Bounded]:
-    """The constraints that the variables can change; one that they cannot must hold.
-
-    Raises:
-        CaseError: one that they cannot change does not hold.
-    """
-    varying = []
-    for item in constraints:
-        expression = item.constraint.expression
-        if x.numel() and any(ca.which_depends(expression, x, 1, True)):
-            varying.append(item)
-            continue
-        value = float(ca.Function("constant", [x, p], [expression])(0, list(arguments)))
-        if not item.lower - _ROUNDING <= value <= item.upper + _ROUNDING:
-            fault = f"is {value:.6g} with these parameters, which are all fixed, and must be {item.lower:g}"
-            raise CaseError(f"robot.parameters: {item.constraint.name}", fault, source=case.source)
-    return varying
-
-
-def _rotation(case: Case, sheet: _Sheet) -> tuple[SX, list[_Bounded]]:
-    axis, angle = case.axis, case.rotation.angle
-    if axis is not None:
-        n = sheet.place_all("axis", Dimension.NUMBER, [float(c) for c in axis])
-        return matrix_from_axis_angle(n, sheet.place("angle", Dimension.ANGLE, angle)), []
-    smallest, largest = _angle_range(angle)
-    radius = math.sin(largest / 2)
-    if radius == 0:
-        q = sheet.place_all("q", Dimension.NUMBER, (0.0, 0.0, 0.0))
-        return matrix_from_quaternion_vector(q), []
-    inner = math.sin(smallest / 2)
-    start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
-    along_z = Free(-radius, radius, math.sin(start / 2))
-    q = sheet.place_all("q", Dimension.NUMBER, (*[Free(-radius, radius)] * 2, along_z))
-    ball = Constraint("angle", ca.sumsqr(q), ROTATION_ANGLE)
-    return matrix_from_quaternion_vector(q), [_Bounded(ball, inner**2 if inner else -math.inf, radius**2)]
-
-
-def _angle_range(angle: Value) -> tuple[float, float]:
-    """Smallest and largest size of a rotation whose axis is free, where an angle's sign means nothing."""
-    if not isinstance(angle, Free):
-        return abs(angle), abs(angle)
-    sizes = sorted((abs(angle.lower), abs(angle.upper)))
-    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
-
-
-@dataclass(frozen=True, eq=False)
-class _Symbols:
-    """What the program puts in place of a model's symbols."""
-
-    parameters: SX
-    unknowns: SX
-    rotation: SX
-    position: SX
-
-
-def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tuple[RobotExpressions, SX]:
-    """The model's expressions with its symbols replaced by the program's, and the closure equations likewise."""
-    force = ca.horzcat(*[row.force for row in model.wrenches])
-    moment = ca.horzcat(*[row.moment for row in model.wrenches])
-    square = ca.vertcat(*[row.square for row in model.wrenches])
-    closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
-    symbols = [
-        ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
-        ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
-        model.pose.rotation,
-        model.pose.position,
-    ]
-    quantities = [quantity.values for quantity in model.quantities]
-    inlined = ca.Function("model", symbols, [force, moment, square, closure, *quantities])
-    force, moment, square, closure, *quantities = inlined.call(
-        [put.parameters, put.unknowns, put.rotation, put.position]
-    )
-    couple_scale = [length if row.kind is WrenchKind.COUPLE else SX(1) for row in model.wrenches]
-    rows, rates, objectives, magnitudes = [], [], [], []
-    for i, scale in enumerate(couple_scale):
-        rows.append(scale * ca.vertcat(force[:, i], moment[:, i]).T / ca.sqrt(square[i]))
-    for twist in twists:
-        omega, v = twist[:3], twist[3:]
-        # (m . omega + f . v)^2 / square, rather than the square of a normalised product: smoother, tighter enclosures.
-        products = [s * (ca.dot(moment[:, i], omega) + ca.dot(force[:, i], v)) for i, s in enumerate(couple_scale)]
-        rates.append(ca.vertcat(*[product / ca.sqrt(square[i]) for i, product in enumerate(products)]))
-        objectives.append(sum((product**2 / square[i] for i, product in enumerate(products)), SX(0)))
-        magnitudes.append(
-            sum(
-                (
-                    scale**2
-                    * (ca.norm_2(moment[:, i]) * ca.norm_2(omega) + ca.norm_2(force[:, i]) * ca.norm_2(v)) ** 2
-                    / square[i]
-                    for i, scale in enumerate(couple_scale)
-                ),
-                SX(0),
-            )
-        )
-    robot = RobotExpressions(
-        parameters=put.parameters,
-        rotation=put.rotation,
-        position=put.position,
-        jacobian=ca.vertcat(*rows),
-        rates=ca.horzcat(*rates),
-        F=ca.vertcat(*objectives),
-        squares=square,
-        magnitude=ca.vertcat(*magnitudes),
-        quantities=tuple(quantities),
-    )
-    return robot, closure
 
 
 def _check_limbs(nlp: Nlp) -> None:

@@ -24,6 +24,11 @@ from screwsynth.nlp.program import Nlp, Side
 #: A side closer than this, in scaled variables, is active: well above the rounding error of a corrected point, well
 #: below any clearance that means something in a design.
 ACTIVE = 1e-7
+#: Largest scaled derivative of the Lagrangian that counts as none: F can then still improve by about this part of its
+#: size, at most, over the whole range of a variable along which it is straight.
+STATIONARY = 1e-7
+#: Largest distance outside a limit, in half ranges, of a point that is feasible.
+FEASIBLE = 1e-9
 #: Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a change of the
 #: active set, or an optimum where F is flatter than a parabola, takes more.
 _NEWTON_STEPS = 40

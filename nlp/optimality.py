@@ -22,15 +22,10 @@ import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
 from screwsynth.nlp.case import Sense
-from screwsynth.nlp.kkt import Linearisation, correct, lagrangian_hessian, linearise, multipliers
+from screwsynth.nlp.kkt import FEASIBLE, STATIONARY, Linearisation, correct, lagrangian_hessian, linearise, multipliers
 from screwsynth.nlp.linear import plain_basis
 from screwsynth.nlp.program import Nlp
 
-#: Largest scaled derivative of the Lagrangian that counts as none: F can then still improve by about this part of its
-#: size, at most, over the whole range of a variable along which it is straight.
-STATIONARY = 1e-7
-#: Largest distance outside a limit, in half ranges, of a point that is feasible.
-FEASIBLE = 1e-9
 #: A multiplier below this, in scaled terms, does not hold the point at its side: the side is weakly active.
 STRONG = 1e-9
 #: An eigenvalue of the scaled reduced Hessian below this is zero: over half a variable's range F would change by less

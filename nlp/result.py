@@ -18,9 +18,10 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.case import Case
 from screwsynth.nlp.evaluation import RobotState
+from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.solver import Solution, StartStatus
+from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:

@@ -1,61 +1,35 @@
-"""Ipopt from many starting points.
-
-Ipopt works on scaled variables and a scaled objective. Where it stops, the sides that it found active are held, and a
-few Newton steps bring the point to rounding error; whether that point has converged is then judged by the program's own
-first-order conditions and never by the solver's word. Ipopt's strings end in this module.
-"""
+"""Solving a case from many starting points, and sorting out what they found."""
 
 from __future__ import annotations
 
 import enum
-import os
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from queue import SimpleQueue
-from typing import Any
 
-import casadi as ca
 import numpy as np
-from casadi import SX
 
 from screwsynth.models import FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Search
-from screwsynth.nlp.errors import EvaluationError
+from screwsynth.nlp.errors import CaseError, EvaluationError
 from screwsynth.nlp.evaluation import RobotState, evaluate
 from screwsynth.nlp.formulation import formulate
-from screwsynth.nlp.kkt import Linearisation, correct, linearise, multipliers
-from screwsynth.nlp.optimality import FEASIBLE, STATIONARY, Evidence, Kind, examine
+from screwsynth.nlp.ipopt import Start, StartStatus, search_from
+from screwsynth.nlp.kkt import FEASIBLE, linearise
+from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
 
-#: Ipopt's tolerance. The Newton correction behind it converges quadratically, so tighter would only cost iterations.
-_IPOPT_TOLERANCE = 1e-8
-#: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
-_NEAR = 1e-2
 #: Two optima are the same when their scaled objectives and points differ by less than these.
-_SAME_VALUE = 1e-9
+SAME_VALUE = 1e-9
 _SAME_POINT = 1e-4
-#: A second thread is worth its own solver from this many starts on.
-_STARTS_PER_JOB = 12
-
-
-class StartStatus(enum.Enum):
-    """How the search from one starting point ended; each value is a sentence for people."""
-
-    CONVERGED = "converged"
-    ITERATION_LIMIT = "stopped at the iteration limit: raise solve.max_iterations"
-    INFEASIBLE = "found no point within the limits"
-    SADDLE = "ended where F is stationary but neither largest nor smallest"
-    UNDEFINED = "met a point where the robot's equations have no finite value"
-    STALLED = "stopped before it was stationary"
 
 
 class Status(enum.Enum):
     """How a whole solve ended; each value is the word in results."""
 
     OPTIMAL = "optimal"
+    AVERAGED = "averaged"
     EVALUATED = "evaluated"
     SADDLE = "saddle"
     NOT_CONVERGED = "not converged"
@@ -64,28 +38,7 @@ class Status(enum.Enum):
     @property
     def is_answer(self) -> bool:
         """Whether the solve gave what was asked for."""
-        return self in (Status.OPTIMAL, Status.EVALUATED)
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """The search from one starting point.
-
-    Attributes:
-        status: how it ended.
-        x: (n,) where it ended.
-        F: objective there, NaN where it is undefined.
-        stationarity: largest scaled derivative of the Lagrangian there.
-        violation: largest distance outside a limit there, in half ranges.
-        iterations: of Ipopt.
-    """
-
-    status: StartStatus
-    x: FloatArray
-    F: float
-    stationarity: float
-    violation: float
-    iterations: int
+        return self in (Status.OPTIMAL, Status.AVERAGED, Status.EVALUATED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +92,9 @@ class Solution:
         Raises:
             EvaluationError: there is none, because the solve failed.
         """
-        if not self.status.is_answer or self.state is None:
+        if not self.status.is_answer:
             raise EvaluationError(f"the solve gave no optimum: it is {self.status.value}")
-        return self.state.F
+        return self.nlp.evaluate(self.x)[0]
 
 
 Progress = Callable[[int, int, float | None], None]
@@ -155,7 +108,7 @@ def solve(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Solve a case.
+    """Solve a case with one task.
 
     Args:
         case: the case.
@@ -163,16 +116,36 @@ def solve(
         seed: seed instead of the case's.
         jobs: number of threads; the result does not depend on it. Left out, as many as there are processors and work.
         progress: called after each start with the number done, the number of all, and the best F so far.
+
+    Raises:
+        CaseError: the case has several tasks, or contradicts itself.
     """
     search = case.search
     search = replace(
         search, starts=search.starts if starts is None else starts, seed=search.seed if seed is None else seed
     )
+    if len(case.tasks) > 1:
+        raise CaseError("task", "are several: solve_tasks brings them together", len(case.tasks), case.source)
     return solve_nlp(formulate(case), search, jobs=jobs, progress=progress)
 
 
-def solve_nlp(nlp: Nlp, search: Search, *, jobs: int | None = None, progress: Progress | None = None) -> Solution:
-    """Solve a program; see :func:`solve`."""
+def solve_nlp(
+    nlp: Nlp,
+    search: Search,
+    *,
+    first: Sequence[FloatArray] = (),
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """Solve a program.
+
+    Args:
+        nlp: the program.
+        search: how to search.
+        first: points (n,) to start from before those that the search samples.
+        jobs: as for :func:`solve`.
+        progress: as for :func:`solve`.
+    """
     began = time.perf_counter()
     if nlp.n == 0:
         x = frozen_array(nlp.start, (0,))
@@ -180,10 +153,10 @@ def solve_nlp(nlp: Nlp, search: Search, *, jobs: int | None = None, progress: Pr
         status = Status.EVALUATED if at.violation <= FEASIBLE else Status.INFEASIBLE
         evidence = None if status is Status.EVALUATED else examine(nlp, x)
         return Solution(status, nlp, x, evaluate(nlp, x), evidence, (), (), search.seed, time.perf_counter() - began)
-    points = starting_points(nlp, search.starts, search.seed)
+    points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     done: list[Start] = []
     best: float | None = None
-    for start in _run(nlp, points, search.max_iterations, jobs):
+    for start in search_from(nlp, points, search.max_iterations, jobs):
         done.append(start)
         if start.status is StartStatus.CONVERGED and (best is None or nlp.sign * start.F < nlp.sign * best):
             best = start.F
@@ -220,97 +193,6 @@ def _state(nlp: Nlp, x: FloatArray) -> RobotState | None:
         return None
 
 
-def _run(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None) -> Iterator[Start]:
-    """One :class:`Start` for each point, in their order."""
-    threads = jobs or min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
-    # CasADi's symbols are not safe to share between threads: the solvers are all built here, and only run there.
-    solvers: SimpleQueue[ca.Function] = SimpleQueue()
-    for _ in range(min(threads, len(points))):
-        solvers.put(_solver(nlp, max_iterations))
-    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale]])
-
-    def search(point: FloatArray) -> tuple[dict[str, FloatArray], str, int]:
-        solver = solvers.get()
-        try:
-            result = solver(
-                x0=(point - nlp.centre) / nlp.scale, p=parameters, lbx=-1, ubx=1, lbg=nlp.g_lower, ubg=nlp.g_upper
-            )
-            stats = solver.stats()
-        finally:
-            solvers.put(solver)
-        found = {key: result[key].full().ravel() for key in ("x", "lam_x", "lam_g")}
-        return found, str(stats["return_status"]), int(stats.get("iter_count", 0))
-
-    if threads == 1:
-        for point in points:
-            yield _judged(nlp, *search(point))
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for outcome in pool.map(search, points):
-            yield _judged(nlp, *outcome)
-
-
-def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
-    """Ipopt for the program's structure, over scaled variables and a scaled objective to be minimised."""
-    program = nlp.program
-    s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
-    F, g = program.values.call([centre + scale * s, program.p])
-    options: dict[str, Any] = {
-        "print_time": False,
-        "show_eval_warnings": False,
-        "error_on_fail": False,
-        "calc_multipliers": False,
-        "calc_lam_p": False,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "tol": _IPOPT_TOLERANCE,
-            "max_iter": max_iterations,
-            # Ipopt would otherwise widen every bound by 1e-8 and return values that no feasible point has.
-            "bound_relax_factor": 0.0,
-            # The objective and variables are scaled already, by the same numbers for every start.
-            "nlp_scaling_method": "none",
-        },
-    }
-    problem = {"x": s, "p": ca.vertcat(program.p, centre, scale, weight), "f": weight * F, "g": g}
-    return ca.nlpsol("solver", "ipopt", problem, options)
-
-
-def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iterations: int) -> Start:
-    """Correct the point that Ipopt stopped at, and say by the program's own conditions what it is."""
-    stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
-    at = linearise(nlp, stopped)
-    if np.isfinite(at.violation):
-        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"]))
-        # A correction that makes F worse has gone to another stationary point.
-        if corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE:
-            at = corrected
-    stationarity = multipliers(at, at.active())[1]
-    if at.violation <= FEASIBLE and stationarity <= STATIONARY:
-        status = StartStatus.CONVERGED
-    else:
-        status = {
-            "Maximum_Iterations_Exceeded": StartStatus.ITERATION_LIMIT,
-            "Infeasible_Problem_Detected": StartStatus.INFEASIBLE,
-            "Invalid_Number_Detected": StartStatus.UNDEFINED,
-        }.get(ipopt_status, StartStatus.STALLED)
-    return Start(status, at.x, at.F, stationarity, at.violation, iterations)
-
-
-def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
-    """Sides that an interior-point solution may lie on: near, with a multiplier that is not small beside the slack.
-
-    An interior-point method ends with multiplier * slack about equal on all sides. The choice is generous, because a
-    side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
-    """
-    table = nlp.sides
-    reported = np.concatenate([bound_multipliers, multipliers_of_g])[table.place]
-    # Ipopt's variables are scaled already, its constraints are not.
-    strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
-    near = (at.slack < _NEAR) & (strength > _NEAR**2 * np.maximum(at.slack, 0.0))
-    return [int(j) for j in np.flatnonzero(table.equal | near)]
-
-
 def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]]:
     """The starts, with those that ended at a saddle marked, and the distinct optima among the others, best first.
 
@@ -322,7 +204,7 @@ def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]
     remaining = sorted(converged, key=lambda start: nlp.sign * start.F)
     while remaining:
         lead = remaining[0]
-        level = [s for s in remaining if abs(s.F - lead.F) <= _SAME_VALUE * nlp.objective_scale]
+        level = [s for s in remaining if abs(s.F - lead.F) <= SAME_VALUE * nlp.objective_scale]
         groups: list[list[Start]] = []
         for start in level:
             near = next((group for group in groups if _distance(nlp, group[0].x, start.x) <= _SAME_POINT), None)

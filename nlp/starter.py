@@ -67,7 +67,7 @@ def _line(parameter: Parameter, *, freed: bool) -> str:
     values = [_UNITS.shown(value, parameter.dimension) for value in parameter.typical]
     width = _SPREAD * max(abs(value) for value in values) or 1.0
     domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
-    texts = [_free(value, width, domain) if freed else f"{value:g}" for value in values]
+    texts = [_free(value, width, domain) if freed else f"{value:.10g}" for value in values]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
     return f"{parameter.name} = {text}   # {parameter.description}, {_measure(parameter.dimension)}"
 

@@ -13,6 +13,11 @@ from screwsynth.models import Dimension, Model, Parameter, component_names
 from screwsynth.nlp.case import Case, Free, Value
 from screwsynth.nlp.units import Units
 
+#: A free number below this part of its range is shown as 0; in JSON it stands as it is.
+_NOISE = 1e-9
+#: A rotation by less than this has no axis that means anything.
+_TURNED = 1e-9
+
 
 def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None:
     """The result of a solve, as :func:`screwsynth.nlp.result.result_of` gives it."""
@@ -27,6 +32,7 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
 def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
     """The robot at one point, with its Jacobian."""
     console.print(_title(case))
+    console.print(_task(result["task"], case.units))
     console.print(_labelled("F", _number(result["F"])))
     console.print(_design(case, result))
     console.print(_limbs(case, result))
@@ -96,32 +102,36 @@ def _number(value: float) -> str:
     return f"{value + 0.0:.7g}"
 
 
-def _listed(values: Iterable[float], separator: str = "  ") -> str:
-    return separator.join(f"{value + 0.0:.5g}" for value in values)
+def _listed(values: Iterable[float]) -> str:
+    return "  ".join(f"{value + 0.0:.5g}" for value in values)
 
 
 def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
     status = result["status"]
+    top = Group(_title(case), _task(result["task"], case.units)) if "task" in result else _title(case)
     if result["F"] is None:
-        return Group(_title(case), Text(f"{status}: this is not an optimum", style="bold red"))
+        return Group(top, Text(f"{status}: this is not an optimum", style="bold red"))
     word = {"max": "largest", "min": "smallest"}[result["sense"]] if status == "optimal" else "fixed point:"
-    return Group(_title(case), Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status})"))
+    if status == "optimal" and result["optimality"]["kind"].startswith("stationary"):
+        status = "stationary, not proven optimal"
+    if result["singular"]:
+        status += f", singular: rank {result['rank']}"
+    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status})"))
+
+
+def _task(task: dict[str, Any], units: Units) -> Text:
+    return _labelled("task", f"{task['name']}, {task['sense']} F: {_motion(task, units)}")
 
 
 def _design(case: Case, result: dict[str, Any]) -> Table:
     """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
-    table = _table("", "value", "unit", "free between", "held by")
     held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", [])}
+    table = _table("", "value", "unit", "free between", *(["held by"] if held else []))
     units = case.units
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
-        table.add_row(
-            name,
-            _number(value),
-            units.label(dimension),
-            _range(given, units, dimension),
-            _held(held, name, units.label(dimension)),
-        )
+        row = [name, _settled(value, given, units, dimension), units.label(dimension), _range(given, units, dimension)]
+        table.add_row(*row, *([_held(held, name, units.label(dimension))] if held else []))
 
     for parameter in case.model.parameters:
         shown = result["parameters"][parameter.name]
@@ -130,10 +140,23 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
             add(name, parameter.dimension, value, given)
     for name, value, given in zip(component_names("p", 3), result["pose"]["position"], case.position, strict=True):
         add(name, Dimension.LENGTH, value, given)
-    axis = _listed(result["pose"]["axis"])
-    table.add_row("axis", axis, "", "" if case.axis is not None else "any direction", "")
-    add("angle", Dimension.ANGLE, result["pose"]["angle"], case.rotation.angle)
+    angle, turned = case.rotation.angle, abs(units.to_internal(result["pose"]["angle"], Dimension.ANGLE)) > _TURNED
+    if case.axis is None and isinstance(angle, Free):
+        # The sign of the angle means nothing then: what is allowed is its size.
+        sizes = sorted((abs(angle.lower), abs(angle.upper)))
+        angle = Free(0.0 if angle.lower < 0 < angle.upper else sizes[0], sizes[1])
+    axis = _listed(result["pose"]["axis"]) if turned or case.axis is not None else "none"
+    table.add_row("axis", axis, "", "" if case.axis is not None else "any direction")
+    add("angle", Dimension.ANGLE, result["pose"]["angle"], angle)
     return table
+
+
+def _settled(value: float, given: Value, units: Units, dimension: Dimension) -> str:
+    """A number, 0 where it is rounding error beside the range that it was free in."""
+    if isinstance(given, Free):
+        width = units.shown(given.upper - given.lower, dimension)
+        value = 0.0 if abs(value) < _NOISE * width else value
+    return _number(value)
 
 
 def _range(given: Value, units: Units, dimension: Dimension) -> str:
@@ -144,7 +167,7 @@ def _range(given: Value, units: Units, dimension: Dimension) -> str:
 
 def _held(held: dict[str, Any], name: str, unit: str) -> str:
     side = held.get(name)
-    return "" if side is None else f"{side['bound']}, costs F {side['multiplier']:.4g} per {unit or 'unit'}"
+    return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit or 'unit'}"
 
 
 def _limbs(case: Case, result: dict[str, Any]) -> Table:
@@ -185,18 +208,24 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
     for side in (result.get("reached") or {}).get("violated", []):
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
         yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
-    starts = result["starts"]
-    if starts["run"]:
-        yield _labelled("starts", f"{starts['converged']} of {starts['run']} converged")
-        for sentence, count in starts["failed"].items():
-            yield Text(f"  {count}: {sentence}", style="yellow")
-        for found in starts["optima"][:5]:
-            spread = f", spread over {100 * found['spread']:.0f} % of the box" if found["spread"] > 1e-3 else ""
-            yield Text(f"  {found['count']} at F = {_number(found['F'])}{spread}")
-        if len(starts["optima"]) > 5:
-            yield Text(f"  and {len(starts['optima']) - 5} worse optima")
+    yield from _starts(result["starts"])
     if "rank" in result:
         yield from _singularity(case, result)
+
+
+def _starts(starts: dict[str, Any]) -> Iterable[Text]:
+    if not starts["run"]:
+        return
+    yield _labelled("starts", f"{starts['converged']} of {starts['run']} converged")
+    for sentence, count in starts["failed"].items():
+        yield Text(f"  {count}: {sentence}", style="yellow")
+    for index, found in enumerate(starts["optima"][:5]):
+        note = f", spread over {100 * found['spread']:.0f} % of the ranges" if found["spread"] > 1e-3 else ""
+        if index and _number(found["F"]) == _number(starts["optima"][index - 1]["F"]):
+            note += ", at another point"
+        yield Text(f"  {found['count']} at F = {_number(found['F'])}{note}")
+    if len(starts["optima"]) > 5:
+        yield Text(f"  and {len(starts['optima']) - 5} worse optima")
 
 
 def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
@@ -209,18 +238,20 @@ def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
     if not result["singular"]:
         yield _labelled("rank of J", f"{result['rank']}")
         return
-    yield _labelled("rank of J", f"{result['rank']}: the structure is singular; nothing resists combinations of")
+    several = " combinations of" if len(result["free_motions"]) > 1 else ""
+    yield _labelled("rank of J", f"{result['rank']}: the structure is singular; nothing resists{several}")
     for motion in result["free_motions"]:
         yield Text(f"  {_motion(motion, case.units)}")
 
 
 def _motion(motion: dict[str, Any], units: Units) -> str:
-    axis = _listed(motion["axis"], ", ")
+    def vector(values: Iterable[float]) -> str:
+        return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+
     if motion["pitch"] == "inf":
-        return f"translation along ({axis})"
-    point = _listed(motion["point"], ", ")
+        return f"translation along {vector(motion['axis'])}"
     pitch = "rotation" if abs(motion["pitch"]) < 1e-9 else f"screw of pitch {motion['pitch']:.5g} {units.length}"
-    return f"{pitch} about ({axis}) through ({point})"
+    return f"{pitch} about {vector(motion['axis'])} through {vector(motion['point'])}"
 
 
 def _domain(parameter: Parameter) -> str:

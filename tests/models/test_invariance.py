@@ -66,8 +66,8 @@ def hexapod_states(
     parameters = {f"base_{i + 1}": tuple(b) for i, b in enumerate(base.tolist())}
     parameters |= {f"platform_{i + 1}": tuple(a) for i, a in enumerate(platform.tolist())}
     tasks = [Task(twist, name=str(index)) for index, twist in enumerate(twists)]
-    nlp = formulate(Case(HEXAPOD, parameters, tuple(position.tolist()), tasks, turned))
-    return [evaluate(nlp, np.zeros(0), index) for index in range(len(tasks))]
+    case = Case(HEXAPOD, parameters, tuple(position.tolist()), tasks, turned)
+    return [evaluate(formulate(case, index), np.zeros(0)) for index in range(len(tasks))]
 
 
 def hexapod_state(base: Array, platform: Array, position: Array, turned: Rotation, twist: Array) -> RobotState:

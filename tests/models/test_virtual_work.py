@@ -136,8 +136,8 @@ def scenes(kind: str) -> tuple[Scene, ...]:
         position = rng.uniform([-10, -10, 20], [10, 10, 50])
         axis, angle, twists = rng.normal(size=3), float(rng.uniform(-np.pi / 3, np.pi / 3)), random_twists(rng)
         tasks = [Task(twist, name=str(index)) for index, twist in enumerate(twists)]
-        nlp = formulate(Case(MODELS[kind], parameters, position.tolist(), tasks, Rotation(axis, angle)))
-        states = tuple(evaluate(nlp, np.zeros(0), task) for task in range(len(tasks)))
+        case = Case(MODELS[kind], parameters, position.tolist(), tasks, Rotation(axis, angle))
+        states = tuple(evaluate(formulate(case, task), np.zeros(0)) for task in range(len(tasks)))
         names = tuple(row.limb for row in MODELS[kind].wrenches)
         made.append(
             Scene(

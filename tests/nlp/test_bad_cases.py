@@ -138,9 +138,9 @@ NOT_TOML = [
     paper("toml-unclosed-header", "[pose]", "[pose", "", "not valid TOML", "line"),
     Broken("file-is-json", b'{"title": "a case"}', "", ("not valid TOML",)),
     Broken("file-of-nul", b"\0\0\0\0", "", ("not valid TOML",)),
-    Broken("file-is-binary", bytes(range(256)), "", ("cannot be read", "utf-8")),
-    Broken("file-is-utf16", PAPER.encode("utf-16"), "", ("cannot be read", "utf-8")),
-    Broken("file-is-latin1", PAPER.replace("Pose", "Größe").encode("latin-1"), "", ("cannot be read", "utf-8")),
+    Broken("file-is-binary", bytes(range(256)), "", ("cannot be read", "UTF-8")),
+    Broken("file-is-utf16", PAPER.encode("utf-16"), "", ("cannot be read", "UTF-8")),
+    Broken("file-is-latin1", PAPER.replace("Pose", "Größe").encode("latin-1"), "", ("cannot be read", "UTF-8")),
     paper("number-of-5000-digits", "x1 = 12", f"x1 = 1{'0' * 5000}", ""),
     paper("list-nested-5000-deep", "x1 = 12", f"x1 = {'[' * 5000}{']' * 5000}", ""),
 ]
@@ -380,9 +380,11 @@ OUT_OF_RANGE = [
 NOT_YET = [
     paper("limits", "[expect]", "[limits]\nbase_joint_angle = 45\n[expect]", "limits", "not supported yet"),
     paper("limits-empty", "[expect]", "[limits]\n[expect]", "limits", "not supported yet"),
-    paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "not supported yet"),
+    paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "means nothing for one task"),
     paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance", "not supported yet"),
-    paper("two-tasks", TASK, TASK + TASK.replace("drive", "stop"), "task", "not supported yet", "one"),
+    paper("two-tasks-of-one-name", TASK, TASK + TASK, "task[1].name", "used by an earlier task"),
+    paper("combine-misspelt", "[expect]", '[combine]\nmethod = "mean"\n[expect]', "combine.method", "average"),
+    paper("angle-range-lopsided", ROTATION, "rotation = { angle = { min = -30, max = 5 } }", "pose.rotation.angle.min"),
     paper("fault-in-second-task", TASK, TASK + '[[task]]\nsense = "most"\n', "task[1].sense", "'max'", "'min'"),
 ]
 

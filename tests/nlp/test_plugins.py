@@ -181,10 +181,16 @@ def check_refused(ended: tuple[int, str, str], *words: str) -> None:
 
 @pytest.mark.usefixtures("tripod")
 def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
-    assert model_names() == ("stewart-gough", "hexapod", "tripod")
+    assert model_names() == ("stewart-gough", "hexapod", "three-upu", "tripod")
     code, out, err = cli("models")
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()] == ["robot", "stewart-gough", "hexapod", "tripod"]
+    assert [line.split()[0] for line in out.splitlines()] == [
+        "robot",
+        "stewart-gough",
+        "hexapod",
+        "three-upu",
+        "tripod",
+    ]
     assert "legs and a joint" in out
 
 
@@ -219,7 +225,7 @@ def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
     assert sum(rate**2 for rate in result["rates"]) == pytest.approx(result["F"], rel=1e-12)
     code, out, err = cli("solve", path)
     assert (code, err) == (0, "")
-    assert "(optimal)" in out
+    assert "(optimal" in out
     assert "couple" in out
     code, out, err = cli("evaluate", path, "--set", "radius=9", "--json", "-")
     assert (code, err) == (0, "")
@@ -314,7 +320,7 @@ def test_a_new_case_for_unusual_typical_values(old: str, new: str, install: Inst
 
 def test_a_shipped_name_cannot_be_taken_over(install: Install, cli: Run) -> None:
     install({"hexapod": "robots:hexapod", "stewart-gough": "robots:hexapod", "tripod": "robots:tripod"})
-    assert model_names() == ("stewart-gough", "hexapod", "tripod")
+    assert model_names() == ("stewart-gough", "hexapod", "three-upu", "tripod")
     assert robot_function("hexapod").__module__ == "screwsynth.models.hexapod"
     assert build_model("stewart-gough").parameters[0].name == "x1"
     code, out, err = cli("models")
@@ -416,5 +422,5 @@ def test_a_faulty_robot_does_not_hide_the_others(faulty: tuple[str, str, str], i
     code, out, err = cli("models")
     assert code == 0
     assert len(err.splitlines()) <= 1
-    for name in ("stewart-gough", "hexapod", "tripod"):
+    for name in ("stewart-gough", "hexapod", "three-upu", "tripod"):
         assert name in out + err

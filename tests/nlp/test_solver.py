@@ -158,7 +158,7 @@ def test_a_limb_that_cannot_have_a_length_is_refused() -> None:
                 model=stewart_gough(),
                 parameters={"x1": 5, "x2": 5, "x3": 0.2, "x4": 0.2},
                 position=[0, 0, 0],
-                tasks=[Task.screw("max", axis=[0, 0, 1])],
+                tasks=[Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)],
             )
         )
 
