@@ -11,6 +11,7 @@ help: ## this list
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m compileall -q models nlp cases
 	touch $@
 
 demo: $(VENV)/ready ## set everything up and solve the paper's Section 4.1

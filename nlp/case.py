@@ -145,23 +145,46 @@ class Search:
 
 
 @dataclass(frozen=True)
+class ExpectedValue:
+    """A number of the result, by its dotted path there, and how far it may be off."""
+
+    quantity: str
+    value: float
+    within: float
+
+
+@dataclass(frozen=True)
 class Expectation:
     """What a regression holds the case to; ``tolerance`` is relative, and absolute where F is 0."""
 
     F: float | None = None
     tolerance: float = 1e-6
     singular: bool | None = None
+    values: tuple[ExpectedValue, ...] = ()
 
 
 @dataclass(frozen=True)
 class Published:
-    """A number that the literature prints, and whether this program reproduces it."""
+    """A number that the literature prints, and whether this program reproduces it.
+
+    Attributes:
+        quantity: dotted path in the result, such as ``pose.angle``, or ``gain``: by how many percent F exceeds that of
+            the case ``over``.
+        value: as printed.
+        source: where.
+        reproduced: whether this program reproduces it.
+        because: the reason, where it does not.
+        decimals: digits printed behind the point, where the value alone does not show them.
+        over: name of the case that a gain is over.
+    """
 
     quantity: str
-    value: float | tuple[float, ...]
+    value: tuple[float, ...]
     source: str
     reproduced: bool
     because: str = ""
+    decimals: int | None = None
+    over: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

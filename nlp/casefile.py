@@ -18,6 +18,7 @@ from screwsynth.nlp.case import (
     LARGEST,
     Case,
     Expectation,
+    ExpectedValue,
     Free,
     Method,
     Published,
@@ -141,19 +142,26 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         method=Method.AVERAGE if written.combine is None else Method(written.combine.method),
         title=written.title,
         name=name,
-        expect=Expectation(written.expect.F, written.expect.tolerance, written.expect.singular),
+        expect=_expectation(written.expect),
         published=tuple(
             Published(
                 row.quantity,
-                tuple(row.value) if isinstance(row.value, list) else row.value,
+                tuple(row.value) if isinstance(row.value, list) else (row.value,),
                 row.source,
                 row.reproduced,
                 row.because,
+                row.decimals,
+                row.over,
             )
             for row in written.published
         ),
         source=source,
     )
+
+
+def _expectation(written: document.ExpectTable) -> Expectation:
+    values = tuple(ExpectedValue(row.quantity, row.value, row.within) for row in written.value)
+    return Expectation(written.F, written.tolerance, written.singular, values)
 
 
 def _parameter(

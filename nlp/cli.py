@@ -6,10 +6,14 @@ it runs, so that help is there at once.
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import os
 import sys
+from functools import partial
+from importlib import import_module
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 
     from screwsynth.nlp.case import Case
     from screwsynth.nlp.solver import Solution
+    from screwsynth.nlp.tasks import Compromise
 
 app = typer.Typer(
     name="screwsynth",
@@ -63,19 +68,55 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from screwsynth.nlp.casefile import load_case
-    from screwsynth.nlp.result import result_of
+    from screwsynth.nlp.result import compromise_of, result_of
+    from screwsynth.nlp.tasks import Compromise
 
     loaded = load_case(case)
     _check_target(json_file)
+    if json_file != "-":
+        # The library of tables loads while Ipopt works outside of the interpreter.
+        Thread(target=import_module, args=("screwsynth.nlp.tables",), daemon=True).start()
     solution = _solve(loaded, starts, seed, jobs)
-    result = result_of(solution)
+    result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
     if json_file is not None:
         _write_json(json_file, result)
     if json_file != "-":
-        from screwsynth.nlp.tables import print_solution
+        from screwsynth.nlp.tables import print_compromise, print_solution
 
-        print_solution(_console(), loaded, result)
+        (print_compromise if isinstance(solution, Compromise) else print_solution)(_console(), loaded, result)
     raise typer.Exit(0 if solution.status.is_answer else 1)
+
+
+@app.command()
+def check(
+    cases: Annotated[
+        list[str] | None, typer.Argument(metavar="[CASE]...", help="All shipped cases if left out.")
+    ] = None,
+    json_file: JsonFile = None,
+    junit: Annotated[str | None, typer.Option(metavar="FILE", help="Write JUnit XML for a CI; - is stdout.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
+) -> None:
+    """Hold cases to their expected and published values."""
+    from screwsynth.nlp import checkreport
+    from screwsynth.nlp.casefile import shipped_cases
+    from screwsynth.nlp.files import write_text
+    from screwsynth.nlp.regress import check_case
+
+    for target in (json_file, junit):
+        _check_target(target)
+    solved: dict[str, dict[str, Any]] = {}
+    checks = [check_case(name, solved) for name in cases or shipped_cases()]
+    if json_file is not None:
+        _write_json(json_file, checkreport.checks_as_data(checks))
+    if junit is not None:
+        write_text(junit, checkreport.checks_as_junit(checks))
+    if markdown:
+        typer.echo(checkreport.checks_as_markdown(checks), nl=False)
+    elif "-" not in (json_file, junit):
+        from screwsynth.nlp.tables import print_checks
+
+        print_checks(_console(), checks)
+    raise typer.Exit(0 if all(each.passed for each in checks) else 1)
 
 
 @app.command()
@@ -152,6 +193,8 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # The matrices here are a dozen wide: BLAS threads would only cost their start and spin beside the solver's own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Collecting garbage while modules are loaded finds none, and takes a twentieth of a short command's time.
+    gc.disable()
     for stream in (sys.stdout, sys.stderr):
         # A terminal that cannot show a letter of a title shows its escape instead.
         if isinstance(stream, io.TextIOWrapper):
@@ -177,22 +220,28 @@ def _description(model: str) -> str:
         return error.fault
 
 
-def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -> Solution:
+def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -> Solution | Compromise:
     from screwsynth.nlp.solver import solve as solve_case
+    from screwsynth.nlp.tasks import solve_tasks
 
+    gc.enable()
+    several = len(case.tasks) > 1
     if not sys.stderr.isatty():
-        return solve_case(case, starts=starts, seed=seed, jobs=jobs)
+        return (solve_tasks if several else solve_case)(case, starts=starts, seed=seed, jobs=jobs)
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("starts", total=None)
 
-        def show(done: int, total: int, best: float | None) -> None:
-            best_text = "" if best is None else f", best F {best:.7g}"
-            bar.update(line, completed=done, total=total, description=f"starts{best_text}")
+        def show(what: str, done: int, total: int, best: float | None) -> None:
+            best_text = "" if best is None else f", best {best:.7g}"
+            bar.update(line, completed=done, total=total, description=f"{escape(what)}{best_text}")
 
-        return solve_case(case, starts=starts, seed=seed, jobs=jobs, progress=show)
+        if several:
+            return solve_tasks(case, starts=starts, seed=seed, jobs=jobs, progress=show)
+        return solve_case(case, starts=starts, seed=seed, jobs=jobs, progress=partial(show, "starts"))
 
 
 def _setting(text: str) -> tuple[str, float | list[float]]:

@@ -157,22 +157,33 @@ class SolveTable(Table):
     max_iterations: int = Field(default=500, ge=1, le=1_000_000, description="limit for each start")
 
 
+class ExpectedValueTable(Table):
+    """A number of the result that a regression holds the case to."""
+
+    quantity: str = Field(min_length=1, description="dotted path in the JSON result, such as pose.angle")
+    value: FiniteFloat = Field(description="what it must be, in the case's units")
+    within: FiniteFloat = Field(gt=0, description="how far it may be off")
+
+
 class ExpectTable(Table):
     """What a regression holds the case to."""
 
     F: FiniteFloat | None = Field(default=None, ge=0, description="objective at the optimum")
     tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="relative; absolute where F is 0")
     singular: bool | None = Field(default=None, description="whether J is rank deficient at the optimum")
+    value: list[ExpectedValueTable] = Field(default_factory=list, description="other numbers of the result")
 
 
 class PublishedTable(Table):
     """A number that the literature prints."""
 
-    quantity: str = Field(min_length=1, description="what it is")
+    quantity: str = Field(min_length=1, description="dotted path in the JSON result, or gain (percent, with over)")
     value: Numbers = Field(description="as printed")
     source: str = Field(min_length=1, description="where")
     reproduced: bool = Field(description="whether this program reproduces it")
     because: str = Field(default="", description="the reason, where it does not")
+    decimals: int | None = Field(default=None, ge=0, le=15, description="printed decimals, if the value hides zeros")
+    over: str | None = Field(default=None, description="the case that a gain is over")
 
     @model_validator(mode="after")
     def _reason_given(self) -> PublishedTable:
@@ -180,6 +191,9 @@ class PublishedTable(Table):
             raise PydanticCustomError(
                 "reason", "{fault}", {"key": "because", "fault": "is missing: say why the number is not reproduced"}
             )
+        if (self.quantity == "gain") != (self.over is not None):
+            fault = 'belongs to quantity = "gain", and that to it'
+            raise PydanticCustomError("reason", "{fault}", {"key": "over", "fault": fault})
         return self
 
 

@@ -182,7 +182,10 @@ def _residual(at: Linearisation, held: Sequence[int]) -> tuple[FloatArray, float
     """Least-squares multipliers (k,) of the held sides, and the largest error of the stationarity conditions."""
     mu = np.zeros(len(at.sides))
     if held and np.isfinite(at.gradient).all():
-        mu[held] = np.linalg.lstsq(at.normals[held].T, -at.gradient, rcond=None)[0]
+        A = at.normals[held]
+        # Bounds alone have orthonormal normals, and most active sets are bounds alone.
+        orthonormal = np.array_equal(A @ A.T, np.eye(len(held)))
+        mu[held] = -A @ at.gradient if orthonormal else np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
     left = at.gradient + at.normals.T @ mu
     return mu, max(float(np.max(np.abs(left), initial=0.0)), at.violation)
 

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+import casadi as ca
 import numpy as np
 
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
@@ -22,6 +23,7 @@ from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import Solution
+from screwsynth.nlp.tasks import Compromise, TaskOutcome
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:
@@ -30,8 +32,13 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-def result_of(solution: Solution) -> dict[str, Any]:
-    """The whole result of a solve, ready for JSON."""
+def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
+    """The whole result of a solve, ready for JSON.
+
+    Args:
+        solution: of one task.
+        task: index of that task in the case.
+    """
     case = solution.nlp.case
     answer = solution.status.is_answer
     state = solution.state
@@ -46,13 +53,61 @@ def result_of(solution: Solution) -> dict[str, Any]:
         "status": solution.status.value,
         "F": state.F if answer and state is not None else None,
         **({} if reached is None else {"reached": reached}),
-        **(state_of(case, state) if state is not None else {}),
+        **(state_of(case, state, task) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
         "starts": _starts(solution),
         "certificate": None,
         "seed": solution.seed,
         "versions": versions(),
         "seconds": solution.seconds,
+    }
+
+
+def compromise_of(compromise: Compromise) -> dict[str, Any]:
+    """The whole result of bringing several tasks together, ready for JSON."""
+    case, outcomes = compromise.case, compromise.outcomes
+    state, combined = outcomes[0].state, compromise.combined
+    robot = {} if state is None else state_of(case, state)
+    for of_a_task in ("task", "rates", "task_is_free"):
+        robot.pop(of_a_task, None)
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "title": case.title,
+        "model": case.model.name,
+        "units": {"length": case.units.length, "angle": case.units.angle},
+        "status": compromise.status.value,
+        "tasks": [result_of(outcome.own, j) for j, outcome in enumerate(outcomes)],
+        "combined": {
+            "method": compromise.method.value,
+            "value": compromise.value,
+            **robot,
+            "tasks": [_outcome(outcome) for outcome in outcomes],
+            "violated": list(compromise.violated),
+            "notices": list(compromise.notices),
+            "optimality": None
+            if combined is None or combined.evidence is None
+            else _optimality(combined.nlp, combined.evidence),
+            "starts": None if combined is None else _starts(combined),
+        },
+        "versions": versions(),
+        "seconds": compromise.seconds,
+    }
+
+
+def _outcome(outcome: TaskOutcome) -> dict[str, Any]:
+    best = outcome.own.nlp.evaluate(outcome.own.x)[0]
+    return {
+        "name": outcome.task.name,
+        "sense": outcome.task.sense.value,
+        "weight": outcome.task.weight,
+        "F": None if outcome.state is None else outcome.state.F,
+        "best": best,
+        "loss": _finite(outcome.loss),
+        "relative_loss": _finite(outcome.loss / best) if best else None,
+        "unique": outcome.unique,
+        "verdict": outcome.evidence.kind.value,
+        "rates": None if outcome.state is None else outcome.state.rates.tolist(),
     }
 
 
@@ -116,7 +171,7 @@ def versions() -> dict[str, str]:
     """Versions of what the numbers depend on."""
     return {
         "screwsynth": version("screwsynth"),
-        "casadi": version("casadi"),
+        "casadi": ca.CasadiMeta.version(),
         "numpy": np.__version__,
         "python": platform.python_version(),
     }

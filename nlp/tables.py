@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
@@ -12,6 +12,9 @@ from rich.text import Text
 from screwsynth.models import Dimension, Model, Parameter, component_names
 from screwsynth.nlp.case import Case, Free, Value
 from screwsynth.nlp.units import Units
+
+if TYPE_CHECKING:
+    from screwsynth.nlp.regress import CaseCheck
 
 #: A free number below this part of its range is shown as 0; in JSON it stands as it is.
 _NOISE = 1e-9
@@ -27,6 +30,63 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
         console.print(_limbs(case, result))
     for line in _verdict(case, result):
         console.print(line)
+
+
+def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> None:
+    """Several tasks brought together, as :func:`screwsynth.nlp.result.compromise_of` gives it."""
+    combined = result["combined"]
+    console.print(_title(case))
+    console.print(_labelled("combined by", combined["method"]), Text(f"({result['status']})"))
+    for name in combined["violated"]:
+        console.print(Text(f"violated: {name}", style="red"))
+    if "parameters" in combined:
+        console.print(_design(case, combined))
+    table = _table("task", "sense", "weight", "F", "best alone", "loss", "at this point")
+    for task in combined["tasks"]:
+        shown = [_number(task[key]) if task[key] is not None else "none" for key in ("F", "best", "loss")]
+        unique = "" if task["unique"] else " (not unique)"
+        table.add_row(
+            task["name"], task["sense"], f"{task['weight']:g}", shown[0], shown[1] + unique, shown[2], task["verdict"]
+        )
+    console.print(table)
+    if combined["value"] is not None:
+        console.print(_labelled(combined["method"], _number(combined["value"])))
+        console.print(_labelled("verdict", combined["optimality"]["kind"]))
+    for notice in combined["notices"]:
+        console.print(_labelled("note", notice))
+    if "rank" in combined:
+        for line in _singularity(case, {**combined, "task_is_free": False}):
+            console.print(line)
+
+
+def print_checks(console: Console, checks: Iterable[CaseCheck]) -> None:
+    """Cases beside what they must compute and what the literature prints."""
+    from screwsynth.nlp.checkreport import describe  # noqa: PLC0415 - a solve does not need it
+
+    table = _table("case", "expected", "published", "seconds")
+    faults: list[Text] = []
+    for check in checks:
+        reproduced = sum(row.reproduced for row in check.published)
+        held = sum(row.passed for row in check.expected)
+        published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
+        table.add_row(
+            Text(check.name, style="" if check.passed else "bold red"),
+            f"{held} of {len(check.expected)} hold",
+            published,
+            f"{check.seconds:.1f}",
+        )
+        faults += [
+            Text(f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}")
+            for row in check.expected
+            if not row.passed
+        ]
+        faults += [Text(f"{check.name}: newly changed: {describe(row)}") for row in check.published if not row.passed]
+    console.print(table)
+    for fault in faults:
+        console.print(fault, style="red")
+    console.print(
+        "all hold" if not faults else f"{len(faults)} do not hold", style="green" if not faults else "bold red"
+    )
 
 
 def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
