@@ -91,6 +91,8 @@ def printed(row: PublishedCheck) -> str:
 
 def computed(row: PublishedCheck) -> str:
     """The computed number with two digits more than were printed."""
+    if not row.computed:
+        return "none"
     shown = zip(row.computed, row.published.value, strict=True)
     return _listed(f"{value + 0.0:.{_decimals(row, said) + 2}f}" for value, said in shown)
 

@@ -135,15 +135,12 @@ def evaluate(
     from screwsynth.nlp import evaluation
     from screwsynth.nlp.casefile import load_case
     from screwsynth.nlp.formulation import formulate
-    from screwsynth.nlp.result import SCHEMA, state_of, versions
+    from screwsynth.nlp.result import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
-    nlp = formulate(loaded)
-    state = evaluation.evaluate(nlp, nlp.start)
-    result: dict[str, Any] = {"schema": SCHEMA, "case": loaded.name, "title": loaded.title, "model": loaded.model.name}
-    result |= {"units": {"length": loaded.units.length, "angle": loaded.units.angle}, "F": state.F}
-    result |= {**state_of(loaded, state), "versions": versions()}
+    nlps = [formulate(loaded, task) for task in range(len(loaded.tasks))]
+    result = evaluation_of(loaded, [evaluation.evaluate(nlp, nlp.start) for nlp in nlps])
     if json_file is not None:
         _write_json(json_file, result)
     if json_file != "-":

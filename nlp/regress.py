@@ -25,7 +25,7 @@ from screwsynth.nlp.casefile import load_case
 from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
 from screwsynth.nlp.formulation import formulate
 from screwsynth.nlp.result import compromise_of, result_of
-from screwsynth.nlp.solver import solve, solve_nlp
+from screwsynth.nlp.solver import Status, solve, solve_nlp
 from screwsynth.nlp.tasks import solve_tasks
 
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
@@ -121,9 +121,8 @@ def _solved(name: str, solved: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def _expected(case: Case, result: Mapping[str, Any]) -> list[ExpectedCheck]:
-    expect, status = case.expect, str(result["status"])
-    good = status in ("optimal", "averaged", "evaluated")
-    rows = [ExpectedCheck("status", "an answer", status, 0.0, good)]
+    expect = case.expect
+    rows = [ExpectedCheck("status", "an answer", str(result["status"]), 0.0, _is_answer(result))]
     if expect.F is not None:
         F = _lookup(result, "F")
         off = math.inf if F is None else abs(float(F) - expect.F)
@@ -136,6 +135,10 @@ def _expected(case: Case, result: Mapping[str, Any]) -> list[ExpectedCheck]:
         near = isinstance(value, float | int) and abs(value - row.value) <= row.within
         rows.append(ExpectedCheck(row.quantity, row.value, value, row.within, near))
     return rows
+
+
+def _is_answer(result: Mapping[str, Any]) -> bool:
+    return Status(result["status"]).is_answer
 
 
 def _lookup(result: Any, path: str) -> Any:  # noqa: ANN401 - whatever JSON can hold
@@ -162,6 +165,8 @@ def _published(
     computed = tuple(float(each) for each in found) if isinstance(found, list) else ()
     if isinstance(found, float | int):
         computed = (float(found),)
+    if not _is_answer(result):
+        return PublishedCheck(row, (), False, f"the case has no answer: it is {result['status']}")
     if len(computed) != len(row.value):
         source = case.source or name
         fault = f"is no number of this result with {len(row.value)} components"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import platform
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
+from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.ipopt import StartStatus
@@ -95,6 +96,39 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     }
 
 
+def evaluation_of(case: Case, states: Sequence[RobotState]) -> dict[str, Any]:
+    """The robot at one point, ready for JSON: what its first task meets, then every task, and what it resists least.
+
+    Args:
+        case: the case.
+        states: the robot with each task's rates, in order.
+    """
+    analysis = analyse_tasks(states[0].jacobian)
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "title": case.title,
+        "model": case.model.name,
+        "units": {"length": case.units.length, "angle": case.units.angle},
+        "F": states[0].F,
+        **state_of(case, states[0]),
+        "tasks": [
+            {**_task(case, j), "F": state.F, "rates": state.rates.tolist(), "task_is_free": state.is_zero}
+            for j, state in enumerate(states)
+        ],
+        "principal_motions": {
+            "rotations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.rotations],
+            "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
+        },
+        "versions": versions(),
+    }
+
+
+def _task(case: Case, task: int) -> dict[str, Any]:
+    chosen = case.tasks[task]
+    return {"name": chosen.name, "sense": chosen.sense.value, **motion_of(chosen.twist)}
+
+
 def _outcome(outcome: TaskOutcome) -> dict[str, Any]:
     best = outcome.own.nlp.evaluate(outcome.own.x)[0]
     return {
@@ -121,11 +155,7 @@ def state_of(case: Case, state: RobotState, task: int = 0) -> dict[str, Any]:
             "angle": case.units.shown(state.angle, Dimension.ANGLE),
             "rotation_matrix": state.rotation.tolist(),
         },
-        "task": {
-            "name": case.tasks[task].name,
-            "sense": case.tasks[task].sense.value,
-            **motion_of(case.tasks[task].twist),
-        },
+        "task": _task(case, task),
         "limbs": [row.limb for row in case.model.wrenches],
         "jacobian": state.jacobian.tolist(),
         "rates": state.rates.tolist(),

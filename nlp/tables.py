@@ -92,12 +92,14 @@ def print_checks(console: Console, checks: Iterable[CaseCheck]) -> None:
 def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
     """The robot at one point, with its Jacobian."""
     console.print(_title(case))
-    console.print(_task(result["task"], case.units))
-    console.print(_labelled("F", _number(result["F"])))
+    for task in result["tasks"]:
+        console.print(_task(task, case.units))
+        console.print(_labelled("F", _number(0.0 if task["task_is_free"] else task["F"])))
     console.print(_design(case, result))
     console.print(_limbs(case, result))
     console.print(_jacobian(case, result))
     console.print(_labelled("singular values", _listed(result["singular_values"])))
+    console.print(_principal(case, result["principal_motions"]))
     for line in _singularity(case, result):
         console.print(line)
 
@@ -288,6 +290,17 @@ def _starts(starts: dict[str, Any]) -> Iterable[Text]:
         yield Text(f"  and {len(starts['optima']) - 5} worse optima")
 
 
+def _principal(case: Case, motions: dict[str, Any]) -> Table:
+    """Motions at which F is stationary: among those of unit rotation, and among translations of unit speed."""
+    table = _table("resisted", "F", "motion")
+    for kind in ("rotations", "translations"):
+        ranks = ("least", "", "most")
+        for rank, motion in zip(ranks, motions[kind], strict=True):
+            noise = _NOISE * motions[kind][-1]["F"]
+            table.add_row(rank, _number(motion["F"] if motion["F"] > noise else 0.0), _motion(motion, case.units))
+    return table
+
+
 def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
     if result["task_is_free"]:
         yield Text(
@@ -305,8 +318,9 @@ def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
 
 
 def _motion(motion: dict[str, Any], units: Units) -> str:
-    def vector(values: Iterable[float]) -> str:
-        return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+    def vector(values: Sequence[float]) -> str:
+        noise = _NOISE * max(1.0, *map(abs, values))
+        return f"({', '.join(f'{value if abs(value) > noise else 0:.4g}' for value in values)})"
 
     if motion["pitch"] == "inf":
         return f"translation along {vector(motion['axis'])}"
