@@ -104,6 +104,7 @@ def check(
 
     for target in (json_file, junit):
         _check_target(target)
+    gc.enable()
     solved: dict[str, dict[str, Any]] = {}
     checks = [check_case(name, solved) for name in cases or shipped_cases()]
     if json_file is not None:
@@ -204,6 +205,8 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("screwsynth: interrupted", err=True)
         sys.exit(130)
+    finally:
+        gc.enable()
 
 
 def _description(model: str) -> str:

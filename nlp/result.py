@@ -45,11 +45,7 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
     state = solution.state
     reached = None if answer else _reached(solution)
     return {
-        "schema": SCHEMA,
-        "case": case.name,
-        "title": case.title,
-        "model": case.model.name,
-        "units": {"length": case.units.length, "angle": case.units.angle},
+        **_head(case),
         "sense": solution.nlp.sense.value,
         "status": solution.status.value,
         "F": state.F if answer and state is not None else None,
@@ -72,11 +68,7 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
     return {
-        "schema": SCHEMA,
-        "case": case.name,
-        "title": case.title,
-        "model": case.model.name,
-        "units": {"length": case.units.length, "angle": case.units.angle},
+        **_head(case),
         "status": compromise.status.value,
         "tasks": [result_of(outcome.own, j) for j, outcome in enumerate(outcomes)],
         "combined": {
@@ -105,11 +97,7 @@ def evaluation_of(case: Case, states: Sequence[RobotState]) -> dict[str, Any]:
     """
     analysis = analyse_tasks(states[0].jacobian)
     return {
-        "schema": SCHEMA,
-        "case": case.name,
-        "title": case.title,
-        "model": case.model.name,
-        "units": {"length": case.units.length, "angle": case.units.angle},
+        **_head(case),
         "F": states[0].F,
         **state_of(case, states[0]),
         "tasks": [
@@ -121,6 +109,16 @@ def evaluation_of(case: Case, states: Sequence[RobotState]) -> dict[str, Any]:
             "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
         },
         "versions": versions(),
+    }
+
+
+def _head(case: Case) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "title": case.title,
+        "model": case.model.name,
+        "units": {"length": case.units.length, "angle": case.units.angle},
     }
 
 

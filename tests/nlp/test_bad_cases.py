@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from screwsynth.nlp import CaseError, InputError, formulate, load_case
-from screwsynth.nlp.cli import main
 
 NAME = "broken.toml"
 
@@ -461,19 +460,6 @@ def not_finite() -> list[Broken]:
 BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *NOT_YET, *LINES, *LIMBS, *not_finite()]
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture

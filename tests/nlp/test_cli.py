@@ -17,7 +17,6 @@ import pytest
 import screwsynth.cases
 from screwsynth.models import model_names
 from screwsynth.nlp import shipped_cases
-from screwsynth.nlp.cli import main
 
 CASES = Path(screwsynth.cases.__file__).parent
 HELICAL = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8")
@@ -26,22 +25,6 @@ ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
 MOTION = "axis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n"
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
-        capfd.readouterr()
-        code: object = 0
-        try:
-            main()
-        except SystemExit as ended:
-            code = ended.code
-        out, err = capfd.readouterr()
-        return int(str(code or 0)), out, err
-
-    return run
 
 
 def process(

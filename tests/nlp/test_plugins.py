@@ -11,7 +11,6 @@ import pytest
 
 from screwsynth.models import model_names, robot_function
 from screwsynth.nlp import CaseError, InputError, build_model, formulate, load_case, solve
-from screwsynth.nlp.cli import main
 
 # A robot with a constraint couple and an option of every plain kind. Its hints are text, as in many packages.
 MODULE = '''
@@ -112,22 +111,6 @@ starts = 3
 
 Run = Callable[..., tuple[int, str, str]]
 Install = Callable[..., Path]
-
-
-@pytest.fixture
-def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
-        capfd.readouterr()
-        code: object = 0
-        try:
-            main()
-        except SystemExit as ended:
-            code = ended.code
-        out, err = capfd.readouterr()
-        return int(str(code or 0)), out, err
-
-    return run
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Cases held to expected and published values: the shipped ones hold, and nothing that does not hold passes."""
 
 import json
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -11,10 +10,10 @@ import pytest
 
 from screwsynth.nlp import load_case, shipped_cases
 from screwsynth.nlp.checkreport import checks_as_junit, checks_as_markdown
-from screwsynth.nlp.cli import main
 from screwsynth.nlp.regress import CaseCheck, check_case, decimals_of
 
 ROOT = Path(__file__).parents[2]
+Run = Callable[..., tuple[int, str, str]]
 
 # What Section 4 of the paper prints: (section, quantity, printed).
 PRINTED = [
@@ -65,18 +64,6 @@ PRINTED = [
 def checks() -> dict[str, CaseCheck]:
     solved: dict[str, dict[str, object]] = {}
     return {name: check_case(name, solved) for name in shipped_cases()}
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    def call(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        captured = capsys.readouterr()
-        return int(ended.value.code or 0), captured.out, captured.err
-
-    return call
 
 
 def test_every_shipped_case_holds(checks: dict[str, CaseCheck]) -> None:
@@ -153,11 +140,8 @@ def edited(tmp_path: Path, name: str, *changes: tuple[str, str]) -> str:
     return str(path)
 
 
-Run = Callable[..., tuple[int, str, str]]
-
-
-def test_a_users_own_file_is_checked(tmp_path: Path, run: Run) -> None:
-    code, out, _ = run("check", edited(tmp_path, "paper-4.3-axis-x"))
+def test_a_users_own_file_is_checked(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("check", edited(tmp_path, "paper-4.3-axis-x"))
     assert code == 0
     assert "all hold" in out
 
@@ -171,9 +155,9 @@ def test_a_users_own_file_is_checked(tmp_path: Path, run: Run) -> None:
         ("starts = 32", "starts = 32\nmax_iterations = 1"),
     ],
 )
-def test_an_expectation_that_does_not_hold_fails(tmp_path: Path, run: Run, change: tuple[str, str]) -> None:
+def test_an_expectation_that_does_not_hold_fails(tmp_path: Path, cli: Run, change: tuple[str, str]) -> None:
     extra = [("[expect]", "[solve]\nstarts = 32\n\n[expect]")] if change[0].startswith("starts") else []
-    code, out, _ = run("check", edited(tmp_path, "paper-4.3-axis-x", *extra, change))
+    code, out, _ = cli("check", edited(tmp_path, "paper-4.3-axis-x", *extra, change))
     assert code == 1
     assert "mine" in out
 
@@ -190,16 +174,16 @@ def test_an_expectation_that_does_not_hold_fails(tmp_path: Path, run: Run, chang
         ("paper-4.3-axis-x", ("value = 524.7", "value = 407.1")),
     ],
 )
-def test_a_published_number_marked_wrongly_fails(tmp_path: Path, run: Run, name: str, change: tuple[str, str]) -> None:
-    code, out, _ = run("check", edited(tmp_path, name, change))
+def test_a_published_number_marked_wrongly_fails(tmp_path: Path, cli: Run, name: str, change: tuple[str, str]) -> None:
+    code, out, _ = cli("check", edited(tmp_path, name, change))
     assert code == 1
     assert "newly changed" in out
 
 
-def test_json_and_junit(tmp_path: Path, run: Run) -> None:
+def test_json_and_junit(tmp_path: Path, cli: Run) -> None:
     path = edited(tmp_path, "paper-4.3-axis-x", ("F = 407.0562", "F = 500"), ("value = 524.7", "value = 407.1"))
     data, junit = tmp_path / "check.json", tmp_path / "check.xml"
-    code, _, _ = run("check", path, "paper-4.2-rotation", "--json", str(data), "--junit", str(junit))
+    code, _, _ = cli("check", path, "paper-4.2-rotation", "--json", str(data), "--junit", str(junit))
     assert code == 1
     result = json.loads(data.read_text(encoding="utf-8"))
     assert result["passed"] is False
@@ -215,8 +199,8 @@ def test_junit_escapes_what_a_case_says(tmp_path: Path) -> None:
     ElementTree.fromstring(checks_as_junit([check_case(path)]))
 
 
-def test_a_quantity_that_is_no_number_of_the_result_is_a_fault_of_the_case(tmp_path: Path, run: Run) -> None:
-    code, _, err = run(
+def test_a_quantity_that_is_no_number_of_the_result_is_a_fault_of_the_case(tmp_path: Path, cli: Run) -> None:
+    code, _, err = cli(
         "check",
         edited(
             tmp_path,
