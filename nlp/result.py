@@ -21,6 +21,7 @@ from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.ipopt import StartStatus
+from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import Solution
@@ -212,14 +213,18 @@ def _reached(solution: Solution) -> dict[str, Any]:
 
 
 def violations(nlp: Nlp, x: FloatArray, g: FloatArray) -> list[dict[str, Any]]:
-    """Constraints that a point lies outside of: name, value and limit, in the case's words and units."""
+    """Constraints that a point lies outside of: name, value and limit, in the case's words and units.
+
+    Those that are violated a thousand times less than the worst are left out: they only give way to it.
+    """
+    at = linearise(nlp, x)
     rows: list[dict[str, Any]] = []
     units = nlp.case.units
     for j, side in enumerate(nlp.sides.sides):
         value = float(x[side.variable]) if side.variable is not None else float(g[side.constraint or 0])
         limit = float(nlp.sides.limit[j])
         outside = abs(value - limit) if side.bound == "equal" else float(nlp.sides.sign[j]) * (value - limit)
-        if not outside > 1e-9 * max(1.0, abs(limit)):
+        if outside <= 0 or at.slack[j] >= -max(FEASIBLE, 1e-3 * at.violation):
             continue
         if side.constraint is None:
             dimension = nlp.program.variables[side.variable or 0].dimension

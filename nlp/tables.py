@@ -187,8 +187,9 @@ def _task(task: dict[str, Any], units: Units) -> Text:
 
 def _design(case: Case, result: dict[str, Any]) -> Table:
     """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
-    held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", [])}
-    table = _table("", "value", "unit", "free between", *(["held by"] if held else []))
+    reached = "reached" in result
+    held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", []) if not reached}
+    table = _table("", "reached" if reached else "value", "unit", "free between", *(["held by"] if held else []))
     units = case.units
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
@@ -263,15 +264,15 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
         for direction in evidence["flat_directions"]:
             yield _labelled("flat along", ", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()))
         if evidence["stationarity"] is not None:
-            checks = f"stationarity {evidence['stationarity']:.1e}, feasibility {evidence['feasibility']:.1e}, "
+            checks = f"stationarity {evidence['stationarity']:.1e}, feasibility {evidence['feasibility']:.1e}"
             curvature = evidence["reduced_hessian_eigenvalues"]
-            smallest = f"smallest curvature {min(curvature):.2e}" if curvature else "no free direction left"
-            yield _labelled("evidence", checks + smallest)
+            smallest = f", smallest curvature {min(curvature):.2e}" if curvature else ", no free direction left"
+            yield _labelled("evidence", checks + ("" if "reached" in result else smallest))
     for side in (result.get("reached") or {}).get("violated", []):
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
         yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
     yield from _starts(result["starts"])
-    if "rank" in result:
+    if "rank" in result and "reached" not in result:
         yield from _singularity(case, result)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from screwsynth.models import stewart_gough
+from screwsynth.models import stewart_gough, three_upu
 from screwsynth.nlp import (
     Case,
     CaseError,
@@ -19,6 +19,7 @@ from screwsynth.nlp import (
     Task,
     formulate,
     load_case,
+    result_of,
     solve,
 )
 from screwsynth.nlp.sampling import starting_points
@@ -167,3 +168,23 @@ def test_progress_is_told_after_every_start() -> None:
     seen: list[tuple[int, int]] = []
     solve(load_case("paper-4.3"), starts=3, progress=lambda done, total, _best: seen.append((done, total)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_an_infeasible_case_names_what_cannot_hold() -> None:
+    # Two components of at least 0.9 cannot belong to a unit vector.
+    ranges: dict[str, object] = {f"u{j}_{i}": [Free(-1, 1)] * 3 for i in (1, 2, 3) for j in (1, 2)}
+    ranges |= {"base_radius": 50, "platform_radius": 25, "u1_1": [Free(0.9, 1), Free(0.9, 1), 0]}
+    case = Case(
+        model=three_upu(),
+        parameters=ranges,  # type: ignore[arg-type]
+        position=[0, 0, 50],
+        tasks=[Task.screw("max", axis=[1, 0, 0], point=[0, 0, 100], pitch=0)],
+        search=Search(starts=4),
+    )
+    solution = solve(case)
+    assert solution.status is Status.INFEASIBLE
+    assert solution.optima == ()
+    result = result_of(solution)
+    assert result["F"] is None
+    assert [side["name"] for side in result["reached"]["violated"]] == ["|u1_1|"]
+    assert result["reached"]["violated"][0]["value"] == pytest.approx(1.62, abs=1e-6)
