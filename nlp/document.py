@@ -32,7 +32,8 @@ NOT_YET = ("limits", "tolerance")
 class Table(BaseModel):
     """A TOML table with its known keys only."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    # Validators are built when a document is first read, once for the whole tree of tables.
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -93,7 +94,7 @@ class UnitsTable(Table):
 class RobotTable(Table):
     """The robot: its model, the model's own options, and its dimensions."""
 
-    model_config = ConfigDict(strict=True, extra="allow", frozen=True)
+    model_config = ConfigDict(extra="allow")
 
     model: str = Field(description="name of the robot; `screwsynth models` lists them")
     parameters: dict[str, VectorOrValue] = Field(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ _IPOPT_TOLERANCE = 1e-8
 _NEAR = 1e-2
 #: A second thread is worth its own solver from this many starts on.
 _STARTS_PER_JOB = 12
+#: How long a thread may keep the interpreter while another wants it, in seconds: a tenth of a search.
+_SWITCH_INTERVAL = 5e-4
 
 
 class StartStatus(enum.Enum):
@@ -88,9 +91,15 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
         for point in points:
             yield _judged(nlp, *search(point))
         return
-    with ThreadPoolExecutor(threads) as pool:
-        for outcome in pool.map(search, points):
-            yield _judged(nlp, *outcome)
+    # Between two calls of Ipopt a thread needs the interpreter for a moment only, so it must not wait long for it.
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(min(interval, _SWITCH_INTERVAL))
+    try:
+        with ThreadPoolExecutor(threads) as pool:
+            for outcome in pool.map(search, points):
+                yield _judged(nlp, *outcome)
+    finally:
+        sys.setswitchinterval(interval)
 
 
 def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
