@@ -151,6 +151,31 @@ def evaluate(
 
 
 @app.command()
+def codegen(
+    case: CaseName,
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
+    language: Annotated[str, typer.Option(help="c is the only one.")] = "c",
+    precision: Annotated[str, typer.Option(help="double is the only one.")] = "double",
+) -> None:
+    """Write F and its derivatives as C for embedding."""
+    from screwsynth.nlp.casefile import find_case, load_case
+    from screwsynth.nlp.codegen import generate_c
+    from screwsynth.nlp.errors import InputError
+    from screwsynth.nlp.files import write_folder
+
+    if language != "c":
+        raise InputError(f"--language {language}: only c is generated")
+    if precision != "double":
+        raise InputError(
+            f"--precision {precision}: only double is generated; in single precision, optimising over these functions "
+            "was tried and fails"
+        )
+    files = generate_c(load_case(case), find_case(case).read_text(encoding="utf-8"))
+    write_folder(out, files)
+    typer.echo(f"{len(files)} files in {out}: make -C {out} test")
+
+
+@app.command()
 def models(name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None) -> None:
     """List the robots, or show one with its parameters, options and wrenches."""
     from screwsynth.models import model_names

@@ -12,7 +12,7 @@ from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
 from screwsynth.nlp.case import Free
 from screwsynth.nlp.errors import EvaluationError
 from screwsynth.nlp.linear import plain_basis
-from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.program import Nlp, vanished
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
 ZERO_F = 1e-12
@@ -82,7 +82,7 @@ def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
     components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
     for row, square in zip(model.wrenches, squares.ravel(), strict=True):
         if not square > 0:
-            raise EvaluationError(f"{where}limb {row.limb!r} has zero length at this point: its two joints coincide")
+            raise EvaluationError(f"{where}{vanished(row)}, at this point")
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)

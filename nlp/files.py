@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from screwsynth.nlp.errors import InputError
@@ -45,6 +46,26 @@ def _replace(path: Path, text: str) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def write_folder(target: str, files: Mapping[str, str]) -> None:
+    """Write texts by file name into a folder, which is made when missing.
+
+    All of them are complete before the first appears under its name; other files in the folder stay.
+
+    Raises:
+        InputError: the folder cannot be made or written.
+    """
+    folder = Path(target)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
+            for name, text in files.items():
+                (Path(waiting) / name).write_text(text, encoding="utf-8")
+            for name in files:
+                (Path(waiting) / name).replace(folder / name)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
 
 
 def check_target(target: str) -> None:

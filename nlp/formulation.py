@@ -25,7 +25,7 @@ from screwsynth.models import Dimension, FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Free, Sense
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.layout import Bounded, Layout, free_directions, lay_out
-from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, Scalar
+from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, Scalar, vanished
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -167,5 +167,4 @@ def _check_limbs(nlp: Nlp) -> None:
     free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
     for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
         if not varies and not value > 0:
-            fault = f"limb {row.limb!r} has zero length: its two joints coincide"
-            raise CaseError("robot.parameters", fault, source=nlp.case.source)
+            raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)

@@ -178,8 +178,11 @@ def correct(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisation:
     return best
 
 
-def _residual(at: Linearisation, held: Sequence[int]) -> tuple[FloatArray, float]:
-    """Least-squares multipliers (k,) of the held sides, and the largest error of the stationarity conditions."""
+def _residual(at: Linearisation, held: list[int]) -> tuple[FloatArray, float]:
+    """Least-squares multipliers (k,) of the held sides, and the largest error of the stationarity conditions.
+
+    A held side counts by its distance: it is to be lain on, and not only kept.
+    """
     mu = np.zeros(len(at.sides))
     if held and np.isfinite(at.gradient).all():
         A = at.normals[held]
@@ -187,7 +190,8 @@ def _residual(at: Linearisation, held: Sequence[int]) -> tuple[FloatArray, float
         orthonormal = np.array_equal(A @ A.T, np.eye(len(held)))
         mu[held] = -A @ at.gradient if orthonormal else np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
     left = at.gradient + at.normals.T @ mu
-    return mu, max(float(np.max(np.abs(left), initial=0.0)), at.violation)
+    off = float(np.max(np.abs(at.residual[held]), initial=0.0)) if held else 0.0
+    return mu, max(float(np.max(np.abs(left), initial=0.0)), off, at.violation)
 
 
 def _pinned(nlp: Nlp, x: FloatArray, held: Sequence[int]) -> FloatArray:

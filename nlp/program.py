@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from screwsynth.models import Dimension, FloatArray, Model
+from screwsynth.models import Dimension, FloatArray, Model, Wrench, WrenchKind
 from screwsynth.nlp.case import Case, Sense
 from screwsynth.nlp.kernel import Kernel
 
@@ -56,6 +56,13 @@ class Constraint:
     name: str
     expression: SX
     reading: Reading
+
+
+def vanished(row: Wrench) -> str:
+    """Why a row whose direction is zero is none, for messages."""
+    if row.kind is WrenchKind.COUPLE:
+        return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
+    return f"limb {row.limb!r} has zero length: its two joints coincide"
 
 
 @dataclass(frozen=True, eq=False)

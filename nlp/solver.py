@@ -23,6 +23,8 @@ from screwsynth.nlp.sampling import starting_points
 #: Two optima are the same when their scaled objectives and points differ by less than these.
 SAME_VALUE = 1e-9
 _SAME_POINT = 1e-4
+#: A point that is better than the best optimum by more than this part of F's scale is no rounding of it.
+_BETTER = 1e-6
 
 
 class Status(enum.Enum):
@@ -163,10 +165,14 @@ def solve_nlp(
         if progress is not None:
             progress(len(done), len(points), best)
     done, optima = _sorted_out(nlp, done)
-    x = optima[0].x if optima else min(done, key=lambda start: (start.violation, start.stationarity)).x
+    beaten = _better_unconverged(nlp, done, optima)
+    if beaten is not None:
+        x = beaten.x
+    else:
+        x = optima[0].x if optima else min(done, key=lambda start: (start.violation, start.stationarity)).x
     evidence = examine(nlp, x)
     return Solution(
-        status=_status(evidence, bool(optima)),
+        status=_status(evidence, bool(optima) and beaten is None),
         nlp=nlp,
         x=frozen_array(x, (nlp.n,)),
         state=_state(nlp, x),
@@ -176,6 +182,19 @@ def solve_nlp(
         seed=search.seed,
         seconds=time.perf_counter() - began,
     )
+
+
+def _better_unconverged(nlp: Nlp, done: list[Start], optima: list[Optimum]) -> Start | None:
+    """A feasible point of a start that did not converge and that is better than every optimum found, if there is one.
+
+    Then the best optimum found is not the best there is, and must not be given for it.
+    """
+    feasible = [start for start in done if start.status is not StartStatus.CONVERGED and start.violation <= FEASIBLE]
+    if not (feasible and optima):
+        return None
+    best = min(feasible, key=lambda start: nlp.sign * start.F)
+    gain = nlp.sign * (optima[0].F - best.F)
+    return best if gain > _BETTER * nlp.objective_scale else None
 
 
 def _status(evidence: Evidence, converged: bool) -> Status:

@@ -12,8 +12,8 @@ Each way says what it costs: every task's F, rates and verdict at the combined p
 and every limit that is violated.
 
 Where a task's optimum is not unique, its ``q_j`` is arbitrary. It is then settled by the rule *nearest to the others*:
-the member of the optimal set nearest (in half ranges) to the mean of the other tasks' points, task after task until
-none moves, the tasks with the fewest flat directions first.
+the member of the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once,
+again and again until none moves: the order of the tasks means nothing.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import SAME_VALUE, Progress, Solution, Status, solve_nlp
 
-#: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale: far more than
-#: rounding, far less than what F loses on leaving the optimal set. The correction that follows takes it off again.
-_DRAWN = 1e-5
+#: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale, weaker and weaker:
+#: the point tends to the nearest of the optimal set, and the correction that follows takes the rest off.
+_DRAWN = (1e-5, 1e-7, 1e-9)
 #: Rounds of settling, and the movement in half ranges that ends it.
 _ROUNDS = 20
 _SETTLED = 1e-9
@@ -245,16 +245,14 @@ def _settled(
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
-    flats = [len(solution.evidence.flat) if solution.evidence else 0 for solution in own]
-    order = sorted((j for j in range(len(own)) if not unique[j]), key=lambda j: flats[j])
     for _ in range(_ROUNDS if notices else 0):
-        moved = 0.0
-        for j in order:
-            others = [point for k, point in enumerate(points) if k != j]
-            target = np.mean(others, axis=0)
-            following = _nearest(nlps[j], own[j], members[j], target, search)
-            moved = max(moved, float(np.max(np.abs(following - points[j]) / nlps[j].scale)))
-            points[j] = following
+        following = list(points)
+        for j in range(len(own)):
+            if not unique[j]:
+                target = np.mean([point for k, point in enumerate(points) if k != j], axis=0)
+                following[j] = _nearest(nlps[j], own[j], members[j], target, search)
+        moved = max(float(np.max(np.abs(a - b) / nlps[0].scale)) for a, b in zip(following, points, strict=True))
+        points = following
         if moved <= _SETTLED:
             break
     return points, unique, notices
@@ -287,13 +285,16 @@ def _nearest(
     closest = min(members, key=distance)
     if not _is_set(solution):
         return closest
-    drawn = solve_nlp(near(nlp, target, _DRAWN), replace(search, starts=1), first=[closest, target], jobs=1)
     best = nlp.evaluate(solution.x)[0]
-    for start in drawn.starts:
-        back = correct(nlp, start.x, linearise(nlp, start.x).active())
-        kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
-        if kept and distance(back.x) < distance(closest):
-            closest = back.x
+    points = [closest, target]
+    for strength in _DRAWN:
+        drawn = solve_nlp(near(nlp, target, strength), replace(search, starts=1), first=points, jobs=1)
+        points = [drawn.x]
+        for start in drawn.starts:
+            back = correct(nlp, start.x, linearise(nlp, start.x).active())
+            kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
+            if kept and distance(back.x) < distance(closest):
+                closest = back.x
     return closest
 
 

@@ -1,0 +1,532 @@
+"""Several tasks at once, against brute force over few variables, and against Eq. 15 by hand."""
+
+import itertools
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from screwsynth.models import stewart_gough, three_upu
+from screwsynth.nlp import (
+    Case,
+    CaseError,
+    Compromise,
+    Free,
+    Kind,
+    Method,
+    Rotation,
+    Status,
+    Task,
+    load_case,
+    solve,
+    solve_tasks,
+)
+from screwsynth.nlp.case import Value
+from screwsynth.nlp.cli import main
+
+Array = NDArray[np.float64]
+Objective = Callable[[Array], Array]
+Word = Literal["max", "min"]
+
+HALF = math.radians(30)
+FIXED: dict[str, float] = {
+    "x1": 12.0,
+    "x2": 8.0,
+    "x3": 0.4,
+    "x4": 0.15,
+    "p_x": 1.0,
+    "p_y": -2.0,
+    "p_z": 30.0,
+    "angle": 0.1,
+}
+RANGES: dict[str, tuple[float, float]] = {
+    "x2": (4.0, 12.0),
+    "x4": (0.0, HALF),
+    "p_x": (-15.0, 10.0),
+    "p_y": (-10.0, 15.0),
+    "p_z": (15.0, 50.0),
+    "angle": (-0.7, 0.5),
+}
+NAMES = tuple(FIXED)
+
+
+def values_of(x: Array, free: Sequence[str]) -> dict[str, Array]:
+    return {name: x[:, free.index(name)] if name in free else np.full(len(x), FIXED[name]) for name in NAMES}
+
+
+def objective_by_hand(x: Array, free: Sequence[str], twist: Array) -> Array:
+    """F of the aligned 6-6 platform turned about z, for points (N, n): its leg rates written out, no screws."""
+    at = values_of(x, free)
+    centre = np.stack([at["p_x"], at["p_y"], at["p_z"]], axis=1)
+    omega, v = twist[:3], twist[3:]
+    F = np.zeros(len(x))
+    for k, sign in itertools.product(range(3), (-1, 1)):
+        b, a = (2 * math.pi * k / 3 + sign * at[half] for half in ("x3", "x4"))
+        a = a + at["angle"]
+        none = np.zeros(len(x))
+        B = at["x1"][:, None] * np.stack([np.cos(b), np.sin(b), none], axis=1)
+        A = centre + at["x2"][:, None] * np.stack([np.cos(a), np.sin(a), none], axis=1)
+        # d|A - B| / dt while A moves with the platform.
+        F += np.sum((A - B) * (v + np.cross(omega, A)), axis=1) ** 2 / np.sum((A - B) ** 2, axis=1)
+    return F
+
+
+def brute_force(objective: Objective, free: Sequence[str]) -> float:
+    """Largest value over the box: a grid, then random points in shrinking boxes about the best places of it."""
+    lower, upper = (np.array([RANGES[name][end] for name in free]) for end in (0, 1))
+    count = {2: 61, 3: 21}[len(free)]
+    axes = [np.linspace(*RANGES[name], count) for name in free]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(free))
+    order = np.argsort(-objective(points))
+    seeds: list[Array] = []
+    for x in points[order[:2000]]:
+        if all(np.max(np.abs(x - seed) / (upper - lower)) > 0.15 for seed in seeds):
+            seeds.append(x)
+        if len(seeds) == 3:
+            break
+    centres = np.array(seeds)
+    best = objective(centres)
+    generator, reach = np.random.default_rng(0), 0.1
+    for _ in range(90):
+        steps = reach * (upper - lower) * generator.uniform(-1, 1, (len(centres), 80, len(free)))
+        tried = np.clip(centres[:, None] + steps, lower, upper)
+        values = objective(tried.reshape(-1, len(free))).reshape(len(centres), 80)
+        which = np.argmax(values, axis=1)
+        rows = np.arange(len(centres))
+        better = values[rows, which] > best
+        centres[better], best = tried[rows, which][better], np.maximum(best, values[rows, which])
+        reach *= 0.86
+    return float(best.max())
+
+
+def case_of(free: Sequence[str], tasks: Sequence[Task], method: Method = Method.AVERAGE) -> Case:
+    values: dict[str, Value] = {name: Free(*RANGES[name]) if name in free else FIXED[name] for name in NAMES}
+    return Case(
+        model=stewart_gough(),
+        parameters={name: values[name] for name in ("x1", "x2", "x3", "x4")},
+        position=[values[name] for name in ("p_x", "p_y", "p_z")],
+        rotation=Rotation([0, 0, 1], values["angle"]),
+        tasks=list(tasks),
+        method=method,
+    )
+
+
+def random_tasks(seed: int, senses: Sequence[Word], weights: Sequence[float]) -> list[Task]:
+    generator = np.random.default_rng(seed)
+    return [
+        Task.screw(
+            sense,
+            axis=generator.normal(size=3),
+            point=8 * generator.normal(size=3),
+            pitch=4 * generator.normal(),
+            name=f"task {j}",
+            weight=weight,
+        )
+        for j, (sense, weight) in enumerate(zip(senses, weights, strict=True))
+    ]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One combination of variables, senses and weights."""
+
+    free: tuple[str, ...]
+    senses: tuple[Word, ...]
+    weights: tuple[float, ...]
+    seed: int
+
+    def tasks(self) -> list[Task]:
+        return random_tasks(self.seed, self.senses, self.weights)
+
+    def scaled(self) -> Array:
+        return np.array(self.weights) * len(self.weights) / sum(self.weights)
+
+    @cached_property
+    def twists(self) -> list[Array]:
+        return [np.asarray(task.twist) for task in self.tasks()]
+
+    def F(self, x: Array) -> Array:  # noqa: N802 - the objective's name
+        return np.array([objective_by_hand(x, self.free, twist) for twist in self.twists])
+
+    @cached_property
+    def own(self) -> Array:
+        signs = [1.0 if sense == "max" else -1.0 for sense in self.senses]
+        best = []
+        for sign, twist in zip(signs, self.twists, strict=True):
+            best.append(sign * brute_force(partial(self._signed, sign, twist), self.free))
+        return np.array(best)
+
+    def _signed(self, sign: float, twist: Array, x: Array) -> Array:
+        return sign * objective_by_hand(x, self.free, twist)
+
+
+SETTINGS = [
+    Setting(("p_x", "p_y"), ("max", "max"), (1, 1), 1),
+    Setting(("p_x", "p_y"), ("min", "min"), (1, 1), 2),
+    Setting(("p_x", "p_y"), ("max", "min"), (1, 1), 3),
+    Setting(("x2", "x4"), ("max", "max", "max"), (1, 3, 2), 4),
+    Setting(("x2", "x4", "p_z"), ("min", "min"), (0.5, 1.5), 5),
+    Setting(("p_x", "p_y", "angle"), ("max", "max"), (1, 2), 6),
+    Setting(("p_x", "p_y", "angle"), ("min", "max", "min"), (2, 1, 3), 7),
+    Setting(("p_y", "p_z", "angle"), ("min", "min", "min"), (5, 1, 1), 8),
+]
+
+
+def solved(setting: Setting, method: Method) -> Compromise:
+    return solve_tasks(case_of(setting.free, setting.tasks(), method), starts=8, jobs=1)
+
+
+def check_outcomes(found: Compromise, setting: Setting, own: Array) -> Array:
+    """Every task's F, rates, weight and loss at the combined point; returns the F by hand."""
+    F = setting.F(found.x[None])[:, 0]
+    for j, outcome in enumerate(found.outcomes):
+        assert outcome.state is not None
+        assert pytest.approx(F[j], rel=1e-11) == outcome.state.F
+        assert float(outcome.state.rates @ outcome.state.rates) == pytest.approx(F[j], rel=1e-11)
+        assert outcome.task.weight == pytest.approx(setting.scaled()[j], rel=1e-15)
+        sign = 1 if setting.senses[j] == "max" else -1
+        size = outcome.own.nlp.objective_scale
+        # Brute force comes near to a task's own optimum from below; the loss is against the optimum itself.
+        assert -1e-9 * size <= sign * (outcome.own.F - own[j]) <= 1e-5 * abs(own[j]) + 1e-9 * size
+        assert outcome.loss == pytest.approx(sign * (outcome.own.F - F[j]), abs=1e-12 * size)
+        assert outcome.loss >= -1e-9 * size
+    return F
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_the_weighted_sum_is_the_best_there_is(setting: Setting) -> None:
+    found = solved(setting, Method.WEIGHTED_SUM)
+    assert found.status is Status.OPTIMAL
+    own = setting.own
+    F = check_outcomes(found, setting, own)
+    mixed = len(set(setting.senses)) > 1
+    counted = np.array([-1.0 if sense == "min" and mixed else 1.0 for sense in setting.senses]) * setting.scaled()
+    better = -1.0 if setting.senses[0] == "min" and not mixed else 1.0
+    best = better * brute_force(lambda x: better * (counted @ setting.F(x)), setting.free)
+    assert found.value == pytest.approx(float(counted @ F), rel=1e-11)
+    assert found.value is not None
+    size = float(np.abs(counted) @ F)
+    assert -1e-9 * size <= better * (found.value - best) <= 1e-5 * size
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_the_worst_task_is_as_good_as_it_can_be(setting: Setting) -> None:
+    found = solved(setting, Method.WORST_CASE)
+    assert found.status is Status.OPTIMAL
+    own = setting.own
+    F = check_outcomes(found, setting, own)
+    best_own = np.array([outcome.own.F for outcome in found.outcomes])
+    w = setting.scaled()[:, None]
+
+    def level(values: Array) -> Array:
+        """What is to be as large as possible, from F (tasks, N)."""
+        if set(setting.senses) == {"max"}:
+            return np.asarray(np.min(values / w, axis=0))
+        if set(setting.senses) == {"min"}:
+            return np.asarray(-np.max(w * values, axis=0))
+        signs = np.array([1.0 if sense == "max" else -1.0 for sense in setting.senses])[:, None]
+        return np.asarray(-np.max(w * signs * (best_own[:, None] - values), axis=0))
+
+    best = brute_force(lambda x: level(setting.F(x)), setting.free)
+    sign = 1.0 if set(setting.senses) == {"max"} else -1.0
+    reached = float(level(F[:, None])[0])
+    assert found.value is not None
+    size = max(abs(best), 1e-3 * max(outcome.own.nlp.objective_scale for outcome in found.outcomes))
+    assert sign * found.value == pytest.approx(reached, abs=1e-8 * size)
+    assert -1e-8 * size <= reached - best <= 1e-5 * size
+
+
+def test_averages_of_lengths_and_of_an_angle_about_a_held_axis_are_those_of_equation_15() -> None:
+    free = ("p_x", "p_y", "angle")
+    tasks = random_tasks(21, ("max", "min", "max"), (1.0, 0.5, 1.5))
+    alone = [solve(case_of(free, [task]), starts=12, jobs=1) for task in tasks]
+    found = solve_tasks(case_of(free, tasks), starts=12, jobs=1)
+    assert found.status is Status.AVERAGED
+    assert found.value is None
+    assert found.notices == ()
+    assert all(outcome.unique for outcome in found.outcomes)
+    by_hand = (1.0 * alone[0].x + 0.5 * alone[1].x + 1.5 * alone[2].x) / 3
+    np.testing.assert_allclose(found.x, by_hand, atol=1e-12)
+    assert np.max(np.abs(alone[0].x - alone[1].x)) > 0.1  # or the average would be any of them
+    state = found.outcomes[0].state
+    assert state is not None
+    np.testing.assert_allclose([*state.position[:2], state.angle], by_hand, atol=1e-12)
+    for outcome, task, solution in zip(found.outcomes, tasks, alone, strict=True):
+        F = float(objective_by_hand(by_hand[None], free, np.asarray(task.twist))[0])
+        assert outcome.state is not None
+        assert pytest.approx(F, rel=1e-11) == outcome.state.F
+        loss = solution.F - F if task.sense.value == "max" else F - solution.F
+        assert outcome.loss == pytest.approx(loss, abs=1e-12 * outcome.own.nlp.objective_scale)
+
+
+@pytest.mark.parametrize("method", list(Method))
+@pytest.mark.parametrize("factor", [1e-9, 0.1, 1e9])
+def test_only_the_proportions_of_weights_count_and_a_notice_says_so(method: Method, factor: float) -> None:
+    free = ("p_x", "p_y")
+    tasks = random_tasks(22, ("max", "max"), (0.5, 1.5))
+    plain = solve_tasks(case_of(free, tasks, method), starts=4, jobs=1)
+    scaled = [replace(task, weight=factor * task.weight) for task in tasks]
+    found = solve_tasks(case_of(free, scaled, method), starts=4, jobs=1)
+    assert plain.notices == ()
+    assert len(found.notices) == 1
+    assert "scaled to sum to 2, the number of tasks: 0.5, 1.5" in found.notices[0]
+    assert f"sum to {2 * factor:g}" in found.notices[0]
+    np.testing.assert_allclose(found.x, plain.x, atol=1e-9)
+    assert [outcome.task.weight for outcome in found.outcomes] == pytest.approx([0.5, 1.5], rel=1e-15)
+
+
+def free_axis(tasks: Sequence[Task], angle: Free) -> Case:
+    case = case_of((), tasks)
+    return replace(case, rotation=Rotation(None, angle))
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.2, 1.8), (0.5, 1.0, 1.5)], ids=str)
+@pytest.mark.parametrize("largest", [0.4, 1.5])
+def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: float) -> None:
+    tasks = random_tasks(23, (["max", "min", "max"])[: len(weights)], weights)  # type: ignore[arg-type]
+    case = free_axis(tasks, Free(-largest, largest))
+    found = solve_tasks(case, starts=6, jobs=1)
+    rotations = []
+    for task in tasks:
+        alone = solve(replace(case, tasks=[task]), starts=6, jobs=1).state
+        assert alone is not None
+        rotations.append(alone.rotation)
+    assert all(outcome.unique for outcome in found.outcomes)
+    # The rotation nearest to the weighted mean of the matrices, by its singular values.
+    mean = sum(w * R for w, R in zip(weights, rotations, strict=True))
+    U, _, Vt = np.linalg.svd(mean)
+    nearest = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+    state = found.outcomes[0].state
+    assert state is not None
+    np.testing.assert_allclose(state.rotation, nearest, atol=1e-12)
+    # It is not what averaging quaternion vectors or rotation vectors would give.
+    assert np.max(np.abs(rotations[0] - rotations[1])) > 0.05
+    assert found.status is Status.AVERAGED
+    assert found.violated == ()
+
+
+def test_an_average_that_turns_too_little_is_reported() -> None:
+    # Rotations of at least 0.3 about any axis are no convex set: about opposite axes they average to nothing.
+    tasks = random_tasks(24, ("max", "min"), (1.0, 1.0))
+    found = solve_tasks(free_axis(tasks, Free(0.3, 0.5)), starts=6, jobs=1)
+    state = found.outcomes[0].state
+    assert state is not None
+    assert state.angle < 0.3 - 1e-3
+    assert found.status is Status.INFEASIBLE
+    assert found.violated == ("angle",)
+    assert all(outcome.evidence.kind is Kind.INFEASIBLE for outcome in found.outcomes)
+
+
+PARK: dict[str, Any] = {
+    "base_radius": 50.0,
+    "platform_radius": 25.0,
+    "u1_2": [-0.5, math.sqrt(0.75), 0.0],
+    "u1_3": [-0.5, -math.sqrt(0.75), 0.0],
+    "u2_2": [math.sqrt(0.75), 0.5, 0.0],
+    "u2_3": [-math.sqrt(0.75), 0.5, 0.0],
+}
+
+
+def couple_case(axes: Literal["free", "limb"], parameters: dict[str, Any], seed: int, count: int) -> Case:
+    generator = np.random.default_rng(seed)
+    tasks = [
+        Task.screw("max", axis=generator.normal(size=3), point=[0, 0, 100], pitch=0, name=f"turn {j}")
+        for j in range(count)
+    ]
+    return Case(model=three_upu(axes=axes), parameters=parameters, position=[0, 0, 50], tasks=tasks)
+
+
+def test_averaging_breaks_orthogonality_and_that_is_reported() -> None:
+    direction = [Free(-1, 1)] * 3
+    found = solve_tasks(couple_case("free", {**PARK, "u1_1": direction, "u2_1": direction}, 3, 3), starts=4, jobs=1)
+    assert found.status is Status.INFEASIBLE
+    assert not found.status.is_answer
+    assert found.violated == ("u1_1 . u2_1",)
+    first, second = found.x[:3], found.x[3:]
+    assert abs(float(first @ second)) > 1e-3
+    # The directions themselves are unit vectors, along the mean of the tasks' own.
+    for own, mean in ((slice(0, 3), first), (slice(3, 6), second)):
+        total = np.sum([outcome.x[own] for outcome in found.outcomes], axis=0)
+        np.testing.assert_allclose(mean, total / np.linalg.norm(total), atol=1e-14)
+    for outcome in found.outcomes:
+        assert outcome.evidence.kind is Kind.INFEASIBLE
+        assert outcome.state is not None
+        assert math.isfinite(outcome.loss)
+
+
+@pytest.mark.parametrize("method", [Method.WEIGHTED_SUM, Method.WORST_CASE])
+def test_one_program_for_all_tasks_keeps_what_averaging_breaks(method: Method) -> None:
+    direction = [Free(-1, 1)] * 3
+    case = couple_case("free", {**PARK, "u1_1": direction, "u2_1": direction}, 3, 2)
+    found = solve_tasks(replace(case, method=method), starts=4, jobs=1)
+    assert found.status is Status.OPTIMAL
+    assert found.violated == ()
+    first, second = found.x[:3], found.x[3:]
+    assert abs(float(first @ second)) < 1e-12
+    # One couple u and two tasks; the fixed rest of F is the same for all u. Scan the sphere.
+    state = [outcome.state for outcome in found.outcomes]
+    assert state[0] is not None
+    assert state[1] is not None
+    u = np.cross(first, second)
+    omegas = np.array([np.asarray(task.twist)[:3] for task in case.tasks])
+    rest = np.array([s.F for s in state if s is not None]) - (omegas @ u) ** 2
+    z, t = np.meshgrid(np.linspace(-1, 1, 401), np.linspace(0, 2 * math.pi, 801))
+    sphere = np.stack([np.sqrt(1 - z**2) * np.cos(t), np.sqrt(1 - z**2) * np.sin(t), z], axis=-1).reshape(-1, 3)
+    values = rest + (sphere @ omegas.T) ** 2
+    combined = values.sum(axis=1) if method is Method.WEIGHTED_SUM else values.min(axis=1)
+    assert found.value is not None
+    assert found.value >= combined.max() - 1e-9
+    # The grid's steps are 1/200 and 1/127; a kink loses a step's length times a slope of at most 2.
+    assert found.value <= combined.max() + (1e-3 if method is Method.WEIGHTED_SUM else 2e-2)
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_the_peg_in_hole_robot_serves_both_of_its_tasks_in_full(method: Method) -> None:
+    found = solve_tasks(replace(load_case("paper-4.2"), method=method), starts=8, jobs=1)
+    assert found.status is (Status.AVERAGED if method is Method.AVERAGE else Status.OPTIMAL)
+    x1, x2, x3, x4 = found.x
+    # F of the push falls by the square of these differences over the height of 40: 6e-9 of 6 is some 1e-4 of x1 - x2.
+    assert x1 == pytest.approx(x2, abs=1e-4)
+    assert x3 == pytest.approx(x4, abs=1e-6)
+    push, turn = found.outcomes
+    assert push.state is not None
+    assert turn.state is not None
+    assert pytest.approx(6, rel=1e-11) == push.state.F
+    assert turn.state.F < 1e-10
+    assert not push.unique
+    assert not turn.unique
+    assert sum("is not unique" in notice and "nearest" in notice for notice in found.notices) == 2
+    # The member that was used is one and the same, on both optimal sets.
+    np.testing.assert_allclose(push.x, turn.x, atol=1e-7)
+    assert turn.x[2] == pytest.approx(turn.x[3], abs=1e-9)
+    assert push.x[0] == pytest.approx(push.x[1], abs=1e-6)
+
+
+TURN = Task.screw("min", axis=[0, 0, 1], point=[0, 0, 0], pitch=0, name="turn")
+
+
+def peg(parameters: dict[str, Any], tasks: Sequence[Task]) -> Case:
+    return replace(load_case("paper-4.2"), parameters=parameters, tasks=list(tasks), method=Method.AVERAGE)
+
+
+#: Half angles of unequal ranges, so that half ranges are no multiple of radians.
+ANGLES: dict[str, Any] = {"x3": Free(0, HALF), "x4": Free(0, HALF / 2)}
+
+
+@pytest.mark.parametrize(
+    "radii",
+    [
+        pytest.param({"x1": 6.0, "x2": 5.0}, id="angles only"),
+        pytest.param({"x1": Free(5, 6), "x2": 5.0}, id="one radius"),
+        pytest.param({"x1": Free(2, 6), "x2": Free(3, 9)}, id="both radii"),
+    ],
+)
+def test_the_member_nearest_to_the_others_is_the_orthogonal_projection(radii: dict[str, Any]) -> None:
+    # The turn about z meets no resistance wherever x3 = x4, whatever the radii: its moment arms are
+    # x1 x2 sin(x4 - x3) / length. The other task has one optimum.
+    skew = Task.screw("min", axis=[1, 2, 3], point=[3, -2, 5], pitch=2, name="skew")
+    found = solve_tasks(peg({**radii, **ANGLES}, [TURN, skew]), starts=8, jobs=1)
+    turn, other = found.outcomes
+    assert other.unique
+    assert not turn.unique
+    assert abs(float(other.x[-1] - other.x[-2])) > 0.05
+    # Half ranges: 15 and 7.5 degrees. Nearest t to (x3, x4): minimise (t - x3)^2 / 15^2 + (t - x4)^2 / 7.5^2.
+    t = (other.x[-2] + 4 * other.x[-1]) / 5
+    assert 0 <= t <= HALF / 2
+    expected = [*other.x[:-2], t, t]
+    scale = np.asarray(turn.own.nlp.scale)
+    np.testing.assert_allclose(turn.x / scale, expected / scale, atol=1e-5)
+    np.testing.assert_allclose(found.x, (turn.x + other.x) / 2, atol=1e-14)
+    assert [notice for notice in found.notices if "not unique" in notice] == [
+        "the optimum of 'turn' is not unique: the one nearest to the other tasks' optima was used"
+    ]
+
+
+def same_but_for_order(case: Case, orders: Iterable[Sequence[Task]], starts: int, atol: float) -> None:
+    points = []
+    for order in orders:
+        found = solve_tasks(replace(case, tasks=list(order)), starts=starts, jobs=1)
+        assert [outcome.task.name for outcome in found.outcomes] == [task.name for task in order]
+        points.append(found.x)
+    scale = found.outcomes[0].own.nlp.scale
+    for x in points[1:]:
+        np.testing.assert_allclose(x / scale, points[0] / scale, atol=atol)
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_the_order_of_tasks_does_not_matter(method: Method) -> None:
+    tasks = random_tasks(25, ("max", "min", "max"), (1.0, 2.0, 0.5))
+    # F is flat at an optimum: a scaled stationarity of 1e-7 leaves 1e-6 or so of the point.
+    same_but_for_order(case_of(("p_x", "p_y", "angle"), tasks, method), itertools.permutations(tasks), 4, 1e-6)
+
+
+def test_the_order_of_tasks_does_not_matter_to_an_average_of_optimal_sets() -> None:
+    # Three tasks, none with one optimum: x1 = x2 and x3 = x4, or x3 = x4 alone.
+    radii: dict[str, Any] = {"x1": Free(2, 6), "x2": Free(3, 9)}
+    push, _ = load_case("paper-4.2").tasks
+    side = Task.screw("min", axis=[1, 0, 0], pitch=math.inf, name="side")
+    tasks = [push, TURN, side]
+    same_but_for_order(peg({**radii, **ANGLES}, tasks), [tasks, tasks[::-1]], 6, 1e-5)
+
+
+def test_one_task_alone_is_refused() -> None:
+    case = case_of(("p_x",), random_tasks(26, ("max",), (1.0,)))
+    with pytest.raises(CaseError, match="several are needed"):
+        solve_tasks(case)
+
+
+def test_several_tasks_are_refused_by_the_solver_of_one() -> None:
+    case = case_of(("p_x",), random_tasks(26, ("max", "min"), (1.0, 1.0)))
+    with pytest.raises(CaseError, match="solve_tasks"):
+        solve(case)
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_nothing_free_is_refused(method: Method) -> None:
+    case = case_of((), random_tasks(26, ("max", "min"), (1.0, 1.0)), method)
+    with pytest.raises(CaseError, match="nothing free"):
+        solve_tasks(case)
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, math.nan, math.inf])
+def test_a_weight_that_is_not_positive_is_refused(weight: float) -> None:
+    with pytest.raises(CaseError, match=r"task\[1\]\.weight.*positive"):
+        case_of(("p_x",), random_tasks(26, ("max", "min"), (1.0, weight)))
+
+
+def test_the_command_line_writes_tasks_and_their_combination_as_strict_json(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["screwsynth", "solve", "paper-4.2", "--json", "-", "--starts", "4"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    out, err = capfd.readouterr()
+    assert err == ""
+
+    def no_constant(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    result = json.loads(out, parse_constant=no_constant)
+    assert result["status"] == "averaged"
+    assert [task["status"] for task in result["tasks"]] == ["optimal", "optimal"]
+    assert [task["F"] for task in result["tasks"]] == pytest.approx([6, 0], abs=1e-11)
+    assert [task["task"]["name"] for task in result["tasks"]] == ["push along the normal", "turn about the normal"]
+    assert result["tasks"][0]["task"]["pitch"] == "inf"
+    combined = result["combined"]
+    assert combined["method"] == "average"
+    assert combined["value"] is None
+    assert combined["violated"] == []
+    assert len(combined["notices"]) == 2
+    assert [task["F"] for task in combined["tasks"]] == pytest.approx([6, 0], abs=1e-11)
+    assert [task["unique"] for task in combined["tasks"]] == [False, False]
+    assert combined["parameters"]["x3"] == pytest.approx(15, abs=1e-6)
+    assert combined["parameters"]["x1"] == pytest.approx(combined["parameters"]["x2"], abs=1e-6)
+    assert combined["rank"] == 3
