@@ -56,8 +56,13 @@ def unit_vector(vector: ArrayLike) -> FloatArray:
 
     Args:
         vector: (3,) finite numbers, not all zero.
+
+    Raises:
+        ValueError: the vector is zero or not finite.
     """
     v = frozen_array(vector, (3,))
+    if not (np.isfinite(v).all() and v.any()):
+        raise ValueError("a direction must be finite and not zero")
     scaled = v / np.abs(v).max()
     return frozen_array(scaled / np.linalg.norm(scaled), (3,))
 

@@ -57,6 +57,14 @@ class Free:
 Value: TypeAlias = float | Free
 
 
+def sizes_of_turn(angle: Value) -> tuple[float, float]:
+    """Smallest and largest size, radians, of a rotation whose axis is free, where an angle's sign means nothing."""
+    if not isinstance(angle, Free):
+        return abs(angle), abs(angle)
+    sizes = sorted((abs(angle.lower), abs(angle.upper)))
+    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
+
+
 @dataclass(frozen=True, eq=False)
 class Rotation:
     """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
@@ -142,6 +150,21 @@ class Search:
     starts: int = 32
     seed: int = 0
     max_iterations: int = 500
+
+    def __post_init__(self) -> None:
+        for key, value, least in (
+            ("starts", self.starts, 1),
+            ("seed", self.seed, 0),
+            ("max_iterations", self.max_iterations, 1),
+        ):
+            if value < least:
+                raise CaseError(f"solve.{key}", f"must be at least {least}", value)
+
+    def but(self, starts: int | None, seed: int | None) -> Search:
+        """The same search with another number of starts or seed, where they are given."""
+        return Search(
+            self.starts if starts is None else starts, self.seed if seed is None else seed, self.max_iterations
+        )
 
 
 @dataclass(frozen=True)

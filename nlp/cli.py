@@ -99,9 +99,12 @@ def check(
     """Hold cases to their expected and published values."""
     from screwsynth.nlp import checkreport
     from screwsynth.nlp.casefile import shipped_cases
+    from screwsynth.nlp.errors import InputError
     from screwsynth.nlp.files import write_text
     from screwsynth.nlp.regress import check_case
 
+    if [json_file, junit, "-" if markdown else None].count("-") > 1:
+        raise InputError("standard output can take one of --json -, --junit - and --markdown only")
     for target in (json_file, junit):
         _check_target(target)
     gc.enable()
@@ -136,18 +139,21 @@ def evaluate(
     from screwsynth.nlp import evaluation
     from screwsynth.nlp.casefile import load_case
     from screwsynth.nlp.formulation import formulate
+    from screwsynth.nlp.kkt import assembled
     from screwsynth.nlp.result import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
     nlps = [formulate(loaded, task) for task in range(len(loaded.tasks))]
-    result = evaluation_of(loaded, [evaluation.evaluate(nlp, nlp.start) for nlp in nlps])
+    x = assembled(nlps[0], nlps[0].start)
+    result = evaluation_of(nlps, x, [evaluation.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         _write_json(json_file, result)
     if json_file != "-":
         from screwsynth.nlp.tables import print_state
 
         print_state(_console(), loaded, result)
+    raise typer.Exit(1 if result["violated"] else 0)
 
 
 @app.command()
@@ -218,6 +224,8 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Collecting garbage while modules are loaded finds none, and takes a twentieth of a short command's time.
     gc.disable()
+    # Between two calls of Ipopt a thread needs the interpreter for a moment only, and must not wait long for it.
+    sys.setswitchinterval(5e-4)
     for stream in (sys.stdout, sys.stderr):
         # A terminal that cannot show a letter of a title shows its escape instead.
         if isinstance(stream, io.TextIOWrapper):

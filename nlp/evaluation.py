@@ -35,7 +35,7 @@ class RobotState:
         F: ``sum(rates^2)``.
         size: what F would be without cancellation; F is zero when it is small beside this.
         singular_values: (min(m, 6),) of the Jacobian as it stands, largest first.
-        rank: of the Jacobian with moments divided by their longest arm.
+        rank: of the Jacobian with moments about the platform's origin, divided by their longest arm.
         free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in plain terms.
         quantities: the model's named measures, each (n,); radians for angles.
     """
@@ -89,7 +89,7 @@ def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
     if case.axis is not None:
         held = case.rotation.angle
         axis, angle = case.axis, float(x[nlp.program.index("angle")]) if isinstance(held, Free) else held
-    rank, free_twists = _rank(jacobian)
+    rank, free_twists = _rank(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
     parts = np.split(components.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
@@ -117,12 +117,14 @@ def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
     )
 
 
-def _rank(jacobian: FloatArray) -> tuple[int, FloatArray]:
-    """Rank and free twists of J with its moments divided by their longest arm."""
-    arm = float(np.max(np.linalg.norm(jacobian[:, 3:], axis=1))) or 1.0
+def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
+    """Rank and free twists of J with its moments about the platform's origin, divided by their longest arm."""
+    moments = jacobian[:, 3:] - np.cross(centre, jacobian[:, :3])
+    arm = float(np.max(np.linalg.norm(moments, axis=1))) or 1.0
     # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
-    resistance = np.hstack([jacobian[:, 3:] / arm, jacobian[:, :3]])
+    resistance = np.hstack([moments / arm, jacobian[:, :3]])
     _, values, rows = np.linalg.svd(resistance)
     rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
     null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
+    null[:, 3:] -= np.cross(null[:, :3], centre)
     return rank, plain_basis(null) if len(null) else np.zeros((0, 6))

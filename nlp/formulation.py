@@ -82,6 +82,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
     sheet, senses = layout.sheet, {task.sense for task in case.tasks}
     level = sheet.place("level", Dimension.NUMBER, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling))
     size = sheet.place("ceiling", Dimension.NUMBER, ceiling)
+    reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
     constraints = []
     for j, task in enumerate(case.tasks):
         F = layout.robot.F[j]
@@ -94,7 +95,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         else:
             room = level - weight * (own - F if task.sense is Sense.MAX else F - own)
         # In parts of the ceiling, so that the rows are of order 1 like the scaled variables.
-        constraints.append(Bounded(Constraint(task.name, room / size, Reading(Dimension.NUMBER)), 0.0, math.inf))
+        constraints.append(Bounded(Constraint(f"task {task.name}", room / size, reading), 0.0, math.inf))
     return assemble(layout, level, Sense.MAX if senses == {Sense.MAX} else Sense.MIN, constraints)
 
 

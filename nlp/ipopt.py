@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import enum
 import os
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -30,8 +29,6 @@ _IPOPT_TOLERANCE = 1e-8
 _NEAR = 1e-2
 #: A second thread is worth its own solver from this many starts on.
 _STARTS_PER_JOB = 12
-#: How long a thread may keep the interpreter while another wants it, in seconds: a tenth of a search.
-_SWITCH_INTERVAL = 5e-4
 
 
 class StartStatus(enum.Enum):
@@ -68,7 +65,7 @@ class Start:
 
 def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None) -> Iterator[Start]:
     """One :class:`Start` for each point, in their order."""
-    threads = jobs or min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
+    threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
     # CasADi's symbols are not safe to share between threads: the solvers are all built here, and only run there.
     solvers: SimpleQueue[ca.Function] = SimpleQueue()
     for _ in range(min(threads, len(points))):
@@ -91,15 +88,9 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
         for point in points:
             yield _judged(nlp, *search(point))
         return
-    # Between two calls of Ipopt a thread needs the interpreter for a moment only, so it must not wait long for it.
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(min(interval, _SWITCH_INTERVAL))
-    try:
-        with ThreadPoolExecutor(threads) as pool:
-            for outcome in pool.map(search, points):
-                yield _judged(nlp, *outcome)
-    finally:
-        sys.setswitchinterval(interval)
+    with ThreadPoolExecutor(threads) as pool:
+        for outcome in pool.map(search, points):
+            yield _judged(nlp, *outcome)
 
 
 def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:

@@ -232,3 +232,19 @@ def _newton_step(nlp: Nlp, at: Linearisation, held: list[int], mu: FloatArray, e
             held += met
             return after
     return None
+
+
+def assembled(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """The point (n,) nearest to the given one, to first order, at which the program's equations hold.
+
+    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
+    it does not get there, what it reached.
+    """
+    at = linearise(nlp, x)
+    for _ in range(_NEWTON_STEPS):
+        rows = np.flatnonzero(nlp.sides.equal)
+        if not len(rows) or np.max(np.abs(at.residual[rows])) <= _ROUNDING or not np.isfinite(at.violation):
+            break
+        step = np.linalg.lstsq(at.normals[rows], -at.residual[rows], rcond=None)[0]
+        at = linearise(nlp, np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper))
+    return at.x

@@ -31,7 +31,7 @@ from screwsynth.models import (
     matrix_from_axis_angle,
     matrix_from_quaternion_vector,
 )
-from screwsynth.nlp.case import Case, Free, Task, Value
+from screwsynth.nlp.case import Case, Free, Task, Value, sizes_of_turn
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.program import Constraint, Reading, RobotExpressions, Scalar
 
@@ -42,6 +42,10 @@ ROTATION_ANGLE = Reading(
     slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
 )
 
+#: The constraint ``|u|^2 = 1`` read as the length itself.
+_LENGTH_OF_DIRECTION = Reading(
+    Dimension.NUMBER, from_value=lambda value: math.sqrt(max(value, 0.0)), slope=lambda value: 2 * math.sqrt(value)
+)
 #: How far a component of a free unit vector may go as a variable.
 _ROOM = 1.25
 #: How well an equation among fixed numbers must hold: they are written with a dozen digits.
@@ -116,7 +120,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
     symbols = _Symbols(ca.vertcat(SX(0, 1), *placed), ca.vertcat(SX(0, 1), *unknowns), rotation, position)
     robot, closure = _robot(model, symbols, length, twists)
     constraints += [
-        Bounded(Constraint(f"|{item.name}|", ca.sumsqr(symbol), Reading(Dimension.NUMBER)), 1.0, 1.0)
+        Bounded(Constraint(f"|{item.name}|", ca.sumsqr(symbol), _LENGTH_OF_DIRECTION), 1.0, 1.0)
         for item, symbol in zip(model.parameters, placed, strict=True)
         if item.is_direction
     ]
@@ -181,25 +185,19 @@ def _rotation(case: Case, sheet: Sheet) -> tuple[SX, list[Bounded]]:
     if axis is not None:
         n = sheet.place_all("axis", Dimension.NUMBER, [float(c) for c in axis])
         return matrix_from_axis_angle(n, sheet.place("angle", Dimension.ANGLE, angle)), []
-    smallest, largest = _angle_range(angle)
+    smallest, largest = sizes_of_turn(angle)
     radius = math.sin(largest / 2)
     if radius == 0:
         q = sheet.place_all("q", Dimension.NUMBER, (0.0, 0.0, 0.0))
         return matrix_from_quaternion_vector(q), []
     inner = math.sin(smallest / 2)
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
-    along_z = Free(-radius, radius, math.sin(start / 2))
-    q = sheet.place_all("q", Dimension.NUMBER, (*[Free(-radius, radius)] * 2, along_z))
+    # The ball implies |q_x| <= radius and so on: bounds that touched it would share its multiplier where it binds.
+    room = min(_ROOM * radius, 1.0)
+    along_z = Free(-room, room, math.sin(start / 2))
+    q = sheet.place_all("q", Dimension.NUMBER, (Free(-room, room), Free(-room, room), along_z))
     ball = Constraint("angle", ca.sumsqr(q), ROTATION_ANGLE)
     return matrix_from_quaternion_vector(q), [Bounded(ball, inner**2 if inner else -math.inf, radius**2)]
-
-
-def _angle_range(angle: Value) -> tuple[float, float]:
-    """Smallest and largest size of a rotation whose axis is free, where an angle's sign means nothing."""
-    if not isinstance(angle, Free):
-        return abs(angle), abs(angle)
-    sizes = sorted((abs(angle.lower), abs(angle.upper)))
-    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +241,11 @@ def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tup
             sum(
                 (
                     scale**2
-                    * (ca.norm_2(moment[:, i]) * ca.norm_2(omega) + ca.norm_2(force[:, i]) * ca.norm_2(v)) ** 2
+                    * (
+                        ca.norm_2(moment[:, i] - ca.cross(put.position, force[:, i])) * ca.norm_2(omega)
+                        + ca.norm_2(force[:, i]) * ca.norm_2(v + ca.cross(omega, put.position))
+                    )
+                    ** 2
                     / square[i]
                     for i, scale in enumerate(couple_scale)
                 ),

@@ -33,8 +33,13 @@ STRONG = 1e-9
 CURVED = 1e-8
 #: How far a flat direction is followed to see whether F really stays, in half ranges.
 _PROBE = 0.02
-#: A component of a flat direction below this is left out of its description.
-_TRACE = 1e-6
+#: How often a flat direction may be turned by following it, and the cosine from which it was not turned.
+_TURNS = 4
+_STRAIGHT = 0.999
+#: Flat directions found by following are known to a few parts in a hundred: what is closer is one and the same, and a
+#: component below a part in a hundred is left out.
+_INDEPENDENT = 0.05
+_TRACE = 1e-2
 
 
 class Kind(enum.Enum):
@@ -43,7 +48,7 @@ class Kind(enum.Enum):
     STRICT_MAXIMUM = "strict local maximum"
     STRICT_MINIMUM = "strict local minimum"
     NOT_ISOLATED = "not isolated: F keeps its optimal value along the flat directions"
-    UNDECIDED = "stationary, and the second-order test does not decide: F is flat there to second order"
+    UNDECIDED = "stationary, and the second-order test does not decide"
     SADDLE = "saddle: stationary, but F improves along some direction"
     NOT_STATIONARY = "not stationary: F improves to first order"
     INFEASIBLE = "infeasible: a limit is violated"
@@ -142,22 +147,41 @@ def _second_order(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[Kind, Fl
     strict = Kind.STRICT_MAXIMUM if nlp.sense is Sense.MAX else Kind.STRICT_MINIMUM
     active = at.active()
     strong = [j for j in active if mu[j] > STRONG or at.sides[j].bound == "equal"]
+    weak = [j for j in active if j not in strong]
     H = lagrangian_hessian(nlp, at, mu)
-    eigenvalues, directions = _reduced(H, at.normals[strong])
+    eigenvalues, _ = _reduced(H, at.normals[strong])
     if np.all(eigenvalues > CURVED):
         return strict, eigenvalues, []
-    # Weakly active limits cut the tangent space down to a cone; the subspace inside it is what can be tested.
-    if len(strong) < len(active):
-        inner, directions = _reduced(H, at.normals[list(active)])
-    else:
-        inner = eigenvalues
-    if np.any(inner < -CURVED):
+    if _improves(H, at.normals[strong], at.normals[weak]):
         return Kind.SADDLE, eigenvalues, []
+    inner, directions = _reduced(H, at.normals[list(active)])
     candidates = [directions[:, k] for k in np.flatnonzero(np.abs(inner) <= CURVED)]
-    flat = [direction for direction in candidates if _stays_flat(nlp, at, direction)]
-    if flat:
-        return Kind.NOT_ISOLATED, eigenvalues, list(plain_basis(np.array(flat)))
+    followed = [_followed(nlp, at, direction) for direction in candidates]
+    flat = np.array([direction for direction in followed if direction is not None]).reshape(-1, nlp.n)
+    if len(flat):
+        return Kind.NOT_ISOLATED, eigenvalues, _span(flat)
     return Kind.UNDECIDED, eigenvalues, []
+
+
+def _improves(H: FloatArray, strong: FloatArray, weak: FloatArray) -> bool:
+    """Whether F improves to second order along a direction that the strong sides hold and the weak ones allow.
+
+    Finding out for certain is a hard problem (copositivity). Tried are the directions of negative curvature with all,
+    all but one, and none of the weak sides held, and each of these brought back inside the weak sides.
+    """
+    rows = list(range(len(weak)))
+    for held in [rows, *([k for k in rows if k != freed] for freed in rows), []]:
+        values, directions = _reduced(H, np.vstack([strong, weak[held]]))
+        for k in np.flatnonzero(values < -CURVED):
+            for sign in (1.0, -1.0):
+                d = sign * directions[:, k]
+                inside = d - weak.T @ np.maximum(weak @ d, 0.0) if len(weak) else d
+                for each in (d, inside):
+                    size = float(each @ each)
+                    allowed = np.all(weak @ each <= 1e-9) and np.all(np.abs(strong @ each) <= 1e-9)
+                    if size > 1e-6 and allowed and float(each @ H @ each) < -CURVED * size:
+                        return True
+    return False
 
 
 def _reduced(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -171,17 +195,38 @@ def _reduced(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray
     return np.asarray(values, dtype=np.float64), np.asarray(Z @ vectors, dtype=np.float64)
 
 
-def _stays_flat(nlp: Nlp, at: Linearisation, direction: FloatArray) -> bool:
-    """Whether some way along a direction, after correction onto the optimal set, F is still the same."""
-    for sign in (1.0, -1.0):
-        away = at.x + sign * _PROBE * nlp.scale * direction
-        if np.any(away < nlp.lower) or np.any(away > nlp.upper):
-            continue
-        back = correct(nlp, away, at.active())
-        moved = float(np.linalg.norm((back.x - at.x) / nlp.scale))
-        if back.violation <= FEASIBLE and moved > _PROBE / 2 and abs(back.phi - at.phi) <= 1e-11:
-            return True
-    return False
+def _followed(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+    """The direction (n,) in which F really stays when one sets out along the given one; None when it does not.
+
+    A step is corrected back onto the optimal set; where the correction turns it, the turned direction is tried next.
+    """
+    for _ in range(_TURNS):
+        moved = next((m for m in (_displacement(nlp, at, s * direction) for s in (1.0, -1.0)) if m is not None), None)
+        if moved is None:
+            return None
+        turned = moved / np.linalg.norm(moved)
+        if abs(float(turned @ direction)) > _STRAIGHT:
+            return direction
+        direction = turned
+    return None
+
+
+def _displacement(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+    """Where a short step along a direction ends after correction, from the point; None when F changes or it cannot."""
+    away = at.x + _PROBE * nlp.scale * direction
+    if np.any(away < nlp.lower) or np.any(away > nlp.upper):
+        return None
+    back = correct(nlp, away, at.active())
+    moved = np.asarray((back.x - at.x) / nlp.scale, dtype=np.float64)
+    stays = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= 1e-11
+    return moved if stays and float(np.linalg.norm(moved)) > _PROBE / 3 else None
+
+
+def _span(directions: FloatArray) -> list[FloatArray]:
+    """The independent ones among directions (k, n), in as few names as possible."""
+    _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
+    plain = plain_basis(rows[sizes > _INDEPENDENT * sizes[0]])
+    return list(np.where(np.abs(plain) > _TRACE, plain, 0.0))
 
 
 def _named(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:

@@ -1,7 +1,7 @@
 """The nonlinear program: a :class:`Program` of symbols, and an :class:`Nlp` that gives it numbers.
 
-A program is built once for a *structure*, which is a robot and the choice of what is free. Everything a case fixes
-(dimensions, pose, twist) is an argument, so one program serves every start, every task and every point of a sweep.
+A program is built for a *structure*, which is a robot and the choice of what is free. Everything a case fixes
+(dimensions, pose, twist) is an argument, so one program can serve every start, every task and every point of a sweep.
 Variables are in the units of the case (radians for angles); :attr:`Nlp.scale` brings them to order 1.
 """
 
@@ -22,6 +22,10 @@ from screwsynth.nlp.kernel import Kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+#: Multiples of the golden section, modulo 1, spread evenly.
+_GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,8 @@ class RobotExpressions:
         rates: (m, tasks) ``L_i ^ chi_j``.
         F: (tasks, 1) objective of each task (equation 14).
         squares: (m, 1) squared length of each row's direction: a limb of zero length has 0.
-        magnitude: (tasks, 1) what F would be without cancellation, ``sum (|m_i| |omega| + |f_i| |v|)^2``.
+        magnitude: (tasks, 1) what F would be without cancellation, ``sum (|m_i| |omega| + |f_i| |v|)^2`` with moments
+            and velocity taken at the platform's origin, so that it does not depend on where the world's origin is.
         quantities: each of the model's quantities.
     """
 
@@ -304,6 +309,14 @@ class Nlp:
 
     @cached_property
     def objective_scale(self) -> float:
-        """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0."""
-        size = float(np.max(self.program.kernels.robot_state(self.start, self.arguments)[7]))
-        return size if np.isfinite(size) and size > 0 else 1.0
+        """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0.
+
+        Where the robot is not defined there, as with limbs of zero length, it is taken at the first of a few points
+        around the middle where it is.
+        """
+        around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
+        for x in (self.start, *(self.centre + self.scale * each for each in around)):
+            size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[7]))
+            if np.isfinite(size) and size > 0:
+                return size
+        return 1.0

@@ -68,6 +68,8 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     robot = {} if state is None else state_of(case, state)
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
+    if not compromise.is_made:
+        robot = {"reached": robot}
     return {
         **_head(case),
         "status": compromise.status.value,
@@ -76,7 +78,7 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
             "method": compromise.method.value,
             "value": compromise.value,
             **robot,
-            "tasks": [_outcome(outcome) for outcome in outcomes],
+            "tasks": [_outcome(outcome, answered=compromise.is_made) for outcome in outcomes],
             "violated": list(compromise.violated),
             "notices": list(compromise.notices),
             "optimality": None
@@ -89,13 +91,15 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     }
 
 
-def evaluation_of(case: Case, states: Sequence[RobotState]) -> dict[str, Any]:
+def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotState]) -> dict[str, Any]:
     """The robot at one point, ready for JSON: what its first task meets, then every task, and what it resists least.
 
     Args:
-        case: the case.
-        states: the robot with each task's rates, in order.
+        nlps: the program of each task.
+        x: (n,) the point.
+        states: the robot there with each task's rates, in order.
     """
+    case = nlps[0].case
     analysis = analyse_tasks(states[0].jacobian)
     return {
         **_head(case),
@@ -105,6 +109,7 @@ def evaluation_of(case: Case, states: Sequence[RobotState]) -> dict[str, Any]:
             {**_task(case, j), "F": state.F, "rates": state.rates.tolist(), "task_is_free": state.is_zero}
             for j, state in enumerate(states)
         ],
+        "violated": violations(nlps[0], x, nlps[0].evaluate(x)[1]),
         "principal_motions": {
             "rotations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.rotations],
             "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
@@ -128,19 +133,21 @@ def _task(case: Case, task: int) -> dict[str, Any]:
     return {"name": chosen.name, "sense": chosen.sense.value, **motion_of(chosen.twist)}
 
 
-def _outcome(outcome: TaskOutcome) -> dict[str, Any]:
-    best = outcome.own.nlp.evaluate(outcome.own.x)[0]
+def _outcome(outcome: TaskOutcome, *, answered: bool) -> dict[str, Any]:
+    """What a compromise means for one task; what is no answer has no F, and a task without an optimum no best."""
+    best = outcome.own.F if outcome.own.status.is_answer else None
+    known = answered and outcome.state is not None
     return {
         "name": outcome.task.name,
         "sense": outcome.task.sense.value,
         "weight": outcome.task.weight,
-        "F": None if outcome.state is None else outcome.state.F,
+        "F": outcome.state.F if known and outcome.state is not None else None,
         "best": best,
-        "loss": _finite(outcome.loss),
-        "relative_loss": _finite(outcome.loss / best) if best else None,
+        "loss": _finite(outcome.loss) if known and best is not None else None,
+        "relative_loss": _finite(outcome.loss / best) if known and best else None,
         "unique": outcome.unique,
         "verdict": outcome.evidence.kind.value,
-        "rates": None if outcome.state is None else outcome.state.rates.tolist(),
+        "rates": outcome.state.rates.tolist() if known and outcome.state is not None else None,
     }
 
 

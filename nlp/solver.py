@@ -52,7 +52,7 @@ class Optimum:
         count: number of starts that ended there.
         x: (n,) one of the points.
         spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
-            isolated optimum, up to 1 for a set of them.
+            isolated optimum, up to 1 for a set of them, which may have several pieces.
     """
 
     F: float
@@ -122,13 +122,9 @@ def solve(
     Raises:
         CaseError: the case has several tasks, or contradicts itself.
     """
-    search = case.search
-    search = replace(
-        search, starts=search.starts if starts is None else starts, seed=search.seed if seed is None else seed
-    )
     if len(case.tasks) > 1:
         raise CaseError("task", "are several: solve_tasks brings them together", len(case.tasks), case.source)
-    return solve_nlp(formulate(case), search, jobs=jobs, progress=progress)
+    return solve_nlp(formulate(case), case.search.but(starts, seed), jobs=jobs, progress=progress)
 
 
 def solve_nlp(
@@ -175,7 +171,7 @@ def solve_nlp(
         status=_status(evidence, bool(optima) and beaten is None),
         nlp=nlp,
         x=frozen_array(x, (nlp.n,)),
-        state=_state(nlp, x),
+        state=state_or_none(nlp, x),
         evidence=evidence,
         starts=tuple(done),
         optima=tuple(optima),
@@ -205,7 +201,8 @@ def _status(evidence: Evidence, converged: bool) -> Status:
     return Status.SADDLE if evidence.kind is Kind.SADDLE else Status.NOT_CONVERGED
 
 
-def _state(nlp: Nlp, x: FloatArray) -> RobotState | None:
+def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
+    """The robot at a point, or None where its equations have no value."""
     try:
         return evaluate(nlp, x)
     except EvaluationError:
@@ -215,7 +212,7 @@ def _state(nlp: Nlp, x: FloatArray) -> RobotState | None:
 def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]]:
     """The starts, with those that ended at a saddle marked, and the distinct optima among the others, best first.
 
-    A connected set of optima counts as one.
+    Where an optimum is not isolated, all points of its F count as one set; it may have several pieces.
     """
     optima: list[Optimum] = []
     saddles: list[Start] = []
@@ -231,11 +228,13 @@ def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]
                 groups.append([start])
             else:
                 near.append(start)
-        kinds = [examine(nlp, group[0].x).kind for group in groups]
-        saddles += [start for kind, group in zip(kinds, groups, strict=True) if not kind.is_optimum for start in group]
-        groups = [group for kind, group in zip(kinds, groups, strict=True) if kind.is_optimum]
-        if Kind.NOT_ISOLATED in kinds:
-            groups = [[start for group in groups for start in group]]
+        if examine(nlp, lead.x).kind is Kind.NOT_ISOLATED:
+            groups = [level]
+        else:
+            kinds = [examine(nlp, group[0].x).kind for group in groups]
+            judged = list(zip(kinds, groups, strict=True))
+            saddles += [start for kind, group in judged if not kind.is_optimum for start in group]
+            groups = [group for kind, group in judged if kind.is_optimum]
         for group in groups:
             x = np.array([start.x for start in group])
             spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from screwsynth.models import Dimension, Model, Parameter, component_names
-from screwsynth.nlp.case import Case, Free, Value
+from screwsynth.nlp.case import Case, Free, Value, sizes_of_turn
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
     combined = result["combined"]
     console.print(_title(case))
     console.print(_labelled("combined by", combined["method"]), Text(f"({result['status']})"))
+    if "reached" in combined:
+        console.print(Text(f"{result['status']}: this is no answer", style="bold red"))
     for name in combined["violated"]:
         console.print(Text(f"violated: {name}", style="red"))
     if "parameters" in combined:
@@ -95,6 +97,8 @@ def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
     for task in result["tasks"]:
         console.print(_task(task, case.units))
         console.print(_labelled("F", _number(0.0 if task["task_is_free"] else task["F"])))
+    for line in _violated(result["violated"]):
+        console.print(line)
     console.print(_design(case, result))
     console.print(_limbs(case, result))
     console.print(_jacobian(case, result))
@@ -206,8 +210,7 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
     angle, turned = case.rotation.angle, abs(units.to_internal(result["pose"]["angle"], Dimension.ANGLE)) > _TURNED
     if case.axis is None and isinstance(angle, Free):
         # The sign of the angle means nothing then: what is allowed is its size.
-        sizes = sorted((abs(angle.lower), abs(angle.upper)))
-        angle = Free(0.0 if angle.lower < 0 < angle.upper else sizes[0], sizes[1])
+        angle = Free(*sizes_of_turn(angle))
     axis = _listed(result["pose"]["axis"]) if turned or case.axis is not None else "none"
     table.add_row("axis", axis, "", "" if case.axis is not None else "any direction")
     add("angle", Dimension.ANGLE, result["pose"]["angle"], angle)
@@ -268,12 +271,16 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
             curvature = evidence["reduced_hessian_eigenvalues"]
             smallest = f", smallest curvature {min(curvature):.2e}" if curvature else ", no free direction left"
             yield _labelled("evidence", checks + ("" if "reached" in result else smallest))
-    for side in (result.get("reached") or {}).get("violated", []):
-        wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
-        yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
+    yield from _violated((result.get("reached") or {}).get("violated", []))
     yield from _starts(result["starts"])
     if "rank" in result and "reached" not in result:
         yield from _singularity(case, result)
+
+
+def _violated(sides: Iterable[dict[str, Any]]) -> Iterable[Text]:
+    for side in sides:
+        wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
+        yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
 
 
 def _starts(starts: dict[str, Any]) -> Iterable[Text]:

@@ -26,18 +26,18 @@ import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Method, Search, Sense, Task
-from screwsynth.nlp.errors import CaseError, EvaluationError
-from screwsynth.nlp.evaluation import RobotState, evaluate
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.formulation import formulate, formulate_weighted, formulate_worst, near
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, correct, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.solver import SAME_VALUE, Progress, Solution, Status, solve_nlp
+from screwsynth.nlp.solver import SAME_VALUE, Progress, Solution, Status, solve_nlp, state_or_none
 
 #: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale, weaker and weaker:
 #: the point tends to the nearest of the optimal set, and the correction that follows takes the rest off.
-_DRAWN = (1e-5, 1e-7, 1e-9)
+_DRAWN = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 #: Rounds of settling, and the movement in half ranges that ends it.
 _ROUNDS = 20
 _SETTLED = 1e-9
@@ -54,7 +54,7 @@ class TaskOutcome:
         x: (n,) the member of its optimal set that was used.
         state: the robot at the combined point, with this task's rates; None where it does not exist.
         evidence: what the combined point is for this task alone.
-        loss: how much worse its F is than its own optimum, not negative but for rounding.
+        loss: how much worse its F is than its own optimum; negative where the combined search came upon a better one.
     """
 
     task: Task
@@ -94,6 +94,12 @@ class Compromise:
     combined: Solution | None
     seconds: float
 
+    @property
+    def is_made(self) -> bool:
+        """Whether the point is what the method yields, be it within the limits or not."""
+        alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
+        return alone and (self.combined is None or self.combined.status.is_answer)
+
 
 TaskProgress = Callable[[str, int, int, float | None], None]
 
@@ -119,10 +125,7 @@ def solve_tasks(
         CaseError: the case has one task only, nothing is free, or it contradicts itself.
     """
     began = time.perf_counter()
-    search = case.search
-    search = replace(
-        search, starts=search.starts if starts is None else starts, seed=search.seed if seed is None else seed
-    )
+    search = case.search.but(starts, seed)
     nlps = [formulate(case, j) for j in range(len(case.tasks))]
     if len(nlps) < 2:
         raise CaseError("task", "is one: several are needed to bring them together", source=case.source)
@@ -182,10 +185,7 @@ def _weights(case: Case) -> tuple[list[float], list[str]]:
 
 
 def _outcome(nlp: Nlp, task: Task, own: Solution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
-    try:
-        state = evaluate(nlp, x)
-    except EvaluationError:
-        state = None
+    state = state_or_none(nlp, x)
     F = float("nan") if state is None else state.F
     best = nlp.evaluate(own.x)[0]
     loss = best - F if task.sense is Sense.MAX else F - best

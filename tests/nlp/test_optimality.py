@@ -142,6 +142,23 @@ def test_a_quartic_minimum_is_not_called_flat() -> None:
     assert evidence.flat == ()
 
 
+def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
+    x = SX.sym("x", 3)
+    nlp = program_of(x, (x[0] - x[1]) ** 4, Sense.MIN, [(-1, 1), (-1, 1), (-1, 1)])
+    evidence = examine(nlp, np.array([0.1, 0.1, 0.2]))
+    assert evidence.kind is Kind.NOT_ISOLATED
+    directions = [dict(direction) for direction in evidence.flat]
+    assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
+    along = next(direction for direction in directions if "v0" in direction)
+    assert along["v0"] == pytest.approx(along["v1"], rel=0.05)
+
+
+def test_a_minimum_of_a_quartic_on_a_bound_is_no_maximum() -> None:
+    x = SX.sym("x", 1)
+    nlp = program_of(x, (1 + x**2) ** 2, Sense.MAX, [(0, 1)])
+    assert examine(nlp, np.array([0.0])).kind is Kind.SADDLE
+
+
 def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
     # x0 <= 1 stands twice: as a bound and as a constraint.
     x = SX.sym("x", 2)
