@@ -11,7 +11,7 @@ import enum
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from queue import SimpleQueue
 from typing import Any
 
@@ -27,6 +27,10 @@ from screwsynth.nlp.program import Nlp
 _IPOPT_TOLERANCE = 1e-8
 #: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
 _NEAR = 1e-2
+#: Two optima are the same when their points differ by less than this, in half ranges.
+SAME_POINT = 1e-4
+#: How far F where Ipopt stopped may be from the optimum it stopped at, in parts of F's scale: its barrier's last bit.
+_SAME_F = 1e-6
 #: A second thread is worth its own solver from this many starts on.
 _STARTS_PER_JOB = 12
 
@@ -84,13 +88,15 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
         found = {key: result[key].full().ravel() for key in ("x", "lam_x", "lam_g")}
         return found, str(stats["return_status"]), int(stats.get("iter_count", 0))
 
-    if threads == 1:
-        for point in points:
-            yield _judged(nlp, *search(point))
-        return
+    known: list[Start] = []
     with ThreadPoolExecutor(threads) as pool:
-        for outcome in pool.map(search, points):
-            yield _judged(nlp, *outcome)
+        for found, ipopt_status, iterations in map(search, points) if threads == 1 else pool.map(search, points):
+            start = _recognised(nlp, found["x"], known) if ipopt_status == "Solve_Succeeded" else None
+            if start is None:
+                start = _judged(nlp, found, ipopt_status)
+                if start.status is StartStatus.CONVERGED:
+                    known.append(start)
+            yield replace(start, iterations=iterations)
 
 
 def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
@@ -119,7 +125,21 @@ def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
     return ca.nlpsol("solver", "ipopt", problem, options)
 
 
-def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iterations: int) -> Start:
+def _recognised(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:
+    """The converged start that another one ended at too, from where Ipopt stopped in scaled variables.
+
+    Within the distance at which two optima count as one, and with the same F to Ipopt's accuracy, it is that one: the
+    correction would only find it again.
+    """
+    x = np.clip(nlp.centre + nlp.scale * stopped, nlp.lower, nlp.upper)
+    for start in known:
+        if np.max(np.abs(x - start.x) / nlp.scale) <= SAME_POINT:
+            off = abs(nlp.evaluate(x)[0] - start.F)
+            return start if off <= _SAME_F * nlp.objective_scale else None
+    return None
+
+
+def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     """Correct the point that Ipopt stopped at, and say by the program's own conditions what it is."""
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
     at = linearise(nlp, stopped)
@@ -137,7 +157,7 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str, iteration
             "Infeasible_Problem_Detected": StartStatus.INFEASIBLE,
             "Invalid_Number_Detected": StartStatus.UNDEFINED,
         }.get(ipopt_status, StartStatus.STALLED)
-    return Start(status, at.x, at.F, stationarity, at.violation, iterations)
+    return Start(status, at.x, at.F, stationarity, at.violation, 0)
 
 
 def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:

@@ -14,15 +14,14 @@ from screwsynth.nlp.case import Case, Search
 from screwsynth.nlp.errors import CaseError, EvaluationError
 from screwsynth.nlp.evaluation import RobotState, evaluate
 from screwsynth.nlp.formulation import formulate
-from screwsynth.nlp.ipopt import Start, StartStatus, search_from
+from screwsynth.nlp.ipopt import SAME_POINT, Start, StartStatus, search_from
 from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
 
-#: Two optima are the same when their scaled objectives and points differ by less than these.
+#: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9
-_SAME_POINT = 1e-4
 #: A point that is better than the best optimum by more than this part of F's scale is no rounding of it.
 _BETTER = 1e-6
 
@@ -223,7 +222,7 @@ def _sorted_out(nlp: Nlp, done: list[Start]) -> tuple[list[Start], list[Optimum]
         level = [s for s in remaining if abs(s.F - lead.F) <= SAME_VALUE * nlp.objective_scale]
         groups: list[list[Start]] = []
         for start in level:
-            near = next((group for group in groups if _distance(nlp, group[0].x, start.x) <= _SAME_POINT), None)
+            near = next((group for group in groups if _distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
             if near is None:
                 groups.append([start])
             else:

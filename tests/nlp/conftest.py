@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from screwsynth.nlp.cli import main
+from screwsynth.nlp.cli import run as command_line
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -17,12 +17,8 @@ def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["screwsynth", *arguments])
         capfd.readouterr()
-        code: object = 0
-        try:
-            main()
-        except SystemExit as ended:
-            code = ended.code
+        code = command_line()
         out, err = capfd.readouterr()
-        return int(str(code or 0)), out, err
+        return code, out, err
 
     return run

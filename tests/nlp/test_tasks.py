@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -29,7 +28,6 @@ from screwsynth.nlp import (
     solve_tasks,
 )
 from screwsynth.nlp.case import Value
-from screwsynth.nlp.cli import main
 
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]
@@ -502,14 +500,10 @@ def test_a_weight_that_is_not_positive_is_refused(weight: float) -> None:
 
 
 def test_the_command_line_writes_tasks_and_their_combination_as_strict_json(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    cli: Callable[..., tuple[int, str, str]],
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["screwsynth", "solve", "paper-4.2", "--json", "-", "--starts", "4"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
-    out, err = capfd.readouterr()
-    assert err == ""
+    code, out, err = cli("solve", "paper-4.2", "--json", "-", "--starts", "4")
+    assert (code, err) == (0, "")
 
     def no_constant(word: str) -> None:
         raise AssertionError(f"{word} is no JSON")
