@@ -1,7 +1,7 @@
 """Time of whole commands beside the bare import of their libraries, taken in turns so that a busy machine burdens all.
 
-Run by hand: ``.venv/bin/python bench/startup.py [rounds]``. The aims: a solve with 32 starts in at most 4 times the import,
-and help in no more than it.
+Run by hand: ``.venv/bin/python bench/startup.py [rounds]``. The aims: a solve with 32 starts in at most 4 times the
+import, and help in no more than it.
 """
 
 import statistics
