@@ -138,13 +138,13 @@ def evaluate(
     """
     from screwsynth.nlp import evaluation
     from screwsynth.nlp.casefile import load_case
-    from screwsynth.nlp.formulation import formulate
+    from screwsynth.nlp.formulation import formulate_each
     from screwsynth.nlp.kkt import assembled
     from screwsynth.nlp.result import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
-    nlps = [formulate(loaded, task) for task in range(len(loaded.tasks))]
+    nlps = formulate_each(loaded)
     x = assembled(nlps[0], nlps[0].start)
     result = evaluation_of(nlps, x, [evaluation.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:

@@ -65,13 +65,15 @@ class RobotState:
         return self.rank < 6
 
 
-def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
+def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
     """The robot at a point of the program.
 
     Args:
         nlp: the program.
         x: (n,) values of its free variables.
-        task: index of the task whose rates are wanted.
+
+    Returns:
+        The robot with the rates of the program's task; of its first, where it combines several.
 
     Raises:
         EvaluationError: a number is not finite there, as when a limb has zero length.
@@ -102,9 +104,9 @@ def evaluate(nlp: Nlp, x: FloatArray, task: int = 0) -> RobotState:
         axis=axis,
         angle=angle,
         jacobian=frozen_array(jacobian, jacobian.shape),
-        rates=frozen_array(rates[:, task], (len(model.wrenches),)),
-        F=float(F[task, 0]),
-        size=float(size[task, 0]),
+        rates=frozen_array(rates[:, 0], (len(model.wrenches),)),
+        F=float(F[0, 0]),
+        size=float(size[0, 0]),
         singular_values=frozen_array(singular_values, singular_values.shape),
         rank=rank,
         free_twists=frozen_array(free_twists, free_twists.shape),

@@ -19,13 +19,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Free, Sense
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.layout import Bounded, Layout, free_directions, lay_out
-from screwsynth.nlp.program import Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.program import SQUARES, Constraint, Nlp, Program, Reading, Scalar, vanished
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -40,6 +41,21 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     """
     layout = lay_out(case, [case.tasks[task]])
     return assemble(layout, layout.robot.F[0], case.tasks[task].sense)
+
+
+def formulate_each(case: Case) -> list[Nlp]:
+    """The programs of all tasks of a case: one program, with each task's twist and sense.
+
+    Raises:
+        CaseError: as for :func:`formulate`.
+    """
+    first = formulate(case)
+    place = [argument.name for argument in first.program.arguments].index("twist_0")
+    programs = []
+    for task in case.tasks:
+        arguments = [*first.arguments[:place], *np.asarray(task.twist), *first.arguments[place + 6 :]]
+        programs.append(replace(first, arguments=_vector(arguments), sense=task.sense))
+    return programs
 
 
 def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
@@ -163,8 +179,7 @@ def _vector(values: Sequence[float]) -> FloatArray:
 def _check_limbs(nlp: Nlp) -> None:
     """Refuse a limb whose direction vanishes whatever the solver chooses."""
     program = nlp.program
-    squares = ca.Function("squares", [program.x, program.p], [program.robot.squares])
-    values = squares(nlp.start, nlp.arguments).full().ravel()
+    values = program.kernels.robot_state(nlp.start, nlp.arguments)[SQUARES].ravel()
     free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
     for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
         if not varies and not value > 0:

@@ -41,12 +41,11 @@ ROTATION_ANGLE = Reading(
     from_value=lambda value: 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0))),
     slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
 )
-
 #: The constraint ``|u|^2 = 1`` read as the length itself.
 _LENGTH_OF_DIRECTION = Reading(
     Dimension.NUMBER, from_value=lambda value: math.sqrt(max(value, 0.0)), slope=lambda value: 2 * math.sqrt(value)
 )
-#: How far a component of a free unit vector may go as a variable.
+#: How far a component of a free unit vector, or of a rotation's ``q`` beside its ball's radius, may go as a variable.
 _ROOM = 1.25
 #: How well an equation among fixed numbers must hold: they are written with a dozen digits.
 _ROUNDING = 1e-9

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+#: Places of two results among those of :attr:`Program.robot_state`.
+SQUARES, MAGNITUDE = 6, 7
 #: Multiples of the golden section, modulo 1, spread evenly.
 _GOLDEN = 0.6180339887498949
 
@@ -316,7 +318,7 @@ class Nlp:
         """
         around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
-            size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[7]))
+            size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[MAGNITUDE]))
             if np.isfinite(size) and size > 0:
                 return size
         return 1.0

@@ -23,7 +23,7 @@ from screwsynth.models import component_names
 from screwsynth.nlp.case import Case, Published, Search
 from screwsynth.nlp.casefile import load_case
 from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
-from screwsynth.nlp.formulation import formulate
+from screwsynth.nlp.formulation import formulate_each
 from screwsynth.nlp.result import compromise_of, result_of
 from screwsynth.nlp.solver import Status, solve, solve_nlp
 from screwsynth.nlp.tasks import solve_tasks
@@ -103,7 +103,7 @@ def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> Ca
     began = time.perf_counter()
     solved = {} if solved is None else solved
     case = load_case(name)
-    result = _solved(name, solved)
+    result = _solved(name, solved, case)
     return CaseCheck(
         name=case.name,
         title=case.title,
@@ -113,9 +113,10 @@ def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> Ca
     )
 
 
-def _solved(name: str, solved: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _solved(name: str, solved: dict[str, dict[str, Any]], case: Case | None = None) -> dict[str, Any]:
+    """Result of a case by name, solved once; the case itself, where it is read already."""
     if name not in solved:
-        case = load_case(name)
+        case = case or load_case(name)
         solved[name] = compromise_of(solve_tasks(case)) if len(case.tasks) > 1 else result_of(solve(case))
     return solved[name]
 
@@ -239,8 +240,8 @@ def _own_settings(case: Case, result: Mapping[str, Any]) -> dict[str, Any]:
 def _objectives(case: Case) -> list[tuple[float, float]]:
     """Best F of each task over what is still free, and its size without cancellation."""
     values = []
-    for task in range(len(case.tasks)):
-        solution = solve_nlp(formulate(case, task), Search(starts=_STARTS))
+    for nlp in formulate_each(case):
+        solution = solve_nlp(nlp, Search(starts=_STARTS))
         if solution.state is None or not solution.status.is_answer:
             raise EvaluationError(f"no optimum: {solution.status.value}")
         values.append((solution.F, solution.state.size))

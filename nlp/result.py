@@ -109,7 +109,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
             {**_task(case, j), "F": state.F, "rates": state.rates.tolist(), "task_is_free": state.is_zero}
             for j, state in enumerate(states)
         ],
-        "violated": violations(nlps[0], x, nlps[0].evaluate(x)[1]),
+        "violated": violations(nlps[0], x),
         "principal_motions": {
             "rotations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.rotations],
             "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
@@ -136,18 +136,19 @@ def _task(case: Case, task: int) -> dict[str, Any]:
 def _outcome(outcome: TaskOutcome, *, answered: bool) -> dict[str, Any]:
     """What a compromise means for one task; what is no answer has no F, and a task without an optimum no best."""
     best = outcome.own.F if outcome.own.status.is_answer else None
-    known = answered and outcome.state is not None
+    state = outcome.state if answered else None
+    loss = outcome.loss if state is not None and best is not None else math.nan
     return {
         "name": outcome.task.name,
         "sense": outcome.task.sense.value,
         "weight": outcome.task.weight,
-        "F": outcome.state.F if known and outcome.state is not None else None,
+        "F": None if state is None else state.F,
         "best": best,
-        "loss": _finite(outcome.loss) if known and best is not None else None,
-        "relative_loss": _finite(outcome.loss / best) if known and best else None,
+        "loss": _finite(loss),
+        "relative_loss": _finite(loss / best) if best else None,
         "unique": outcome.unique,
         "verdict": outcome.evidence.kind.value,
-        "rates": outcome.state.rates.tolist() if known and outcome.state is not None else None,
+        "rates": None if state is None else state.rates.tolist(),
     }
 
 
@@ -215,24 +216,22 @@ def versions() -> dict[str, str]:
 
 def _reached(solution: Solution) -> dict[str, Any]:
     nlp = solution.nlp
-    F, g = nlp.evaluate(solution.x)
-    return {"F": F if math.isfinite(F) else None, "violated": violations(nlp, solution.x, g)}
+    return {"F": _finite(nlp.evaluate(solution.x)[0]), "violated": violations(nlp, solution.x)}
 
 
-def violations(nlp: Nlp, x: FloatArray, g: FloatArray) -> list[dict[str, Any]]:
+def violations(nlp: Nlp, x: FloatArray) -> list[dict[str, Any]]:
     """Constraints that a point lies outside of: name, value and limit, in the case's words and units.
 
     Those that are violated a thousand times less than the worst are left out: they only give way to it.
     """
-    at = linearise(nlp, x)
+    at, g = linearise(nlp, x), nlp.evaluate(x)[1]
     rows: list[dict[str, Any]] = []
     units = nlp.case.units
     for j, side in enumerate(nlp.sides.sides):
+        if at.slack[j] >= -max(FEASIBLE, 1e-3 * at.violation):
+            continue
         value = float(x[side.variable]) if side.variable is not None else float(g[side.constraint or 0])
         limit = float(nlp.sides.limit[j])
-        outside = abs(value - limit) if side.bound == "equal" else float(nlp.sides.sign[j]) * (value - limit)
-        if outside <= 0 or at.slack[j] >= -max(FEASIBLE, 1e-3 * at.violation):
-            continue
         if side.constraint is None:
             dimension = nlp.program.variables[side.variable or 0].dimension
         else:

@@ -28,7 +28,7 @@ from screwsynth.models import FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Method, Search, Sense, Task
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evaluation import RobotState
-from screwsynth.nlp.formulation import formulate, formulate_weighted, formulate_worst, near
+from screwsynth.nlp.formulation import formulate_each, formulate_weighted, formulate_worst, near
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, correct, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
@@ -126,7 +126,7 @@ def solve_tasks(
     """
     began = time.perf_counter()
     search = case.search.but(starts, seed)
-    nlps = [formulate(case, j) for j in range(len(case.tasks))]
+    nlps = formulate_each(case)
     if len(nlps) < 2:
         raise CaseError("task", "is one: several are needed to bring them together", source=case.source)
     if nlps[0].n == 0:
