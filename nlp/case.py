@@ -145,11 +145,14 @@ class Search:
         starts: number of starting points.
         seed: seed of the random ones.
         max_iterations: Ipopt's limit for each start.
+        compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. It needs a C
+            compiler, and a second or two the first time.
     """
 
     starts: int = 32
     seed: int = 0
     max_iterations: int = 500
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         for key, value, least in (
@@ -160,10 +163,13 @@ class Search:
             if value < least:
                 raise CaseError(f"solve.{key}", f"must be at least {least}", value)
 
-    def but(self, starts: int | None, seed: int | None) -> Search:
-        """The same search with another number of starts or seed, where they are given."""
+    def but(self, starts: int | None, seed: int | None, *, compiled: bool = False) -> Search:
+        """The same search with another number of starts or seed where they are given, and compiled if asked."""
         return Search(
-            self.starts if starts is None else starts, self.seed if seed is None else seed, self.max_iterations
+            self.starts if starts is None else starts,
+            self.seed if seed is None else seed,
+            self.max_iterations,
+            self.compiled or compiled,
         )
 
 

@@ -11,6 +11,7 @@ import io
 import json
 import os
 import sys
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from threading import Thread
@@ -64,6 +65,9 @@ def solve(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")] = None,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
+    ] = False,
     json_file: JsonFile = None,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
@@ -72,11 +76,12 @@ def solve(
     from screwsynth.nlp.tasks import Compromise
 
     loaded = load_case(case)
+    loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     _check_target(json_file)
     if json_file != "-":
         # The library of tables loads while Ipopt works outside of the interpreter.
         Thread(target=import_module, args=("screwsynth.nlp.tables",), daemon=True).start()
-    solution = _solve(loaded, starts, seed, jobs)
+    solution = _solve(loaded, jobs)
     result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
     if json_file is not None:
         _write_json(json_file, result)
@@ -274,14 +279,14 @@ def _description(model: str) -> str:
         return error.fault
 
 
-def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -> Solution | Compromise:
+def _solve(case: Case, jobs: int | None) -> Solution | Compromise:
     from screwsynth.nlp.solver import solve as solve_case
     from screwsynth.nlp.tasks import solve_tasks
 
     gc.enable()
     several = len(case.tasks) > 1
     if not sys.stderr.isatty():
-        return (solve_tasks if several else solve_case)(case, starts=starts, seed=seed, jobs=jobs)
+        return (solve_tasks if several else solve_case)(case, jobs=jobs)
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress
@@ -294,8 +299,8 @@ def _solve(case: Case, starts: int | None, seed: int | None, jobs: int | None) -
             bar.update(line, completed=done, total=total, description=f"{escape(what)}{best_text}")
 
         if several:
-            return solve_tasks(case, starts=starts, seed=seed, jobs=jobs, progress=show)
-        return solve_case(case, starts=starts, seed=seed, jobs=jobs, progress=partial(show, "starts"))
+            return solve_tasks(case, jobs=jobs, progress=show)
+        return solve_case(case, jobs=jobs, progress=partial(show, "starts"))
 
 
 def _setting(text: str) -> tuple[str, float | list[float]]:

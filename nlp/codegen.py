@@ -8,9 +8,8 @@ case and versions give the same bytes.
 from __future__ import annotations
 
 import os
-import re
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
@@ -19,21 +18,33 @@ import casadi as ca
 import numpy as np
 
 from screwsynth.models import Dimension, FloatArray
-from screwsynth.nlp.case import Case
+from screwsynth.nlp.case import Case, Sense
+from screwsynth.nlp.ctext import comment, identifier, matrix, numbers, texts
 from screwsynth.nlp.errors import InputError
 from screwsynth.nlp.formulation import formulate
-from screwsynth.nlp.program import Nlp, Program
+from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.solver import Status, solve_nlp
+from screwsynth.nlp.staged import Staged, stage
 
 _TEMPLATES = Path(__file__).parent / "c"
+#: Ending of each of the files that the prefix names, and its template.
+_PARTS = {
+    ".h": "api.h",
+    ".c": "api.c",
+    "_solver.c": "solver.c",
+    "_sqp.h": "sqp.h",
+    "_sqp.c": "sqp.c",
+    "_qp.c": "qp.c",
+}
+#: Starting points that the solver comes with.
+_SEEDS = 16
+#: Limits of one search: iterations, and lengths of a step that are tried in one.
+_ITERATIONS = 100
+_TRIALS = 30
 #: Points of the self-test, and the seed that they are drawn with.
 _POINTS = 8
 _SEED = 1
-
-
-def identifier(name: str) -> str:
-    """The prefix of a case's C names: valid in C whatever the case is called."""
-    return "screwsynth_" + re.sub(r"[^0-9a-z]+", "_", name.lower(), flags=re.ASCII).strip("_")
 
 
 def generate_c(case: Case, source: str) -> dict[str, str]:
@@ -52,35 +63,16 @@ def generate_c(case: Case, source: str) -> dict[str, str]:
         InputError: the case contradicts itself, or its functions have no finite value anywhere.
     """
     nlp = formulate(case)
-    functions = _functions(nlp.program, identifier(case.name))
-    names = _names(nlp, functions)
-    files = {f"{names['id']}{ending}": _filled(f"api{ending}.in", names) for ending in (".h", ".c")}
-    for name in ("selftest.c", "bench.c", "Makefile", "CMakeLists.txt", "README.md"):
+    staged = stage(nlp.program, f"{identifier(case.name)}_casadi")
+    names = _names(nlp, staged)
+    files = {f"{names['id']}{ending}": _filled(f"{part}.in", names) for ending, part in _PARTS.items()}
+    for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _filled(f"{name}.in", names)
-    return files | _casadi_files(functions, f"{names['id']}_casadi") | {"case.toml": source}
+    return files | _casadi_files(staged.all, f"{names['id']}_casadi") | {"case.toml": source}
 
 
 def _filled(template: str, names: dict[str, str]) -> str:
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
-
-
-def _functions(program: Program, prefix: str) -> tuple[ca.Function, ...]:
-    """The functions of the interface, dense, in the order that the README lists them."""
-    x, p, F, g = program.x, program.p, program.objective, program.g
-    hessian, gradient = ca.hessian(F, x)
-    outputs = {
-        "F": [F],
-        "F_gradient": [F, gradient],
-        "F_hessian": [F, gradient, hessian],
-        "jacobian": [program.robot.jacobian],
-        "rates": [program.robot.rates],
-        "limits": [g, ca.jacobian(g, x)],
-        "rotation": [program.robot.rotation],
-    }
-    return tuple(
-        ca.Function(f"{prefix}_casadi_{name}", [x, p], [ca.densify(each) for each in expressions])
-        for name, expressions in outputs.items()
-    )
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
@@ -93,30 +85,52 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
         return {f"{name}{end}": (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
 
 
-def _names(nlp: Nlp, functions: Sequence[ca.Function]) -> dict[str, str]:
+def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
     """What stands in the templates' places."""
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
     size = len(prefix) + len("_casadi_")
-    points, references = _references(nlp, functions)
+    functions = staged.all
+    solution = solve_nlp(nlp, case.search)
+    points, references = _references(nlp)
+    seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
+    n, c = nlp.n, len(program.constraints)
+    work = max(1, *(function.sz_w() for function in functions))
+    # What sqp.c takes for itself; solver.c doesn't compile where this is too little.
+    solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
+    solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,
         "ID": prefix.upper(),
-        "title": _comment(case.title or case.name),
+        "title": comment(case.title or case.name),
         "version": version("screwsynth"),
         "casadi": ca.CasadiMeta.version(),
-        "length": _comment(case.units.length),
-        "n": str(nlp.n),
+        "length": comment(case.units.length),
+        "n": str(n),
         "np": str(len(program.arguments)),
         "m": str(len(program.model.wrenches)),
-        "nc": str(len(program.constraints)),
+        "nc": str(c),
         "ntasks": str(len(case.tasks)),
         "twist": str([argument.name for argument in program.arguments].index("twist_0")),
-        "work": str(max(1, *(function.sz_w() for function in functions))),
+        "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
+        "nk": str(staged.prepare.numel_out(0)),
+        "maximise": str(int(nlp.sense is Sense.MAX)),
+        "nseeds": str(_SEEDS),
+        "iterations": str(_ITERATIONS),
+        "trials": str(_TRIALS),
+        "solver_work": str(solver_work),
+        "solver_iwork": str(solver_iwork),
+        "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
+        "seeds": "/* Where the solver searches from, in half ranges from the middle of the bounds. */\n"
+        + matrix(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix),
         "count": str(points),
+        "has_optimum": str(int(solution.status is Status.OPTIMAL)),
+        # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
+        "optimum": f"{solution.F:.9g}" if solution.status is Status.OPTIMAL else "0",
+        "optimum_scale": f"{nlp.objective_scale:.9g}",
         "references": references,
         "operations": "\n".join(f"| `{f.name()[size:]}` | {f.n_instructions()} |" for f in functions),
     }
@@ -130,73 +144,50 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
         "/* Free variables: names, units, bounds, and where a search may begin. */",
-        _texts(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
-        _texts(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
-        _numbers(f"{prefix}_variable_lower", N, nlp.lower),
-        _numbers(f"{prefix}_variable_upper", N, nlp.upper),
-        _numbers(f"{prefix}_variable_starts", N, nlp.start),
+        texts(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
+        texts(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
+        numbers(f"{prefix}_variable_lower", N, nlp.lower),
+        numbers(f"{prefix}_variable_upper", N, nlp.upper),
+        numbers(f"{prefix}_variable_starts", N, nlp.start),
         "/* Fixed numbers: names, units, and the case's values. */",
-        _texts(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
-        _texts(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
-        _numbers(f"{prefix}_parameter_defaults", P, nlp.arguments),
+        texts(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
+        texts(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
+        numbers(f"{prefix}_parameter_defaults", P, nlp.arguments),
         "/* Rows of the Jacobian: the limb of each, and whether it applies a force or a couple. */",
-        _texts(f"{prefix}_row_limbs", M, [row.limb for row in program.model.wrenches]),
-        _texts(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.wrenches]),
+        texts(f"{prefix}_row_limbs", M, [row.limb for row in program.model.wrenches]),
+        texts(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.wrenches]),
         "/* Constraints: names and bounds; 1e300 is none. */",
-        _texts(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
-        _numbers(f"{prefix}_constraint_lower", C, lower),
-        _numbers(f"{prefix}_constraint_upper", C, upper),
+        texts(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
+        numbers(f"{prefix}_constraint_lower", C, lower),
+        numbers(f"{prefix}_constraint_upper", C, upper),
         "/* Tasks: names, and twists of six numbers each. */",
-        _texts(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
-        _numbers(f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])),
+        texts(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
+        numbers(f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])),
     ]
     return "\n".join(blocks) + "\n"
 
 
-def _texts(name: str, size: str, texts: Iterable[str]) -> str:
-    quoted = ", ".join([*(_quoted(text) for text in texts), "0"])
-    return f"static const char *const {name}[{size} + 1] = {{{quoted}}};"
+def _references(nlp: Nlp) -> tuple[int, str]:
+    """Number of points of the self-test, and the C tables of its points and values.
 
-
-def _numbers(name: str, size: str, values: Iterable[float]) -> str:
-    listed = ", ".join([*(repr(float(value)) for value in values), "0.0"])
-    return f"static const double {name}[{size} + 1] = {{{listed}}};"
-
-
-def _quoted(text: str) -> str:
-    """A C string literal: UTF-8 bytes outside of ASCII as octal escapes, which end after three digits."""
-    plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
-    return f'"{"".join(plain)}"'
-
-
-def _comment(text: str) -> str:
-    """A text that cannot end a C comment or begin another line."""
-    return re.sub(r"\s+", " ", text).replace("*/", "* /").replace("/*", "/ *")
-
-
-def _references(nlp: Nlp, functions: Sequence[ca.Function]) -> tuple[int, str]:
-    """Number of points of the self-test, and the C tables of its points and values."""
-    rows: list[list[FloatArray]] = []
+    The values are those of the program itself, not of the functions that the C is made of.
+    """
+    kernels, p = nlp.program.kernels, nlp.arguments
+    rows: list[dict[str, FloatArray]] = []
     for x in starting_points(nlp, 4 * _POINTS + 1, _SEED)[1:]:
-        values = [_called(function, x, nlp) for function in functions]
-        flat = [x, values[0][0], values[1][1], values[2][2], values[3][0], values[4][0], values[5][0], values[6][0]]
-        if all(np.isfinite(each).all() for each in flat):
-            rows.append([np.asarray(each) for each in flat])
+        F, gradient, g, slopes = kernels.derivatives(x, p)
+        (hessian,) = kernels.hessian(x, p, 1.0, np.zeros(len(nlp.program.constraints)))
+        _, R, _, J, rates, *_ = kernels.robot_state(x, p)
+        row = {"points": x, "F": F, "gradient": gradient, "hessian": hessian, "jacobian": J, "rates": rates}
+        row |= {"limits": g, "slopes": slopes, "rotation": R}
+        if all(np.isfinite(each).all() for each in row.values()):
+            rows.append(row)
         if len(rows) == (_POINTS if nlp.n else 1):
             break
     if not rows:
         raise InputError(f"{nlp.case.source or nlp.case.name}: F has no finite value at any point that was tried")
-    results = ("F", "gradient", "hessian", "jacobian", "rates", "limits", "rotation")
-    tables = ("points", *(f"reference_{result}" for result in results))
-    lines = []
-    for column, name in enumerate(tables):
-        cells = [", ".join(repr(float(v)) for v in [*row[column].ravel(), 0.0]) for row in rows]
-        body = ",\n    ".join(f"{{{cell}}}" for cell in cells)
-        lines.append(f"static const double {name}[{len(rows)}][{rows[0][column].size + 1}] = {{\n    {body}}};\n")
-    return len(rows), "\n".join(lines)
-
-
-def _called(function: ca.Function, x: FloatArray, nlp: Nlp) -> list[FloatArray]:
-    """Results of a function as arrays, row after row."""
-    results = function.call([ca.DM(x), ca.DM(nlp.arguments)])
-    return [result.full() for result in results]
+    tables = []
+    for name, first in rows[0].items():
+        table = name if name == "points" else f"reference_{name}"
+        tables.append(matrix(f"{table}[{len(rows)}][{first.size + 1}]", [row[name].ravel() for row in rows]))
+    return len(rows), "\n".join(tables)

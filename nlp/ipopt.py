@@ -20,7 +20,9 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import FloatArray
+from screwsynth.nlp.case import Search
 from screwsynth.nlp.kkt import FEASIBLE, STATIONARY, Linearisation, correct, linearise, multipliers
+from screwsynth.nlp.library import shared_library
 from screwsynth.nlp.program import Nlp
 
 #: Ipopt's tolerance. The Newton correction behind it converges quadratically, so tighter would only cost iterations.
@@ -67,16 +69,22 @@ class Start:
     iterations: int
 
 
-def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None) -> Iterator[Start]:
-    """One :class:`Start` for each point, in their order."""
+def search_from(nlp: Nlp, points: FloatArray, search: Search, jobs: int | None) -> Iterator[Start]:
+    """One :class:`Start` for each point, in their order.
+
+    Raises:
+        InputError: the objective is to be compiled, and cannot be.
+    """
     threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
     # CasADi's symbols are not safe to share between threads: the solvers are all built here, and only run there.
     solvers: SimpleQueue[ca.Function] = SimpleQueue()
+    symbols = _problem(nlp)
+    problem = _compiled(symbols) if search.compiled else symbols
     for _ in range(min(threads, len(points))):
-        solvers.put(_solver(nlp, max_iterations))
+        solvers.put(ca.nlpsol("solver", "ipopt", problem, _options(search.max_iterations)))
     parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale]])
 
-    def search(point: FloatArray) -> tuple[dict[str, FloatArray], str, int]:
+    def search_one(point: FloatArray) -> tuple[dict[str, FloatArray], str, int]:
         solver = solvers.get()
         try:
             result = solver(
@@ -90,7 +98,9 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
 
     known: list[Start] = []
     with ThreadPoolExecutor(threads) as pool:
-        for found, ipopt_status, iterations in map(search, points) if threads == 1 else pool.map(search, points):
+        for found, ipopt_status, iterations in (
+            map(search_one, points) if threads == 1 else pool.map(search_one, points)
+        ):
             start = _recognised(nlp, found["x"], known) if ipopt_status == "Solve_Succeeded" else None
             if start is None:
                 start = _judged(nlp, found, ipopt_status)
@@ -99,12 +109,25 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
             yield replace(start, iterations=iterations)
 
 
-def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
-    """Ipopt for the program's structure, over scaled variables and a scaled objective to be minimised."""
+def _problem(nlp: Nlp) -> dict[str, SX]:
+    """The program's structure over scaled variables and a scaled objective to be minimised."""
     program = nlp.program
     s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
     F, g = program.values.call([centre + scale * s, program.p])
-    options: dict[str, Any] = {
+    return {"x": s, "p": ca.vertcat(program.p, centre, scale, weight), "f": weight * F, "g": g}
+
+
+def _compiled(problem: dict[str, SX]) -> str:
+    """A library with everything of a problem that Ipopt calls, for CasADi to load as external functions."""
+    solver = ca.nlpsol("solver", "ipopt", problem, _options(1))
+    generator = ca.CodeGenerator("problem.c")
+    for function in (solver.oracle(), *(solver.get_function(name) for name in solver.get_function())):
+        generator.add(function)
+    return str(shared_library(generator.dump()))
+
+
+def _options(max_iterations: int) -> dict[str, Any]:
+    return {
         "print_time": False,
         "show_eval_warnings": False,
         "error_on_fail": False,
@@ -121,8 +144,6 @@ def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
             "nlp_scaling_method": "none",
         },
     }
-    problem = {"x": s, "p": ca.vertcat(program.p, centre, scale, weight), "f": weight * F, "g": g}
-    return ca.nlpsol("solver", "ipopt", problem, options)
 
 
 def _recognised(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:

@@ -107,6 +107,7 @@ def solve(
     starts: int | None = None,
     seed: int | None = None,
     jobs: int | None = None,
+    compiled: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
     """Solve a case with one task.
@@ -116,14 +117,17 @@ def solve(
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
         jobs: number of threads; the result does not depend on it. Left out, as many as there are processors and work.
+        compiled: whether Ipopt calls the objective as compiled C.
         progress: called after each start with the number done, the number of all, and the best F so far.
 
     Raises:
         CaseError: the case has several tasks, or contradicts itself.
+        InputError: the objective is to be compiled, and there is no C compiler or it fails.
     """
     if len(case.tasks) > 1:
         raise CaseError("task", "are several: solve_tasks brings them together", len(case.tasks), case.source)
-    return solve_nlp(formulate(case), case.search.but(starts, seed), jobs=jobs, progress=progress)
+    search = case.search.but(starts, seed, compiled=compiled)
+    return solve_nlp(formulate(case), search, jobs=jobs, progress=progress)
 
 
 def solve_nlp(
@@ -153,7 +157,7 @@ def solve_nlp(
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     done: list[Start] = []
     best: float | None = None
-    for start in search_from(nlp, points, search.max_iterations, jobs):
+    for start in search_from(nlp, points, search, jobs):
         done.append(start)
         if start.status is StartStatus.CONVERGED and (best is None or nlp.sign * start.F < nlp.sign * best):
             best = start.F

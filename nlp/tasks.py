@@ -110,6 +110,7 @@ def solve_tasks(
     starts: int | None = None,
     seed: int | None = None,
     jobs: int | None = None,
+    compiled: bool = False,
     progress: TaskProgress | None = None,
 ) -> Compromise:
     """Solve a case with several tasks by the method that it names.
@@ -119,13 +120,14 @@ def solve_tasks(
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
         jobs: number of threads.
+        compiled: whether Ipopt calls the objective as compiled C.
         progress: called with what is being solved, the starts done, all starts, and the best objective so far.
 
     Raises:
         CaseError: the case has one task only, nothing is free, or it contradicts itself.
     """
     began = time.perf_counter()
-    search = case.search.but(starts, seed)
+    search = case.search.but(starts, seed, compiled=compiled)
     nlps = formulate_each(case)
     if len(nlps) < 2:
         raise CaseError("task", "is one: several are needed to bring them together", source=case.source)

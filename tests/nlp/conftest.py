@@ -1,11 +1,22 @@
-"""What the tests of the command line share."""
+"""What the tests of the command line, and those of generated C, share."""
 
+import ctypes
+import re
+import shutil
+import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.cli import run as command_line
+from screwsynth.nlp.codegen import generate_c
+from screwsynth.nlp.ctext import identifier
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -22,3 +33,105 @@ def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
         return code, out, err
 
     return run
+
+
+@dataclass
+class Solved:
+    """What the solver in C returned."""
+
+    status: int
+    F: float
+    x: np.ndarray
+    R: np.ndarray
+    axis: np.ndarray
+    angle: float
+    violation: float
+    residual: float
+    runs: int
+    converged: int
+    iterations: int
+
+
+class Embedded:
+    """The C of a case, compiled and loaded."""
+
+    def __init__(self, case: Case, folder: Path) -> None:
+        files = generate_c(case, "")
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        self.prefix = identifier(case.name)
+        self.header = files[f"{self.prefix}.h"]
+        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+        library = str(folder / "all.so")
+        compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
+        flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
+        subprocess.run([compiler, *flags, *sources, "-lm", "-o", library], check=True)
+        self._library = ctypes.CDLL(library)
+        self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
+        pointer, number, integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
+
+        class Problem(ctypes.Structure):
+            _fields_ = (
+                *((name, pointer) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper")),
+                *((name, integer) for name in ("maximise", "seeds")),
+            )
+
+        class Result(ctypes.Structure):
+            _fields_ = (
+                ("F", number),
+                ("x", number * (self.n + 1)),
+                ("R", number * 9),
+                ("axis", number * 3),
+                *((name, number) for name in ("angle", "violation", "residual")),
+                *((name, integer) for name in ("runs", "converged", "iterations")),
+            )
+
+        self._problem, self._result = Problem, Result
+        # Room behind what the header asks for, filled with a mark, shows where too much is written.
+        self._work = np.full(self.macro("SOLVER_WORK") + 64, 1234.5)
+        self._iwork = np.full(self.macro("SOLVER_IWORK") + 64, 12345, dtype=np.intc)
+
+    def macro(self, name: str) -> int:
+        (value,) = re.findall(rf"#define {self.prefix.upper()}_{name} (\d+)", self.header)
+        return int(value)
+
+    def call(self, function: str, *arrays: np.ndarray) -> int:
+        return int(getattr(self._library, f"{self.prefix}_{function}")(*[_address(each) for each in arrays]))
+
+    def solve(self, *, maximise: int | None = None, seeds: int | None = None, **arrays: np.ndarray) -> Solved:
+        """Solve the default problem with some of its arrays replaced."""
+        problem, result = self._problem(), self._result()
+        getattr(self._library, f"{self.prefix}_defaults")(ctypes.byref(problem))
+        kept = {name: np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()}
+        for name, array in kept.items():
+            setattr(problem, name, _address(array))
+        if maximise is not None:
+            problem.maximise = maximise
+        if seeds is not None:
+            problem.seeds = seeds
+        solve = getattr(self._library, f"{self.prefix}_solve")
+        status = solve(ctypes.byref(problem), ctypes.byref(result), _address(self._work), _address(self._iwork))
+        assert (self._work[-64:] == 1234.5).all()
+        assert (self._iwork[-64:] == 12345).all()
+        names = ("angle", "violation", "residual", "runs", "converged", "iterations")
+        scalars = {name: getattr(result, name) for name in names}
+        arrays_out = {name: np.array(getattr(result, name)) for name in ("R", "axis")}
+        return Solved(status, result.F, np.array(result.x)[: self.n], **arrays_out, **scalars)
+
+
+def _address(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+@pytest.fixture(scope="session")
+def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Case], Embedded]:
+    """The C of any case."""
+    if not any(shutil.which(name) for name in ("gcc", "clang", "cc")):
+        pytest.skip("no C compiler is installed")
+    return lambda case: Embedded(case, tmp_path_factory.mktemp("c"))
+
+
+@pytest.fixture(scope="session")
+def embedded(embed: Callable[[Case], Embedded]) -> Callable[[str], Embedded]:
+    """The C of a shipped case, made once."""
+    return cache(lambda name: embed(load_case(name)))

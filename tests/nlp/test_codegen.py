@@ -1,21 +1,23 @@
 """The C that a case becomes: it compiles cleanly, agrees with CasADi, and needs nothing else."""
 
-import ctypes
 import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from screwsynth.nlp import case_from_tables, evaluate, formulate, load_case, shipped_cases
+from screwsynth.nlp import Nlp, case_from_tables, formulate, load_case, shipped_cases, solve
 from screwsynth.nlp.casefile import find_case
-from screwsynth.nlp.codegen import generate_c, identifier
+from screwsynth.nlp.codegen import generate_c
+from screwsynth.nlp.ctext import identifier
 from screwsynth.nlp.sampling import starting_points
 
 Run = Callable[..., tuple[int, str, str]]
+Embedded = Any
 
 STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
@@ -41,54 +43,65 @@ def made(where: Path, *words: str) -> str:
 def test_every_shipped_case_compiles_without_a_warning_and_passes_its_test(
     name: str, compiler: str, tmp_path: Path
 ) -> None:
-    printed = made(folder(name, tmp_path), f"CC={compiler}", f"CFLAGS={STRICT}", "test")
+    printed = made(folder(name, tmp_path), f"CC={compiler}", f"CFLAGS={STRICT}", "all", "test")
     (counts,) = re.findall(r"^(\d+) passed, 0 failed$", printed, flags=re.MULTILINE)
     assert int(counts) >= 14
 
 
+def random_points(nlp: Nlp, count: int) -> list[np.ndarray]:
+    return [np.ascontiguousarray(x) for x in starting_points(nlp, count + 1, 7)[1:]] if nlp.n else [nlp.start]
+
+
 @needs_compiler
-def test_compiled_values_are_those_of_the_program_at_random_points(tmp_path: Path) -> None:
-    name = "paper-4.3"
-    where, prefix = folder(name, tmp_path), identifier(name)
-    library = tmp_path / "all.so"
-    sources = [str(where / f"{prefix}{end}") for end in (".c", "_casadi.c")]
-    subprocess.run([COMPILERS[0], "-std=c99", "-O2", "-shared", "-fPIC", *sources, "-lm", "-o", library], check=True)
-    compiled = ctypes.CDLL(str(library))
-    nlp = formulate(load_case(name))
-    n, m = nlp.n, 6
-    p = np.ascontiguousarray(nlp.arguments)
-    work, F, gradient, hessian = np.zeros(64), np.zeros(1), np.zeros(n), np.zeros((n, n))
-    J, rates, g, dg = np.zeros((m, 6)), np.zeros(m), np.zeros(1), np.zeros((1, n))
-
-    def call(function: str, x: np.ndarray, *outputs: np.ndarray) -> int:
-        pointers = [ctypes.c_void_p(each.ctypes.data) for each in (x, p, *outputs, work)]
-        return int(getattr(compiled, f"{prefix}_{function}")(*pointers))
-
-    for point in starting_points(nlp, 1001, 7)[1:]:
-        x = np.ascontiguousarray(point)
-        assert call("F_hessian", x, F, gradient, hessian) == 0
-        assert call("jacobian", x, J) == call("rates", x, rates) == call("limits", x, g, dg) == 0
-        state = evaluate(nlp, x)
-        value, slope, constraint, constraint_slope = nlp.program.kernels.derivatives(x, p)
-        (second,) = nlp.program.kernels.hessian(x, p, 1.0, np.zeros(1))
-        # The same operations in the same order: a compiler may still contract or reorder the last digit.
+@pytest.mark.parametrize("name", shipped_cases())
+def test_compiled_values_are_those_of_the_program_at_a_thousand_points(
+    name: str, embedded: Callable[[str], Embedded]
+) -> None:
+    c, nlp = embedded(name), formulate(load_case(name))
+    p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n
+    m, limits = len(nlp.program.model.wrenches), len(nlp.program.constraints)
+    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+    F, gradient, hessian = np.zeros(1), np.zeros(n), np.zeros((n, n))
+    J, rates, g, dg = np.zeros((m, 6)), np.zeros(m), np.zeros(limits), np.zeros((limits, n))
+    R, axis, angle = np.zeros((3, 3)), np.zeros(3), np.zeros(1)
+    assert c.call("prepare", p, k, work) == 0
+    for x in random_points(nlp, 1000):
+        assert c.call("F", x, k, F, work) == 0
+        alone = F[0]
+        assert c.call("F_gradient", x, k, F, gradient, work) == 0
+        assert F[0] == alone
+        assert c.call("F_hessian", x, k, F, gradient, hessian, work) == 0
+        assert c.call("jacobian", x, k, J, work) == c.call("rates", x, k, rates, work) == 0
+        assert c.call("limits", x, k, g, dg, work) == c.call("rotation", x, k, R, axis, angle, work) == 0
+        value, slope, constraint, constraint_slope = kernels.derivatives(x, p)
+        (second,) = kernels.hessian(x, p, 1.0, np.zeros(limits))
+        _, rotation, _, jacobian, products, *_ = kernels.robot_state(x, p)
+        # The same operations: a compiler may still contract or reorder the last digit.
         for got, wanted in (
             (F, value.ravel()),
             (gradient, slope.ravel()),
             (hessian, second),
-            (J, state.jacobian),
-            (rates, state.rates),
+            (J, jacobian),
+            (rates, products.ravel()),
             (g, constraint.ravel()),
             (dg, constraint_slope),
+            (R, rotation),
         ):
-            assert np.max(np.abs(got - wanted)) <= 1e-14 * max(1.0, float(np.max(np.abs(wanted))))
+            if got.size:
+                assert np.max(np.abs(got - wanted)) <= 1e-14 * max(1.0, float(np.max(np.abs(wanted))))
+        turned = np.eye(3) + np.sin(angle[0]) * cross(axis) + (1 - np.cos(angle[0])) * cross(axis) @ cross(axis)
+        assert np.max(np.abs(turned - R)) <= 1e-13
+
+
+def cross(u: np.ndarray) -> np.ndarray:
+    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
 
 
 @needs_compiler
 def test_only_the_mathematics_library_is_needed(tmp_path: Path) -> None:
     where, prefix = folder("paper-4.1-helical", tmp_path), identifier("paper-4.1-helical")
     made(where, "selftest")
-    objects = [str(where / f"{prefix}{end}.o") for end in ("", "_casadi")]
+    objects = [str(where / f"{prefix}{end}.o") for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
     lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
     wanted = {line.split()[-1] for line in lines if " U " in line}
     assert {symbol for symbol in wanted if not symbol.startswith(prefix)} <= {
@@ -107,13 +120,14 @@ def test_the_header_serves_cpp(tmp_path: Path) -> None:
     (where / "use.cpp").write_text(
         f"""#include "{prefix}.h"
 int main() {{
-    double work[{prefix.upper()}_WORK], F;
-    return {prefix}_F({prefix}_variable_starts, {prefix}_parameter_defaults, &F, work);
+    double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F;
+    if ({prefix}_prepare({prefix}_parameter_defaults, k, work)) return 2;
+    return {prefix}_F({prefix}_variable_starts, k, &F, work);
 }}
 """,
         encoding="utf-8",
     )
-    objects = [f"{prefix}.o", f"{prefix}_casadi.o"]
+    objects = [f"{prefix}{end}.o" for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
     flags = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-variable"]
     subprocess.run([compiler, *flags, "use.cpp", *objects, "-lm", "-o", "use"], cwd=where, check=True)
     assert subprocess.run([str(where / "use")], check=False).returncode == 0
@@ -127,19 +141,94 @@ def test_a_limb_of_zero_length_is_told(tmp_path: Path) -> None:
     (where / "zero.c").write_text(
         f"""#include "{prefix}.h"
 int main(void) {{
-    double work[{prefix.upper()}_WORK], F, x[4] = {{4, 4, 0.2, 0.2}}, p[{prefix.upper()}_P];
+    double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F, x[4] = {{4, 4, 0.2, 0.2}}, p[{prefix.upper()}_P];
     int i;
     for (i = 0; i < {prefix.upper()}_P; ++i) p[i] = {prefix}_parameter_defaults[i];
-    if ({prefix}_F(x, p, &F, work) != 0) return 2;
+    if ({prefix}_prepare(p, k, work) != 0 || {prefix}_F(x, k, &F, work) != 0) return 2;
     p[{z}] = 0;
-    return {prefix}_F(x, p, &F, work) == 1 ? 0 : 3;
+    if ({prefix}_prepare(p, k, work) != 0) return 4;
+    return {prefix}_F(x, k, &F, work) == 1 ? 0 : 3;
 }}
 """,
         encoding="utf-8",
     )
-    objects = [f"{prefix}.o", f"{prefix}_casadi.o"]
+    objects = [f"{prefix}{end}.o" for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
     subprocess.run([COMPILERS[0], "-std=c99", "zero.c", *objects, "-lm", "-o", "zero"], cwd=where, check=True)
     assert subprocess.run([str(where / "zero")], check=False).returncode == 0
+
+
+def run(where: Path, flags: str, *runner: str) -> subprocess.CompletedProcess[str]:
+    """The self-test and a twentieth of the example's ticks, built with the flags and run."""
+    made(where, "clean")
+    example = where / "example.c"
+    example.write_text(example.read_text(encoding="utf-8").replace("TICKS 10000", "TICKS 500"), encoding="utf-8")
+    made(where, f"CC={COMPILERS[0]}", f"CFLAGS=-std=c99 -g {flags}", "selftest", "example")
+    for program in ("selftest", "example"):
+        done = subprocess.run([*runner, str(where / program)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-max", "paper-4.4-snu"])
+def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
+    probe = tmp_path / "probe.c"
+    probe.write_text("int main(void) { return 0; }", encoding="utf-8")
+    flags = "-fsanitize=address,undefined -fno-sanitize-recover=all"
+    built = [COMPILERS[0], *flags.split(), str(probe), "-o", str(tmp_path / "probe")]
+    if subprocess.run(built, check=False, capture_output=True).returncode:
+        pytest.skip("the compiler has no sanitizers")
+    run(folder(name, tmp_path / "c"), f"-O1 {flags}")
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_valgrind_finds_nothing_and_no_heap(tmp_path: Path) -> None:
+    valgrind = shutil.which("valgrind")
+    if valgrind is None:
+        pytest.skip("valgrind is not installed")
+    where = folder("paper-4.1-rotation", tmp_path)
+    done = run(where, "-O1", valgrind, "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
+    # What printf takes is one buffer; the library takes nothing.
+    assert re.search(r"total heap usage: 1 allocs", done.stderr), done.stderr
+
+
+@needs_compiler
+def test_ten_million_calls_take_no_memory(tmp_path: Path) -> None:
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("the system has no /proc/self/statm to read the size of a process from")
+    where, prefix = folder("paper-4.1-helical", tmp_path), identifier("paper-4.1-helical")
+    made(where, "selftest")
+    (where / "many.c").write_text(
+        f"""#include "{prefix}.h"
+#include <stdio.h>
+static long pages(void) {{
+    long size = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (!file || fscanf(file, "%ld", &size) != 1) size = -1;
+    if (file) fclose(file);
+    return size;
+}}
+int main(void) {{
+    static double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F, sum;
+    long before, call;
+    if ({prefix}_prepare({prefix}_parameter_defaults, k, work)) return 2;
+    pages();
+    before = pages();
+    for (call = 0; call < 10000000; ++call) {{
+        if ({prefix}_F({prefix}_variable_starts, k, &F, work)) return 3;
+        sum += F;
+    }}
+    printf("%ld %ld %g\\n", before, pages(), sum);
+    return pages() == before && before > 0 ? 0 : 1;
+}}
+""",
+        encoding="utf-8",
+    )
+    objects = [f"{prefix}{end}.o" for end in ("", "_casadi")]
+    subprocess.run([COMPILERS[0], "-std=c99", "-O2", "many.c", *objects, "-lm", "-o", "many"], cwd=where, check=True)
+    assert subprocess.run([str(where / "many")], check=False).returncode == 0
 
 
 def test_the_same_case_gives_the_same_bytes() -> None:
@@ -181,3 +270,42 @@ def test_other_languages_and_precisions_are_refused(tmp_path: Path, cli: Run, op
     assert code == 2
     assert len(err.splitlines()) == 1
     assert not (tmp_path / "made").exists()
+
+
+@needs_compiler
+def test_a_compiled_solve_is_the_same_and_compiles_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    interpreted, compiled = (solve(load_case("paper-4.3"), starts=6, compiled=choice) for choice in (False, True))
+    assert abs(interpreted.F - compiled.F) <= 1e-12 * interpreted.F
+    (library,) = (tmp_path / "screwsynth").iterdir()
+    made_at = library.stat().st_mtime_ns
+    code, out, err = cli("solve", "paper-4.3", "--starts", "2", "--compiled")
+    assert (code, err) == (0, "")
+    assert "408.803" in out
+    assert [path.stat().st_mtime_ns for path in (tmp_path / "screwsynth").iterdir()] == [made_at]
+
+
+@pytest.mark.parametrize("compiler", ["no-such-compiler", "false"])
+def test_compiling_without_a_compiler_is_told_in_a_sentence(
+    compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("CC", compiler)
+    code, out, err = cli("solve", "paper-4.1-helical", "--compiled")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert "compiler" in err
+
+
+@needs_compiler
+def test_cmake_builds_it_too(tmp_path: Path) -> None:
+    cmake = shutil.which("cmake")
+    if cmake is None:
+        pytest.skip("cmake is not installed")
+    where, build = folder("paper-4.2", tmp_path / "c"), tmp_path / "build"
+    for words in (["-S", str(where), "-B", str(build)], ["--build", str(build)]):
+        done = subprocess.run([cmake, *words], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert subprocess.run([str(build / "selftest")], check=False, capture_output=True).returncode == 0
