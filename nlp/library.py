@@ -6,11 +6,7 @@ A library is made once for its text, compiler and flags, under the user's cache 
 
 from __future__ import annotations
 
-import hashlib
 import os
-import shutil
-import subprocess
-import tempfile
 from pathlib import Path
 
 from screwsynth.nlp.errors import InputError
@@ -24,6 +20,9 @@ def shared_library(source: str) -> Path:
     Raises:
         InputError: there is no C compiler, or it fails.
     """
+    import hashlib
+    import tempfile
+
     compiler = _compiler()
     version = _run([compiler, "--version"])
     key = hashlib.sha256("\0".join([source, compiler, version, *_FLAGS]).encode()).hexdigest()
@@ -41,6 +40,8 @@ def shared_library(source: str) -> Path:
 
 
 def _compiler() -> str:
+    import shutil
+
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
     for name in wanted:
         found = shutil.which(name)
@@ -50,6 +51,8 @@ def _compiler() -> str:
 
 
 def _run(words: list[str]) -> str:
+    import subprocess
+
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False)  # noqa: S603 - the user's own compiler
     except OSError as error:
@@ -62,6 +65,8 @@ def _run(words: list[str]) -> str:
 
 def _folder() -> Path:
     """The user's cache; a fresh folder where there can be none."""
+    import tempfile
+
     base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     try:
         folder = Path(base).expanduser() / "screwsynth"
