@@ -23,8 +23,8 @@ DRIVER = """#include "ID.h"
 #include <stdio.h>
 #include <time.h>
 int main(void) {
-    static double work[BIG_SOLVER_WORK], x[BIG_N + 1];
-    static int iwork[BIG_SOLVER_IWORK];
+    static double work[BIG_SOLVERWORK], x[BIG_N + 1];
+    static int iwork[BIG_SOLVERIWORK];
     ID_problem problem;
     ID_result result;
     ID_defaults(&problem);
@@ -64,7 +64,7 @@ with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / file).write_text(text)
     (Path(folder) / "driver.c").write_text(DRIVER.replace("ID", prefix).replace("BIG", prefix.upper()))
     (Path(folder) / "handwritten.c").write_text((Path(__file__).parent / "handwritten.c").read_text())
-    parts = [f"{prefix}{end}.c" for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+    parts = [f"{prefix}{end}.c" for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
     for program in ("driver", "handwritten"):
         flags = ["-O2", "-std=gnu99", f"{program}.c", *parts, "-lm", "-o", program]
         subprocess.run([os.environ.get("CC", "cc"), *flags], cwd=folder, check=True)

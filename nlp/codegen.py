@@ -19,7 +19,7 @@ import numpy as np
 
 from screwsynth.models import Dimension, FloatArray
 from screwsynth.nlp.case import Case, Sense
-from screwsynth.nlp.ctext import comment, identifier, matrix, numbers, texts
+from screwsynth.nlp.ctext import comment, identifier, integers, matrix, numbers, texts
 from screwsynth.nlp.errors import InputError
 from screwsynth.nlp.formulation import formulate
 from screwsynth.nlp.program import Nlp
@@ -32,10 +32,10 @@ _TEMPLATES = Path(__file__).parent / "c"
 _PARTS = {
     ".h": "api.h",
     ".c": "api.c",
-    "_solver.c": "solver.c",
-    "_sqp.h": "sqp.h",
-    "_sqp.c": "sqp.c",
-    "_qp.c": "qp.c",
+    "-solver.c": "solver.c",
+    "-sqp.h": "sqp.h",
+    "-sqp.c": "sqp.c",
+    "-qp.c": "qp.c",
 }
 #: Starting points that the solver comes with.
 _SEEDS = 16
@@ -63,12 +63,13 @@ def generate_c(case: Case, source: str) -> dict[str, str]:
         InputError: the case contradicts itself, or its functions have no finite value anywhere.
     """
     nlp = formulate(case)
-    staged = stage(nlp.program, f"{identifier(case.name)}_casadi")
+    staged = stage(nlp.program, f"{identifier(case.name)}_CASADI")
     names = _names(nlp, staged)
     files = {f"{names['id']}{ending}": _filled(f"{part}.in", names) for ending, part in _PARTS.items()}
     for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _filled(f"{name}.in", names)
-    return files | _casadi_files(staged.all, f"{names['id']}_casadi") | {"case.toml": source}
+    casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
+    return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
 
 
 def _filled(template: str, names: dict[str, str]) -> str:
@@ -76,20 +77,21 @@ def _filled(template: str, names: dict[str, str]) -> str:
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
+    """C and header by ending; the name stands in front of what CasADi names itself."""
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int"})
     for function in functions:
         generator.add(function)
     # CasADi writes files only.
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + os.sep)
-        return {f"{name}{end}": (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
+        return {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
 
 
 def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
     """What stands in the templates' places."""
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
-    size = len(prefix) + len("_casadi_")
+    size = len(prefix) + len("_CASADI_")
     functions = staged.all
     solution = solve_nlp(nlp, case.search)
     points, references = _references(nlp)
@@ -141,11 +143,13 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     case, program = nlp.case, nlp.program
     units = {Dimension.LENGTH: case.units.length, Dimension.ANGLE: "rad", Dimension.NUMBER: ""}
     lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
+    kinds = list(Dimension)
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
-        "/* Free variables: names, units, bounds, and where a search may begin. */",
+        "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
         texts(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
         texts(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
+        integers(f"{prefix}_variable_kinds", N, [kinds.index(each.dimension) for each in program.variables]),
         numbers(f"{prefix}_variable_lower", N, nlp.lower),
         numbers(f"{prefix}_variable_upper", N, nlp.upper),
         numbers(f"{prefix}_variable_starts", N, nlp.start),

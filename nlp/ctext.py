@@ -9,8 +9,13 @@ from screwsynth.models import FloatArray
 
 
 def identifier(name: str) -> str:
-    """The prefix of a case's C names: valid in C whatever the case is called."""
-    return "screwsynth_" + re.sub(r"[^0-9a-z]+", "_", name.lower(), flags=re.ASCII).strip("_")
+    """The prefix of a case's C names: valid in C whatever the case is called.
+
+    What is added behind it is one word, has a capital letter, or for files a hyphen: two cases with different prefixes
+    have no name in common.
+    """
+    plain = re.sub(r"[^0-9a-z]+", "_", name.lower(), flags=re.ASCII).strip("_")
+    return f"screwsynth_{plain or 'case'}"
 
 
 def texts(name: str, size: str, values: Iterable[str]) -> str:
@@ -23,6 +28,11 @@ def numbers(name: str, size: str, values: Iterable[float]) -> str:
     """A constant table of numbers, ended by a zero so that none is empty."""
     listed = ", ".join([*(repr(float(value)) for value in values), "0.0"])
     return f"static const double {name}[{size} + 1] = {{{listed}}};"
+
+
+def integers(name: str, size: str, values: Iterable[int]) -> str:
+    """A constant table of whole numbers, ended by a zero so that none is empty."""
+    return f"static const int {name}[{size} + 1] = {{{', '.join(map(str, [*values, 0]))}}};"
 
 
 def matrix(declared: str, rows: Iterable[FloatArray]) -> str:

@@ -61,7 +61,7 @@ class Embedded:
             (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
         flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
@@ -88,8 +88,8 @@ class Embedded:
 
         self._problem, self._result = Problem, Result
         # Room behind what the header asks for, filled with a mark, shows where too much is written.
-        self._work = np.full(self.macro("SOLVER_WORK") + 64, 1234.5)
-        self._iwork = np.full(self.macro("SOLVER_IWORK") + 64, 12345, dtype=np.intc)
+        self._work = np.full(self.macro("SOLVERWORK") + 64, 1234.5)
+        self._iwork = np.full(self.macro("SOLVERIWORK") + 64, 12345, dtype=np.intc)
 
     def macro(self, name: str) -> int:
         (value,) = re.findall(rf"#define {self.prefix.upper()}_{name} (\d+)", self.header)
@@ -109,6 +109,17 @@ class Embedded:
             problem.maximise = maximise
         if seeds is not None:
             problem.seeds = seeds
+        return self._solved(problem, result)
+
+    def solve_again(self) -> Solved:
+        """Solve the default problem, and again from the result's own x, into the same result."""
+        problem, result = self._problem(), self._result()
+        getattr(self._library, f"{self.prefix}_defaults")(ctypes.byref(problem))
+        self._solved(problem, result)
+        problem.x0, problem.seeds = ctypes.addressof(result) + self._result.x.offset, 0
+        return self._solved(problem, result)
+
+    def _solved(self, problem: ctypes.Structure, result: ctypes.Structure) -> Solved:
         solve = getattr(self._library, f"{self.prefix}_solve")
         status = solve(ctypes.byref(problem), ctypes.byref(result), _address(self._work), _address(self._iwork))
         assert (self._work[-64:] == 1234.5).all()

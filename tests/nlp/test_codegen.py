@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -101,11 +102,11 @@ def cross(u: np.ndarray) -> np.ndarray:
 def test_only_the_mathematics_library_is_needed(tmp_path: Path) -> None:
     where, prefix = folder("paper-4.1-helical", tmp_path), identifier("paper-4.1-helical")
     made(where, "selftest")
-    objects = [str(where / f"{prefix}{end}.o") for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+    objects = [str(where / f"{prefix}{end}.o") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
     lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
     wanted = {line.split()[-1] for line in lines if " U " in line}
     assert {symbol for symbol in wanted if not symbol.startswith(prefix)} <= {
-        "sin", "sincos", "cos", "sqrt", "atan2", "memcpy", "memset", "__stack_chk_fail",
+        "sin", "sincos", "cos", "sqrt", "atan2", "fmin", "fmax", "memcpy", "memset", "__stack_chk_fail",
     }  # fmt: skip
     assert not [line for line in lines if line.split()[-2:-1] in (["D"], ["B"], ["d"], ["b"])]
 
@@ -127,7 +128,7 @@ int main() {{
 """,
         encoding="utf-8",
     )
-    objects = [f"{prefix}{end}.o" for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+    objects = [f"{prefix}{end}.o" for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
     flags = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-variable"]
     subprocess.run([compiler, *flags, "use.cpp", *objects, "-lm", "-o", "use"], cwd=where, check=True)
     assert subprocess.run([str(where / "use")], check=False).returncode == 0
@@ -152,7 +153,7 @@ int main(void) {{
 """,
         encoding="utf-8",
     )
-    objects = [f"{prefix}{end}.o" for end in ("", "_solver", "_sqp", "_qp", "_casadi")]
+    objects = [f"{prefix}{end}.o" for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
     subprocess.run([COMPILERS[0], "-std=c99", "zero.c", *objects, "-lm", "-o", "zero"], cwd=where, check=True)
     assert subprocess.run([str(where / "zero")], check=False).returncode == 0
 
@@ -226,7 +227,7 @@ int main(void) {{
 """,
         encoding="utf-8",
     )
-    objects = [f"{prefix}{end}.o" for end in ("", "_casadi")]
+    objects = [f"{prefix}{end}.o" for end in ("", "-casadi")]
     subprocess.run([COMPILERS[0], "-std=c99", "-O2", "many.c", *objects, "-lm", "-o", "many"], cwd=where, check=True)
     assert subprocess.run([str(where / "many")], check=False).returncode == 0
 
@@ -236,9 +237,25 @@ def test_the_same_case_gives_the_same_bytes() -> None:
     assert generate_c(case, "text") == generate_c(load_case("paper-4.3"), "text")
 
 
-@pytest.mark.parametrize("name", ["paper-4.1-helical", "3 legs!", "größe", "a__b", "", "*/", "int"])
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "3 legs!", "größe", "a__b", "", "*/", "int", "日本"])
 def test_names_are_identifiers(name: str) -> None:
-    assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", identifier(name))
+    assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier(name))
+    tables = tomllib.loads(find_case("paper-4.2").read_text(encoding="utf-8"))
+    assert f"{identifier(name)}.h" in generate_c(case_from_tables(tables, name=name, source="x.toml"), "")
+
+
+def test_names_of_two_cases_do_not_meet() -> None:
+    tables = tomllib.loads(find_case("paper-4.2").read_text(encoding="utf-8"))
+    declared: dict[str, set[str]] = {}
+    for name in ("x", "x solver", "x-sqp", "x qp", "x casadi", "x-f", "x variable"):
+        files = generate_c(case_from_tables(tables, name=name, source="x.toml"), "")
+        own = {file for file in files if file.startswith("screwsynth")}
+        text = "\n".join(files[file] for file in own)
+        own |= set(re.findall(r"#define (SCREWSYNTH_\w+)", text)) - {"SCREWSYNTH_STATUS"}
+        own |= set(re.findall(r"^[\w *]*?\b(screwsynth_[A-Za-z0-9_]+)\(", text, flags=re.MULTILINE))
+        for other, theirs in declared.items():
+            assert not own & theirs - {"screwsynth_status"}, (name, other, own & theirs)
+        declared[name] = own
 
 
 @needs_compiler

@@ -4,12 +4,25 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, build_model, formulate, load_case, shipped_cases
+from screwsynth.nlp import (
+    Case,
+    Free,
+    Nlp,
+    Rotation,
+    Sense,
+    Task,
+    build_model,
+    codegen,
+    formulate,
+    load_case,
+    shipped_cases,
+)
 from screwsynth.nlp.case import Search
 from screwsynth.nlp.kkt import linearise, multipliers
 from screwsynth.nlp.sampling import starting_points
@@ -225,6 +238,81 @@ def test_a_saddle_is_left(embedded: EmbeddedCase) -> None:
     assert residual <= STATIONARY or violation > 0
     solved = c.solve(x0=nlp.start, seeds=0)
     assert (solved.status, solved.F) == (OK, pytest.approx(3.0, rel=1e-6))
+
+
+def test_a_search_that_is_cut_off_is_no_answer(
+    embed: Embed, embedded: EmbeddedCase, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(codegen, "_ITERATIONS", 4)
+    unfinished = 0
+    for name in ("paper-4.3", "paper-4.4-max", "paper-4.1-rotation"):
+        c, nlp = embed(load_case(name)), formulate(load_case(name))
+        best = embedded(name).solve().F
+        for x in starting_points(nlp, 101, 8)[1:]:
+            solved = c.solve(x0=x, seeds=0)
+            assert solved.iterations <= 4
+            if solved.status == OK:
+                violation, residual = kkt(nlp, solved.x)
+                assert violation <= FEASIBLE
+                assert residual <= STATIONARY
+                assert abs(solved.F - best) <= 1e-6 * best
+            unfinished += solved.status != OK
+    assert unfinished > 150
+
+
+def test_a_side_that_only_rounding_holds_does_not_make_an_optimum(embedded: EmbeddedCase) -> None:
+    # With this task F is even in several variables: their middles are bounds here, stationary, and saddles.
+    c, nlp = embedded("paper-4.3"), formulate(load_case("paper-4.3"))
+    at = [argument.name for argument in nlp.program.arguments].index("twist_0")
+    p = np.array(nlp.arguments)
+    p[at : at + 6] = [0, 0, 0, 0, 1, 0]
+    lower = np.array([0, 0, 0, 20, 0, 0, -0.3235238064])
+    upper = np.array([nlp.upper[0], 10, 10, 50, 0.3235238064, 0, 0])
+    symmetric, half = np.clip([0.3, 0, 0, 30, 0, 0, 0], lower, upper), (upper - lower) / 2
+    generator, checked = np.random.default_rng(0), 0
+    F = nlp.program.kernels.values
+    for _ in range(200):
+        x0 = np.where(generator.random(7) < 0.4, generator.uniform(lower, upper), symmetric)
+        solved = c.solve(p=p, lower=lower, upper=upper, x0=x0, seeds=0, maximise=0)
+        if solved.status != OK:
+            continue
+        checked += 1
+        here = float(F(solved.x, p)[0][0, 0])
+        for i in range(7):
+            inward = np.eye(7)[i] * half[i] * (0.01 if solved.x[i] - lower[i] < upper[i] - solved.x[i] else -0.01)
+            assert float(F(solved.x + inward, p)[0][0, 0]) >= here - 1e-9 * nlp.objective_scale
+    assert checked > 100
+
+
+def test_the_residual_is_in_parts_of_the_size_of_f_where_it_is_found(embedded: EmbeddedCase) -> None:
+    c, nlp = embedded("paper-4.1-helical"), formulate(load_case("paper-4.1-helical"))
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    lower[:3], upper[:3] = [-300, -300, 20], [300, 300, 600]
+    wide, checked = replace(nlp, lower=lower, upper=upper), 0
+    for x0 in starting_points(wide, 61, 4)[1:]:
+        solved = c.solve(lower=lower, upper=upper, x0=x0, seeds=0, maximise=0)
+        if solved.status == OK:
+            # The scale of F is taken at the start: here, where the search ended.
+            assert kkt(replace(wide, start=solved.x, sense=Sense.MIN), solved.x)[1] <= STATIONARY
+            checked += 1
+    assert checked > 20
+
+
+def test_among_equal_optima_x_stays_where_it_was(embedded: EmbeddedCase) -> None:
+    c = embedded("paper-4.2")
+    somewhere = c.solve(seeds=16).x
+    nlp = formulate(load_case("paper-4.2"))
+    for x0 in starting_points(nlp, 21, 6)[1:]:
+        own = c.solve(x0=x0, seeds=0)
+        assert own.status == OK
+        again = c.solve(x0=own.x)
+        assert np.max(np.abs(again.x - own.x)) <= 1e-6
+    assert np.max(np.abs(own.x - somewhere)) > 1e-3
+
+
+def test_the_point_may_be_that_of_the_last_result(embedded: EmbeddedCase) -> None:
+    c = embedded("paper-4.1-helical")
+    assert c.solve_again().iterations <= 2
 
 
 def test_tracking_follows_an_optimum_without_a_jump(embedded: EmbeddedCase) -> None:
