@@ -15,8 +15,21 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis, unit_vector
+from screwsynth.models import (
+    Dimension,
+    FloatArray,
+    Model,
+    Parameter,
+    component_names,
+    frozen_array,
+    screw_from_axis,
+    unit_vector,
+)
 from screwsynth.nlp.errors import CaseError, nearest
+from screwsynth.nlp.limitcheck import checked_limits
+from screwsynth.nlp.limits import Limits
+from screwsynth.nlp.poses import HERE, Step
+from screwsynth.nlp.sentence import SentenceError, parse
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:
@@ -77,6 +90,29 @@ class Rotation:
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
     angle: Value = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A pose of the platform, and the poses that follow from it.
+
+    Attributes:
+        position: origin of the platform frame in the world frame, length.
+        rotation: orientation of the platform.
+        steps: displacements of this pose, one for each pose that the robot takes.
+    """
+
+    position: Sequence[Value]
+    rotation: Rotation = field(default_factory=Rotation)
+    steps: tuple[Step, ...] = (HERE,)
+
+
+class OverPoses(enum.Enum):
+    """What F is over several poses."""
+
+    SUM = "sum"
+    MEAN = "mean"
+    WORST = "worst"
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,6 +260,11 @@ class Case:
         units: units for people.
         characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
             constraint couples.
+        limits: what a design must keep to be built.
+        steps: displacements of the pose above, one for each pose that the robot takes.
+        further: other poses, with their displacements. The robot's dimensions are the same at all of them.
+        over_poses: what F is over several poses.
+        joint_centre_tolerance: how far off a joint centre may be built, length; None leaves it out.
         search: how the solver searches.
         method: how several tasks are brought together; the average is equation 15.
         title, name: for people; the name is the file's.
@@ -243,6 +284,11 @@ class Case:
     rotation: Rotation = field(default_factory=Rotation)
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
+    limits: Limits = field(default_factory=Limits)
+    steps: tuple[Step, ...] = (HERE,)
+    further: Sequence[Pose] = ()
+    over_poses: OverPoses = OverPoses.SUM
+    joint_centre_tolerance: float | None = None
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE
     title: str = ""
@@ -254,9 +300,11 @@ class Case:
     def __post_init__(self) -> None:
         settle = object.__setattr__
         settle(self, "parameters", MappingProxyType(_parameters(self)))
-        settle(self, "position", _position(self))
-        settle(self, "rotation", _rotation(self))
+        settle(self, "position", _position(self, self.position, "pose"))
+        settle(self, "rotation", _rotation(self, self.rotation, "pose"))
+        settle(self, "further", _further(self))
         settle(self, "tasks", _tasks(self))
+        _check_buildable(self)
         if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
@@ -269,6 +317,27 @@ class Case:
     def axis(self) -> FloatArray | None:
         """Held axis of rotation, (3,) unit, or None when it is free."""
         return None if self.rotation.axis is None else frozen_array(self.rotation.axis, (3,))
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """The poses as they are stated, each with its displacements."""
+        return (Pose(self.position, self.rotation, self.steps), *self.further)
+
+    @property
+    def pose_prefixes(self) -> tuple[str, ...]:
+        """What stands before the names of each stated pose's numbers: nothing for a single one."""
+        count = 1 + len(self.further)
+        return ("",) if count == 1 else tuple(f"pose{k + 1}_" for k in range(count))
+
+    @property
+    def scalars(self) -> Mapping[str, Dimension]:
+        """Names of the case's own numbers, which ``limits.custom`` may relate, with what they measure."""
+        names = {part: item.dimension for item in self.model.parameters for part in item.components}
+        for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
+            names |= dict.fromkeys((f"{prefix}{part}" for part in component_names("p", 3)), Dimension.LENGTH)
+            if pose.rotation.axis is not None:
+                names[f"{prefix}angle"] = Dimension.ANGLE
+        return names
 
 
 def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
@@ -306,17 +375,48 @@ def _expected(parameter: Parameter) -> str:
     return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
 
 
-def _position(case: Case) -> tuple[Value, ...]:
-    if len(case.position) != 3:
-        raise CaseError("pose.position", "must be a list of 3, each a number or { min, max }")
+def _position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
+    if len(position) != 3:
+        raise CaseError(f"{pose}.position", "must be a list of 3, each a number or { min, max }")
     return tuple(
-        _checked(value, f"pose.position[{index}]", Dimension.LENGTH, case.units)
-        for index, value in enumerate(case.position)
+        _checked(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
+        for index, value in enumerate(position)
     )
 
 
-def _rotation(case: Case) -> Rotation:
-    given, key = case.rotation, "pose.rotation.angle"
+def _further(case: Case) -> tuple[Pose, ...]:
+    keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
+    settled = [
+        Pose(_position(case, pose.position, key), _rotation(case, pose.rotation, key), tuple(pose.steps))
+        for pose, key in zip(case.further, keys, strict=True)
+    ]
+    steps = [case.steps, *(pose.steps for pose in settled)]
+    for key, own in zip(["pose", *keys], steps, strict=True):
+        if not own:
+            raise CaseError(key, "must have at least one pose")
+    several = sum(map(len, steps)) > 1
+    if several and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
+        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
+    return tuple(settled)
+
+
+def _check_buildable(case: Case) -> None:
+    """Check the limits against the robot, and that each sentence among them can be understood."""
+    checked_limits(case.limits, case.model, case.units)
+    for index, text in enumerate(case.limits.custom):
+        try:
+            parse(text, case.scalars)
+        except SentenceError as error:
+            raise CaseError(f"limits.custom[{index}]", str(error), text) from None
+    tolerance = case.joint_centre_tolerance
+    if tolerance is not None and not (0 < tolerance <= LARGEST):
+        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
+    if tolerance is not None and not case.model.built:
+        raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")
+
+
+def _rotation(case: Case, given: Rotation, pose: str) -> Rotation:
+    key = f"{pose}.rotation.angle"
     if given.axis is None:
         limit, why = MAX_FREE_ROTATION, "with the axis free"
     else:
@@ -331,7 +431,7 @@ def _rotation(case: Case) -> Rotation:
     if given.axis is None and isinstance(angle, Free) and lopsided:
         fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
         raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
-    axis = None if given.axis is None else _unit(given.axis, "pose.rotation.axis")
+    axis = None if given.axis is None else _unit(given.axis, f"{pose}.rotation.axis")
     return Rotation(axis, angle)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import screwsynth.cases
 from screwsynth.models import Dimension, FloatArray, component_names, screw_from_axis
-from screwsynth.nlp import document
+from screwsynth.nlp import buildcase, document
 from screwsynth.nlp.case import (
     LARGEST,
     Case,
@@ -21,6 +21,8 @@ from screwsynth.nlp.case import (
     ExpectedValue,
     Free,
     Method,
+    OverPoses,
+    Pose,
     Published,
     Rotation,
     Search,
@@ -125,21 +127,32 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
     search = written.solve
-    if written.combine is not None and len(written.task) == 1:
-        raise CaseError("combine", "means nothing for one task; take it out, or give another [[task]]")
+    poses = written.pose if isinstance(written.pose, list) else [written.pose]
+    tasks = _tasks(written.task)
+    steps = [buildcase.steps(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
+    method, over_poses = _combination(written, sum(map(len, steps)))
+    first, *further = [
+        Pose([_value(part, units, Dimension.LENGTH) for part in pose.position], _rotation(pose.rotation, units), moves)
+        for pose, moves in zip(poses, steps, strict=True)
+    ]
     return Case(
         model=model,
         parameters={
             key: _parameter(key, given, units, dimensions.get(key, Dimension.NUMBER))
             for key, given in written.robot.parameters.items()
         },
-        position=[_value(part, units, Dimension.LENGTH) for part in written.pose.position],
-        rotation=_rotation(written.pose.rotation, units),
-        tasks=_tasks(written.task),
+        position=first.position,
+        rotation=first.rotation,
+        steps=first.steps,
+        further=further,
+        over_poses=over_poses,
+        limits=buildcase.limits(written.limits, model, units),
+        joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
+        tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,
         search=Search(search.starts, search.seed, search.max_iterations),
-        method=Method.AVERAGE if written.combine is None else Method(written.combine.method),
+        method=method,
         title=written.title,
         name=name,
         expect=_expectation(written.expect),
@@ -157,6 +170,23 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         ),
         source=source,
     )
+
+
+def _pose_keys(written: document.Document) -> list[str]:
+    return [f"pose[{k}]" for k in range(len(written.pose))] if isinstance(written.pose, list) else ["pose"]
+
+
+def _combination(written: document.Document, poses: int) -> tuple[Method, OverPoses]:
+    """How tasks and poses are brought together; what means nothing for the case is refused."""
+    combine = written.combine
+    if combine is None:
+        return Method.AVERAGE, OverPoses.SUM
+    if len(written.task) == 1 and (combine.method is not None or combine.over_poses is None):
+        key = "combine" if combine.over_poses is None else "combine.method"
+        raise CaseError(key, "means nothing for one task; take it out, or give another [[task]]")
+    if poses == 1 and combine.over_poses is not None:
+        raise CaseError("combine.over_poses", "means nothing for one pose; take it out, or give another [[pose]]")
+    return Method(combine.method or "average"), OverPoses(combine.over_poses or "sum")
 
 
 def _expectation(written: document.ExpectTable) -> Expectation:
@@ -225,7 +255,8 @@ def _screw(written: document.TaskTable, key: str) -> FloatArray:
 def _set(tables: dict[str, Any], name: str, value: Any) -> None:  # noqa: ANN401 - whatever TOML can hold
     """Replace one number in the document's tables; what it cannot find it refuses."""
     parameters = tables.get("robot", {}).get("parameters", {})
-    pose = tables.setdefault("pose", {})
+    given_poses = tables.setdefault("pose", {})
+    pose = given_poses if isinstance(given_poses, dict) else {}
     places: dict[str, tuple[Any, int | str]] = {}
     for key, given in parameters.items():
         places[key] = (parameters, key)

@@ -9,9 +9,10 @@ from types import MappingProxyType
 import numpy as np
 
 from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
-from screwsynth.nlp.case import Free
+from screwsynth.nlp.case import Case, Free, Pose
 from screwsynth.nlp.errors import EvaluationError
 from screwsynth.nlp.linear import plain_basis
+from screwsynth.nlp.poses import Step
 from screwsynth.nlp.program import Nlp, vanished
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
@@ -65,12 +66,13 @@ class RobotState:
         return self.rank < 6
 
 
-def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
+def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     """The robot at a point of the program.
 
     Args:
         nlp: the program.
         x: (n,) values of its free variables.
+        pose: index of the pose, of a case with several.
 
     Returns:
         The robot with the rates of the program's task; of its first, where it combines several.
@@ -80,7 +82,7 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
-    outputs = nlp.program.kernels.robot_state(x, nlp.arguments)
+    outputs = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
     components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
     for row, square in zip(model.wrenches, squares.ravel(), strict=True):
         if not square > 0:
@@ -88,9 +90,10 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
-    if case.axis is not None:
-        held = case.rotation.angle
-        axis, angle = case.axis, float(x[nlp.program.index("angle")]) if isinstance(held, Free) else held
+    prefix, stated, step = _stated(case)[pose]
+    if stated.rotation.axis is not None and step.is_identity:
+        held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
+        angle = float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
     rank, free_twists = _rank(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
@@ -117,6 +120,13 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
             }
         ),
     )
+
+
+def _stated(case: Case) -> list[tuple[str, Pose, Step]]:
+    """The stated pose that each pose comes from: what its names begin with, the pose, and the displacement."""
+    return [
+        (prefix, pose, step) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True) for step in pose.steps
+    ]
 
 
 def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:

@@ -23,10 +23,13 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Free, Sense
+from screwsynth.nlp.case import Case, Free, OverPoses, Sense
 from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.layout import Bounded, Layout, free_directions, lay_out
-from screwsynth.nlp.program import SQUARES, Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.layout import Layout, free_directions, lay_out
+from screwsynth.nlp.program import SQUARES, Bounded, Constraint, Nlp, Program, Reading, Scalar, vanished
+
+#: A level that no F of a pose comes near, in parts of F's size where the search begins.
+_FAR = 20.0
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -40,7 +43,9 @@ def formulate(case: Case, task: int = 0) -> Nlp:
         CaseError: a limb has zero length whatever the solver chooses, or fixed numbers contradict each other.
     """
     layout = lay_out(case, [case.tasks[task]])
-    return assemble(layout, layout.robot.F[0], case.tasks[task].sense)
+    if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
+        return _worst_pose(layout, case.tasks[task].sense)
+    return assemble(layout, layout.F[0], case.tasks[task].sense)
 
 
 def formulate_each(case: Case) -> list[Nlp]:
@@ -76,7 +81,7 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
         layout.sheet.place(f"weight{j}", Dimension.NUMBER, s * w)
         for j, (s, w) in enumerate(zip(signs, weights, strict=True))
     ]
-    objective = sum((place * layout.robot.F[j] for j, place in enumerate(places)), SX(0))
+    objective = sum((place * layout.F[j] for j, place in enumerate(places)), SX(0))
     return assemble(layout, objective, sense)
 
 
@@ -101,7 +106,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
     reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
     constraints = []
     for j, task in enumerate(case.tasks):
-        F = layout.robot.F[j]
+        F = layout.F[j]
         weight = sheet.place(f"weight{j}", Dimension.NUMBER, weights[j])
         own = sheet.place(f"best{j}", Dimension.NUMBER, best[j])
         if senses == {Sense.MAX}:
@@ -113,6 +118,23 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         # In parts of the ceiling, so that the rows are of order 1 like the scaled variables.
         constraints.append(Bounded(Constraint(f"task {task.name}", room / size, reading), 0.0, math.inf))
     return assemble(layout, level, Sense.MAX if senses == {Sense.MAX} else Sense.MIN, constraints)
+
+
+def _worst_pose(layout: Layout, sense: Sense) -> Nlp:
+    """The worst pose as one program: the best level that F keeps at every pose.
+
+    The level is bounded far away from every F: by the size that F would have without cancellation.
+    """
+    whole = assemble(layout, layout.F[0], sense)
+    ceiling = _FAR * whole.objective_scale
+    level = layout.sheet.place("level", Dimension.NUMBER, Free(-0.1 * ceiling, ceiling, whole.objective_scale / 2))
+    size = layout.sheet.place("ceiling", Dimension.NUMBER, ceiling)
+    reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
+    constraints = []
+    for k, robot in enumerate(layout.robots):
+        room = robot.F[0] - level if sense is Sense.MAX else level - robot.F[0]
+        constraints.append(Bounded(Constraint(f"F pose {k + 1}", room / size, reading), 0.0, math.inf))
+    return assemble(layout, level, sense, constraints)
 
 
 def near(nlp: Nlp, target: FloatArray, strength: float) -> Nlp:
@@ -153,7 +175,8 @@ def assemble(layout: Layout, objective: SX, sense: Sense, constraints: Sequence[
         p=ca.vertcat(SX(0, 1), *sheet.p),
         objective=objective,
         constraints=tuple(item.constraint for item in bounded),
-        robot=layout.robot,
+        robot=layout.robots[0],
+        further=layout.robots[1:],
         model=case.model,
         directions=free_directions(case.model, sheet.variables),
     )
@@ -167,6 +190,7 @@ def assemble(layout: Layout, objective: SX, sense: Sense, constraints: Sequence[
         start=_vector([bound.first for bound in sheet.bounds]),
         g_lower=_vector([item.lower for item in bounded]),
         g_upper=_vector([item.upper for item in bounded]),
+        met=layout.met,
     )
     _check_limbs(nlp)
     return nlp

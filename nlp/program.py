@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Places of two results among those of :attr:`Program.robot_state`.
+#: Places of two results among those of :meth:`Program.robot_state`.
 SQUARES, MAGNITUDE = 6, 7
 #: Multiples of the golden section, modulo 1, spread evenly.
 _GOLDEN = 0.6180339887498949
@@ -48,20 +48,42 @@ class Reading:
         dimension: what the limit measures for people.
         from_value: the number for people (radians for angles) from the program's limit.
         slope: derivative of the program's limit with respect to the number for people, at the program's limit.
+        to_value: the program's limit from the number for people, as an expression; it never falls where that grows.
     """
 
     dimension: Dimension
     from_value: Callable[[float], float] = lambda value: value
     slope: Callable[[float], float] = lambda _: 1.0
+    to_value: Callable[[SX], SX] = lambda number: number
 
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`."""
+    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`.
+
+    Attributes:
+        name: in the words of a case.
+        expression: (1, 1).
+        reading: how its limits read.
+        keys: dotted keys below ``limits`` of the case's numbers that are its lower and its upper bound; empty for a
+            bound that is none of the case's limits.
+        pose: index of the pose that it is at.
+    """
 
     name: str
     expression: SX
     reading: Reading
+    keys: tuple[str, str] = ("", "")
+    pose: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Bounded:
+    """A constraint with its bounds."""
+
+    constraint: Constraint
+    lower: float
+    upper: float
 
 
 def vanished(row: Wrench) -> str:
@@ -69,6 +91,23 @@ def vanished(row: Wrench) -> str:
     if row.kind is WrenchKind.COUPLE:
         return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
     return f"limb {row.limb!r} has zero length: its two joints coincide"
+
+
+@dataclass(frozen=True, eq=False)
+class LegExpressions:
+    """A leg at the program's point.
+
+    Attributes:
+        name: the limb's name.
+        base: (3, 1) centre of its base joint in the world frame, length.
+        platform: (3, 1) centre of its platform joint in the platform frame, length.
+        span: (3, 1) from base joint to platform joint in the world frame, length.
+    """
+
+    name: str
+    base: SX
+    platform: SX
+    span: SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +125,7 @@ class RobotExpressions:
         magnitude: (tasks, 1) what F would be without cancellation, ``sum (|m_i| |omega| + |f_i| |v|)^2`` with moments
             and velocity taken at the platform's origin, so that it does not depend on where the world's origin is.
         quantities: each of the model's quantities.
+        legs: the model's legs.
     """
 
     parameters: SX
@@ -97,6 +137,7 @@ class RobotExpressions:
     squares: SX
     magnitude: SX
     quantities: tuple[SX, ...]
+    legs: tuple[LegExpressions, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +151,10 @@ class Program:
         p: (k, 1) symbols of the arguments.
         objective: (1, 1) expression that is maximised or minimised.
         constraints: beside the variables' bounds.
-        robot: the robot's expressions.
+        robot: the robot's expressions, at the first pose where there are several.
         model: the robot itself.
         directions: indices in ``x`` of the three components of each unit vector that is wholly free.
+        further: the robot's expressions at the other poses.
     """
 
     variables: tuple[Scalar, ...]
@@ -124,6 +166,12 @@ class Program:
     robot: RobotExpressions
     model: Model
     directions: tuple[tuple[int, int, int], ...] = ()
+    further: tuple[RobotExpressions, ...] = ()
+
+    @property
+    def robots(self) -> tuple[RobotExpressions, ...]:
+        """The robot's expressions at every pose."""
+        return (self.robot, *self.further)
 
     def index(self, name: str) -> int:
         """Place of a free variable in ``x``."""
@@ -154,9 +202,14 @@ class Program:
         return ca.Function("hessian", [self.x, self.p, weight, multipliers], [hessian])
 
     @cached_property
-    def robot_state(self) -> ca.Function:
-        """``(x, p) ->`` every expression of :class:`RobotExpressions`, in its order."""
-        robot = self.robot
+    def argument_derivatives(self) -> ca.Function:
+        """``(x, p) -> (dF/dp as a row, dg/dp)``."""
+        outputs = [ca.jacobian(self.objective, self.p), ca.jacobian(self.g, self.p)]
+        return ca.Function("argument_derivatives", [self.x, self.p], [ca.densify(output) for output in outputs])
+
+    def robot_state(self, pose: int = 0) -> ca.Function:
+        """``(x, p) ->`` every number of :class:`RobotExpressions`, in its order, at one of the poses."""
+        robot = self.robots[pose]
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
         outputs += [robot.squares, robot.magnitude, *robot.quantities]
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
@@ -192,9 +245,19 @@ class Kernels:
         return Kernel(self._program.hessian)
 
     @cached_property
+    def argument_derivatives(self) -> Kernel:
+        """Derivatives by what is fixed."""
+        return Kernel(self._program.argument_derivatives)
+
+    @cached_property
     def robot_state(self) -> Kernel:
-        """The robot's expressions."""
-        return Kernel(self._program.robot_state)
+        """The robot's expressions, at the first pose."""
+        return self.robot_states[0]
+
+    @cached_property
+    def robot_states(self) -> tuple[Kernel, ...]:
+        """The robot's expressions at each pose."""
+        return tuple(Kernel(self._program.robot_state(pose)) for pose in range(len(self._program.robots)))
 
 
 @dataclass(frozen=True)
@@ -245,6 +308,8 @@ class Nlp:
         lower, upper: (n,) bounds of the variables, ``lower < upper``.
         start: (n,) first starting point.
         g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
+        met: limits of the case that hold whatever is chosen, and so are no constraints of the program.
+        size: size of the objective, where it is not made of the robot's F.
     """
 
     program: Program
@@ -256,6 +321,8 @@ class Nlp:
     start: FloatArray
     g_lower: FloatArray
     g_upper: FloatArray
+    met: tuple[Bounded, ...] = ()
+    size: float | None = None
 
     @property
     def n(self) -> int:
@@ -316,6 +383,8 @@ class Nlp:
         Where the robot is not defined there, as with limbs of zero length, it is taken at the first of a few points
         around the middle where it is.
         """
+        if self.size is not None:
+            return self.size
         around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
             size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[MAGNITUDE]))

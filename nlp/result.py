@@ -22,6 +22,7 @@ from screwsynth.nlp.case import Case
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, linearise
+from screwsynth.nlp.margins import costs_of, margins_as_data, margins_of
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import Solution
@@ -53,6 +54,7 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **({} if reached is None else {"reached": reached}),
         **(state_of(case, state, task) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
+        **(_margins(solution.nlp, solution.x, optimal=answer) if state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
         "seed": solution.seed,
@@ -217,6 +219,11 @@ def versions() -> dict[str, str]:
 def _reached(solution: Solution) -> dict[str, Any]:
     nlp = solution.nlp
     return {"F": _finite(nlp.evaluate(solution.x)[0]), "violated": violations(nlp, solution.x)}
+
+
+def _margins(nlp: Nlp, x: FloatArray, *, optimal: bool) -> dict[str, Any]:
+    margins = margins_as_data(nlp, margins_of(nlp, x, optimal=optimal))
+    return {"margins": margins, "limits": costs_of(margins)}
 
 
 def violations(nlp: Nlp, x: FloatArray) -> list[dict[str, Any]]:

@@ -28,6 +28,8 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
     if "parameters" in result:
         console.print(_design(case, result))
         console.print(_limbs(case, result))
+    if result.get("limits"):
+        console.print(_limits(result))
     for line in _verdict(case, result):
         console.print(line)
 
@@ -258,6 +260,30 @@ def _jacobian(case: Case, result: dict[str, Any]) -> Table:
     for row, values in zip(case.model.wrenches, result["jacobian"], strict=True):
         table.add_row(row.limb, *(f"{value:+.6g}" for value in values))
     return table
+
+
+def _limits(result: dict[str, Any]) -> Table:
+    """Every limit of the case: how near the design comes to it, where, and what it costs."""
+    table = _table("limit", "", "unit", "nearest", "margin", "where", "costs")
+    for row in result["limits"]:
+        where = [_place(name) for name in row["active"]] or [_place(row["nearest"])]
+        shown = ", ".join(where[:3]) + (f" and {len(where) - 3} more" if len(where) > 3 else "")
+        unit = row["unit"] or "unit"
+        cost = f"{row['cost'] + 0.0:+.4g} F/{unit}" if row["active"] and row["cost"] else ""
+        value, margin = ("none" if row[key] is None else _beside(row[key], row["limit"]) for key in ("value", "margin"))
+        margin += ", active" if row["active"] else ""
+        table.add_row(row["key"], f"{row['limit']:g}", row["unit"], value, margin, shown, cost)
+    return table
+
+
+def _beside(value: float, limit: float) -> str:
+    """A number, 0 where it is rounding error beside a limit."""
+    return f"{0.0 if abs(value) < _NOISE * (abs(limit) or 1.0) else value:.6g}"
+
+
+def _place(name: str) -> str:
+    """Where a limit is, from its name: everything behind what it limits."""
+    return name.partition(" ")[2]
 
 
 def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:

@@ -307,8 +307,7 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
         if size > 0:
             Q[list(triple)] /= size
     names = [variable.name for variable in nlp.program.variables]
-    if "q_x" in names:
-        at = names.index("q_x")
+    for at in (names.index(f"{prefix}q_x") for prefix in nlp.case.pose_prefixes if f"{prefix}q_x" in names):
         Q[at : at + 3] = _mean_rotation([point[at : at + 3] for point in points], shares)
     return np.asarray(Q, dtype=np.float64)
 

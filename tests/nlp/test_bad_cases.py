@@ -272,7 +272,12 @@ WRONG_TYPES = [
     hexapod("joint-nested", "[113, 41, 0]", "[[113, 41, 0]]", "robot.parameters.base_2", *ONE),
     hexapod("joint-with-text", "[113, 41, 0]", '[113, "41", 0]', "robot.parameters.base_2[1]", *ONE),
     hexapod("joint-with-bool", "[113, 41, 0]", "[113, 41, false]", "robot.parameters.base_2[2]", *ONE),
-    Broken("pose-is-list", edited(HEXAPOD, ("[pose]", "[[pose]]")).encode(), "pose", ("table",)),
+    Broken(
+        "pose-without-position",
+        edited(HEXAPOD, ("[pose]", "[[pose]]\n[[pose]]")).encode(),
+        "pose[0].position",
+        ("missing",),
+    ),
     paper("position-is-number", POSITION, "position = 3", "pose.position", "list"),
     paper("position-is-range", POSITION, "position = { min = 0, max = 3 }", "pose.position", "list"),
     paper("position-of-two", POSITION, "position = [0, 35]", "pose.position", "3 entries", "got 2"),
@@ -376,11 +381,9 @@ OUT_OF_RANGE = [
     paper("tolerance-zero", "tolerance = 1e-6", "tolerance = 0", "expect.tolerance", "greater than 0"),
 ]
 
-NOT_YET = [
-    paper("limits", "[expect]", "[limits]\nbase_joint_angle = 45\n[expect]", "limits", "not supported yet"),
-    paper("limits-empty", "[expect]", "[limits]\n[expect]", "limits", "not supported yet"),
+COMBINED = [
     paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "means nothing for one task"),
-    paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance", "not supported yet"),
+    paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance.position", "joint_centre"),
     paper("two-tasks-of-one-name", TASK, TASK + TASK, "task[1].name", "used by an earlier task"),
     paper("combine-misspelt", "[expect]", '[combine]\nmethod = "mean"\n[expect]', "combine.method", "average"),
     paper("angle-range-lopsided", ROTATION, "rotation = { angle = { min = -30, max = 5 } }", "pose.rotation.angle.min"),
@@ -457,7 +460,7 @@ def not_finite() -> list[Broken]:
     return found
 
 
-BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *NOT_YET, *LINES, *LIMBS, *not_finite()]
+BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *COMBINED, *LINES, *LIMBS, *not_finite()]
 
 Run = Callable[..., tuple[int, str, str]]
 
