@@ -129,13 +129,13 @@ def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -
         raise CaseError(f"{key}.task", f"is missing: there are several tasks, {listing(names)}")
     if written.task is not None and written.task not in names:
         raise CaseError(f"{key}.task", f"is no task of this case; allowed: {listing(names)}", written.task)
-    if written.start == written.to:
-        raise CaseError(f"{key}.to", "must differ from where the poses begin", written.to)
+    if written.first == written.last:
+        raise CaseError(f"{key}.last", "must differ from where the poses begin", written.last)
     twist = tasks[0 if written.task is None else names.index(written.task)].twist
     if not np.any(np.asarray(twist, dtype=np.float64)):
         raise CaseError(f"{key}.task", "has a twist of zero: it leads nowhere")
     dimension = Dimension.LENGTH if math.isinf(axis_from_screw(twist).pitch) else Dimension.ANGLE
-    first, last = (units.to_internal(end, dimension) for end in (written.start, written.to))
+    first, last = (units.to_internal(end, dimension) for end in (written.first, written.last))
     return along_screw(twist, [float(each) for each in np.linspace(first, last, written.count)])
 
 

@@ -107,11 +107,9 @@ class LimitsTable(Table):
 class AlongTable(Table):
     """Poses along the finite screw motion of a task, evenly spaced."""
 
-    model_config = ConfigDict(populate_by_name=True)
-
     task: str | None = Field(default=None, description="name of the task; needed where there are several")
-    start: FiniteFloat = Field(alias="from", description="where it begins: an angle, or a length for a translation")
-    to: FiniteFloat = Field(description="where it ends")
+    first: FiniteFloat = Field(description="where it begins: an angle, or a length for a translation")
+    last: FiniteFloat = Field(description="where it ends")
     count: int = Field(ge=2, le=50, description="number of poses")
 
 

@@ -26,10 +26,12 @@ from screwsynth.models import Dimension, FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Free, OverPoses, Sense
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.layout import Layout, free_directions, lay_out
-from screwsynth.nlp.program import SQUARES, Bounded, Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.program import MAGNITUDE, SQUARES, Bounded, Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.sampling import starting_points
 
-#: A level that no F of a pose comes near, in parts of F's size where the search begins.
-_FAR = 20.0
+#: How many points are looked at for the size of F over several poses, and a level that no F comes near, in parts of it.
+_PROBES = 32
+_FAR = 3.0
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -123,11 +125,14 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
 def _worst_pose(layout: Layout, sense: Sense) -> Nlp:
     """The worst pose as one program: the best level that F keeps at every pose.
 
-    The level is bounded far away from every F: by the size that F would have without cancellation.
+    The level is bounded far away from every F, by the size that F would have without cancellation.
     """
     whole = assemble(layout, layout.F[0], sense)
-    ceiling = _FAR * whole.objective_scale
-    level = layout.sheet.place("level", Dimension.NUMBER, Free(-0.1 * ceiling, ceiling, whole.objective_scale / 2))
+    points = starting_points(whole, _PROBES, 0)
+    states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
+    sizes = [float(state[MAGNITUDE][0, 0]) for state in states if np.isfinite(state[MAGNITUDE]).all()]
+    ceiling = max([*sizes, whole.objective_scale])
+    level = layout.sheet.place("level", Dimension.NUMBER, Free(-_FAR * ceiling, _FAR * ceiling, ceiling / 2))
     size = layout.sheet.place("ceiling", Dimension.NUMBER, ceiling)
     reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
     constraints = []

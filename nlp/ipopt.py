@@ -27,10 +27,15 @@ from screwsynth.nlp.program import Nlp
 _IPOPT_TOLERANCE = 1e-8
 #: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
 _NEAR = 1e-2
+#: What part of its slack the multiplier of a side must exceed for the side to be held. The generous choice is tried
+#: first; where it holds more sides than can hold at once, the strict one follows.
+_SHARES = (1e-4, 1.0)
 #: Two optima are the same when their points differ by less than this, in half ranges.
 SAME_POINT = 1e-4
 #: How far F where Ipopt stopped may be from the optimum it stopped at, in parts of F's scale: its barrier's last bit.
 _SAME_F = 1e-6
+#: How many starting points are looked at for the size of each constraint.
+_LOOKED_AT = 4
 #: A second thread is worth its own solver from this many starts on.
 _STARTS_PER_JOB = 12
 
@@ -74,18 +79,19 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
     solvers: SimpleQueue[ca.Function] = SimpleQueue()
     for _ in range(min(threads, len(points))):
         solvers.put(_solver(nlp, max_iterations))
-    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale]])
+    sizes = _row_sizes(nlp, points)
+    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale], sizes])
+    lower, upper = nlp.g_lower / sizes, nlp.g_upper / sizes
 
     def search(point: FloatArray) -> tuple[dict[str, FloatArray], str, int]:
         solver = solvers.get()
         try:
-            result = solver(
-                x0=(point - nlp.centre) / nlp.scale, p=parameters, lbx=-1, ubx=1, lbg=nlp.g_lower, ubg=nlp.g_upper
-            )
+            result = solver(x0=(point - nlp.centre) / nlp.scale, p=parameters, lbx=-1, ubx=1, lbg=lower, ubg=upper)
             stats = solver.stats()
         finally:
             solvers.put(solver)
         found = {key: result[key].full().ravel() for key in ("x", "lam_x", "lam_g")}
+        found["lam_g"] = found["lam_g"] / sizes
         return found, str(stats["return_status"]), int(stats.get("iter_count", 0))
 
     known: list[Start] = []
@@ -99,10 +105,23 @@ def search_from(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | N
             yield replace(start, iterations=iterations)
 
 
+def _row_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
+    """(c,) typical length of each limit's gradient in scaled variables, so that Ipopt sees rows of order 1.
+
+    The program's other constraints are written that way already and have 1.
+    """
+    rows = np.array([nlp.program.kernels.derivatives(x, nlp.arguments)[3] for x in points[:_LOOKED_AT]]) * nlp.scale
+    lengths = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
+    lengths = np.where(np.isfinite(lengths), lengths, 0.0).max(axis=0, initial=0.0)
+    limits = np.array([any(constraint.keys) for constraint in nlp.program.constraints], dtype=bool)
+    return np.where(limits & (lengths > 0), lengths, 1.0)
+
+
 def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
     """Ipopt for the program's structure, over scaled variables and a scaled objective to be minimised."""
     program = nlp.program
     s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
+    sizes = SX.sym("sizes", len(program.constraints))
     F, g = program.values.call([centre + scale * s, program.p])
     options: dict[str, Any] = {
         "print_time": False,
@@ -121,7 +140,7 @@ def _solver(nlp: Nlp, max_iterations: int) -> ca.Function:
             "nlp_scaling_method": "none",
         },
     }
-    problem = {"x": s, "p": ca.vertcat(program.p, centre, scale, weight), "f": weight * F, "g": g}
+    problem = {"x": s, "p": ca.vertcat(program.p, centre, scale, weight, sizes), "f": weight * F, "g": g / sizes}
     return ca.nlpsol("solver", "ipopt", problem, options)
 
 
@@ -143,11 +162,13 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     """Correct the point that Ipopt stopped at, and say by the program's own conditions what it is."""
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
     at = linearise(nlp, stopped)
-    if np.isfinite(at.violation):
-        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"]))
+    for share in _SHARES if np.isfinite(at.violation) else ():
+        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"], share))
         # A correction that makes F worse has gone to another stationary point.
-        if corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE:
+        kept = corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE
+        if kept and corrected.violation <= max(at.violation, FEASIBLE):
             at = corrected
+            break
     stationarity = multipliers(at, at.active())[1]
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
@@ -160,15 +181,17 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     return Start(status, at.x, at.F, stationarity, at.violation, 0)
 
 
-def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
+def _held(
+    nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray, share: float
+) -> list[int]:
     """Sides that an interior-point solution may lie on: near, with a multiplier that is not small beside the slack.
 
-    An interior-point method ends with multiplier * slack about equal on all sides. The choice is generous, because a
-    side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
+    An interior-point method ends with multiplier * slack about equal on all sides. A small share makes the choice
+    generous: a side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
     """
     table = nlp.sides
     reported = np.concatenate([bound_multipliers, multipliers_of_g])[table.place]
     # Ipopt's variables are scaled already, its constraints are not.
     strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
-    near = (at.slack < _NEAR) & (strength > _NEAR**2 * np.maximum(at.slack, 0.0))
+    near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
     return [int(j) for j in np.flatnonzero(table.equal | near)]
