@@ -324,6 +324,11 @@ class Case:
         return (Pose(self.position, self.rotation, self.steps), *self.further)
 
     @property
+    def pose_count(self) -> int:
+        """How many poses the robot takes."""
+        return sum(len(pose.steps) for pose in self.poses)
+
+    @property
     def pose_prefixes(self) -> tuple[str, ...]:
         """What stands before the names of each stated pose's numbers: nothing for a single one."""
         count = 1 + len(self.further)
@@ -394,8 +399,7 @@ def _further(case: Case) -> tuple[Pose, ...]:
     for key, own in zip(["pose", *keys], steps, strict=True):
         if not own:
             raise CaseError(key, "must have at least one pose")
-    several = sum(map(len, steps)) > 1
-    if several and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
+    if sum(map(len, steps)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
         raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
     return tuple(settled)
 

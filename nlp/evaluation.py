@@ -66,6 +66,16 @@ class RobotState:
         return self.rank < 6
 
 
+@dataclass(frozen=True, eq=False)
+class StatedPose:
+    """A pose that a case states: ``p`` (3,), ``R`` (3, 3), and the rotation as a unit axis (3,) and radians."""
+
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+
+
 def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     """The robot at a point of the program.
 
@@ -91,9 +101,8 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
     prefix, stated, step = _stated(case)[pose]
-    if stated.rotation.axis is not None and step.is_identity:
-        held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
-        angle = float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
+    if step.is_identity:
+        axis, angle = _turn(nlp, x, prefix, stated, rotation)
     rank, free_twists = _rank(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
@@ -120,6 +129,26 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             }
         ),
     )
+
+
+def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
+    """The poses that a case states, at a point (n,), before their displacements."""
+    found: dict[str, StatedPose] = {}
+    for k, (prefix, stated, step) in enumerate(_stated(nlp.case)):
+        if prefix not in found:
+            outputs = nlp.program.kernels.robot_states[k](x, nlp.arguments)
+            rotation, position = step.rotation.T @ outputs[1], step.rotation.T @ (outputs[2].ravel() - step.translation)
+            axis, angle = _turn(nlp, x, prefix, stated, rotation)
+            found[prefix] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
+    return list(found.values())
+
+
+def _turn(nlp: Nlp, x: FloatArray, prefix: str, stated: Pose, rotation: FloatArray) -> tuple[FloatArray, float]:
+    """A stated pose's rotation as axis and angle: the held axis with a signed angle where there is one."""
+    if stated.rotation.axis is None:
+        return axis_angle_from_matrix(rotation)
+    held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
+    return axis, float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
 
 
 def _stated(case: Case) -> list[tuple[str, Pose, Step]]:

@@ -26,7 +26,18 @@ from screwsynth.models import Dimension, FloatArray, frozen_array
 from screwsynth.nlp.case import Case, Free, OverPoses, Sense
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.layout import Layout, free_directions, lay_out
-from screwsynth.nlp.program import MAGNITUDE, SQUARES, Bounded, Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.program import (
+    MAGNITUDE,
+    OBJECTIVE,
+    SQUARES,
+    Bounded,
+    Constraint,
+    Nlp,
+    Program,
+    Reading,
+    Scalar,
+    vanished,
+)
 from screwsynth.nlp.sampling import starting_points
 
 #: How many points are looked at for the size of F over several poses, and a level that no F comes near, in parts of it.
@@ -140,6 +151,17 @@ def _worst_pose(layout: Layout, sense: Sense) -> Nlp:
         room = robot.F[0] - level if sense is Sense.MAX else level - robot.F[0]
         constraints.append(Bounded(Constraint(f"F pose {k + 1}", room / size, reading), 0.0, math.inf))
     return assemble(layout, level, sense, constraints)
+
+
+def levelled(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """The point with the level of the worst pose put where F is; any other program's point as it is."""
+    names = [variable.name for variable in nlp.program.variables]
+    if "level" not in names or len(nlp.program.robots) == 1:
+        return x
+    values = [float(kernel(x, nlp.arguments)[OBJECTIVE][0, 0]) for kernel in nlp.program.kernels.robot_states]
+    moved = np.array(x)
+    moved[names.index("level")] = min(values) if nlp.sense is Sense.MAX else max(values)
+    return moved
 
 
 def near(nlp: Nlp, target: FloatArray, strength: float) -> Nlp:

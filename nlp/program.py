@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Places of two results among those of :meth:`Program.robot_state`.
-SQUARES, MAGNITUDE = 6, 7
+#: Places of three results among those of :meth:`Program.robot_state`.
+OBJECTIVE, SQUARES, MAGNITUDE = 5, 6, 7
 #: Multiples of the golden section, modulo 1, spread evenly.
 _GOLDEN = 0.6180339887498949
 

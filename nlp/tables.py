@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: A free number below this part of its range is shown as 0; in JSON it stands as it is.
 _NOISE = 1e-9
+#: So many violated limits are shown.
+_SHOWN = 8
 #: A rotation by less than this has no axis that means anything.
 _TURNED = 1e-9
 
@@ -27,7 +29,7 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
     console.print(_headline(case, result))
     if "parameters" in result:
         console.print(_design(case, result))
-        console.print(_limbs(case, result))
+        console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
     if result.get("limits"):
         console.print(_limits(result))
     for line in _verdict(case, result):
@@ -179,12 +181,13 @@ def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
     top = Group(_title(case), _task(result["task"], case.units)) if "task" in result else _title(case)
     if result["F"] is None:
         return Group(top, Text(f"{status}: this is not an optimum", style="bold red"))
+    over = f", {result['over_poses']} over {len(result['poses'])} poses" if "poses" in result else ""
     word = {"max": "largest", "min": "smallest"}[result["sense"]] if status == "optimal" else "fixed point:"
     if status == "optimal" and result["optimality"]["kind"].startswith("stationary"):
         status = "stationary, not proven optimal"
     if result["singular"]:
         status += f", singular: rank {result['rank']}"
-    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status})"))
+    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status}{over})"))
 
 
 def _task(task: dict[str, Any], units: Units) -> Text:
@@ -207,15 +210,35 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
         values = shown if isinstance(shown, list) else [shown]
         for name, value, given in zip(parameter.components, values, case.components(parameter.name), strict=True):
             add(name, parameter.dimension, value, given)
-    for name, value, given in zip(component_names("p", 3), result["pose"]["position"], case.position, strict=True):
-        add(name, Dimension.LENGTH, value, given)
-    angle, turned = case.rotation.angle, abs(units.to_internal(result["pose"]["angle"], Dimension.ANGLE)) > _TURNED
-    if case.axis is None and isinstance(angle, Free):
-        # The sign of the angle means nothing then: what is allowed is its size.
-        angle = Free(*sizes_of_turn(angle))
-    axis = _listed(result["pose"]["axis"]) if turned or case.axis is not None else "none"
-    table.add_row("axis", axis, "", "" if case.axis is not None else "any direction")
-    add("angle", Dimension.ANGLE, result["pose"]["angle"], angle)
+    stated = result.get("stated_poses", [result["pose"]])
+    for prefix, pose, found in zip(case.pose_prefixes, case.poses, stated, strict=True):
+        for name, value, given in zip(component_names("p", 3), found["position"], pose.position, strict=True):
+            add(f"{prefix}{name}", Dimension.LENGTH, value, given)
+        angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
+        turned = abs(units.to_internal(found["angle"], Dimension.ANGLE)) > _TURNED
+        if not is_held and isinstance(angle, Free):
+            # The sign of the angle means nothing then: what is allowed is its size.
+            angle = Free(*sizes_of_turn(angle))
+        axis = _listed(found["axis"]) if turned or is_held else "none"
+        table.add_row(f"{prefix}axis", axis, "", "" if is_held else "any direction")
+        add(f"{prefix}angle", Dimension.ANGLE, found["angle"], angle)
+    return table
+
+
+def _poses(case: Case, result: dict[str, Any]) -> Table:
+    """The robot at every pose: F, where it stands, and the range of each measure over its limbs."""
+    measures = [item for item in case.model.quantities if item.name in result["poses"][0]["quantities"]]
+    words = [item.name.replace("_", " ").removesuffix(" angle") for item in measures]
+    labels = [f"{word}\n{case.units.label(item.dimension)}" for word, item in zip(words, measures, strict=True)]
+    table = _table("pose", "F", *component_names("p", 3), "angle", *labels, "rank")
+    for k, pose in enumerate(result["poses"]):
+        ranges = []
+        for item in measures:
+            values = pose["quantities"][item.name].values()
+            low = "" if item.dimension is Dimension.ANGLE else f"{min(values):.5g} .. "
+            ranges.append(f"{low}{max(values):.5g}")
+        at = [_number(value) for value in (*pose["pose"]["position"], pose["pose"]["angle"])]
+        table.add_row(str(k + 1), _number(pose["F"]), *at, *ranges, str(pose["rank"]))
     return table
 
 
@@ -298,13 +321,18 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
             smallest = f", smallest curvature {min(curvature):.2e}" if curvature else ", no free direction left"
             yield _labelled("evidence", checks + ("" if "reached" in result else smallest))
     yield from _violated((result.get("reached") or {}).get("violated", []))
+    for row in result.get("relaxation", []):
+        unit = f" {row['unit']}" if row["unit"] else ""
+        yield Text(f"would be feasible with {row['key']} = {row['needed']:.6g}{unit} instead of {row['limit']:g}{unit}")
     yield from _starts(result["starts"])
     if "rank" in result and "reached" not in result:
         yield from _singularity(case, result)
 
 
-def _violated(sides: Iterable[dict[str, Any]]) -> Iterable[Text]:
-    for side in sides:
+def _violated(sides: Sequence[dict[str, Any]]) -> Iterable[Text]:
+    if len(sides) > _SHOWN:
+        yield Text(f"{len(sides)} limits are violated; the first {_SHOWN}:", style="red")
+    for side in sides[:_SHOWN]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
         yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
 

@@ -52,7 +52,9 @@ class TaskOutcome:
         own: what the task could have by itself.
         unique: whether its own optimum is the only one.
         x: (n,) the member of its optimal set that was used.
-        state: the robot at the combined point, with this task's rates; None where it does not exist.
+        state: the robot at the combined point, with this task's rates; None where it does not exist. At the first
+            pose, where there are several.
+        F: the task's objective at the combined point; NaN where it does not exist.
         evidence: what the combined point is for this task alone.
         loss: how much worse its F is than its own optimum; negative where the combined search came upon a better one.
     """
@@ -62,6 +64,7 @@ class TaskOutcome:
     unique: bool
     x: FloatArray
     state: RobotState | None
+    F: float
     evidence: Evidence
     loss: float
 
@@ -186,10 +189,10 @@ def _weights(case: Case) -> tuple[list[float], list[str]]:
 
 def _outcome(nlp: Nlp, task: Task, own: Solution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
     state = state_or_none(nlp, x)
-    F = float("nan") if state is None else state.F
+    F = float("nan") if state is None else nlp.evaluate(x)[0]
     best = nlp.evaluate(own.x)[0]
     loss = best - F if task.sense is Sense.MAX else F - best
-    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, examine(nlp, x), loss)
+    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss)
 
 
 def _combined(
