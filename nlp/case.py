@@ -415,7 +415,7 @@ def _check_buildable(case: Case) -> None:
     tolerance = case.joint_centre_tolerance
     if tolerance is not None and not (0 < tolerance <= LARGEST):
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
-    if tolerance is not None and not case.model.built:
+    if tolerance is not None and (not case.model.built or case.model.unknowns):
         raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")
 
 

@@ -25,8 +25,10 @@ from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.margins import costs_of, margins_as_data, margins_of
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.sensitivity import sensitivities
 from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tasks import Compromise, TaskOutcome
+from screwsynth.nlp.tolerance import tolerance_loss
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:
@@ -57,6 +59,7 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **(poses_of(solution.nlp, solution.x) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
         **(_margins(solution.nlp, solution.x, optimal=answer) if state is not None else {}),
+        **(_sensitivity(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
         "seed": solution.seed,
@@ -280,6 +283,29 @@ def _relaxation(solution: Solution) -> list[dict[str, Any]]:
         }
         for row in solution.relaxation
     ]
+
+
+def _sensitivity(solution: Solution) -> dict[str, Any]:
+    """What F owes to what is fixed, and what inexact joint centres may cost."""
+    nlp, case = solution.nlp, solution.nlp.case
+    rows = [
+        {
+            "name": row.name,
+            "value": case.units.shown(row.value, row.dimension),
+            "unit": case.units.label(row.dimension),
+            "derivative": row.derivative * case.units.to_internal(1.0, row.dimension),
+        }
+        for row in sensitivities(nlp, solution.x)
+    ]
+    if case.joint_centre_tolerance is None:
+        return {"sensitivity": rows}
+    lost = tolerance_loss(nlp, solution.x, case.joint_centre_tolerance)
+    joints = [
+        {"limb": limb, "plate": plate, "gradient": gradient.tolist()}
+        for (limb, plate), gradient in zip(lost.joints, lost.gradients, strict=True)
+    ]
+    tolerance = {"joint_centre": lost.tolerance, "loss": lost.loss, "loss_there": lost.loss_there, "joints": joints}
+    return {"sensitivity": rows, "tolerance": tolerance}
 
 
 def violations(nlp: Nlp, x: FloatArray) -> list[dict[str, Any]]:

@@ -16,6 +16,8 @@ The largest eigenvalue is ``c - lambda_min(c I - A)`` for any larger c, and is e
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import casadi as ca
 from casadi import SX
 
@@ -31,63 +33,90 @@ _CLOSE = 0.999
 _FLOOR = 1e-10
 
 
+#: The upper triangle of a symmetric matrix, row by row: ``rows[i][j - i]`` for ``i <= j``.
+Rows: TypeAlias = list[list[SX]]
+
+
 def smallest_eigenvalue(A: SX) -> SX:
     """(1, 1) estimate from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
     n = A.shape[0]
     scale = ca.trace(A) / n
-    theta = -_FLOOR * scale
-    found = theta
+    rows = _upper(A / scale)
+    theta = found = SX(-_FLOOR)
     for _ in range(_ROUNDS):
-        found = theta + _root_of_inverse(A - theta * SX.eye(n), scale)
+        found = theta + _root_of_inverse(_shifted(rows, -theta))
         theta = theta + _CLOSE * (found - theta)
-    return found
+    return found * scale
 
 
 def largest_eigenvalue(A: SX) -> SX:
     """(1, 1) estimate from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
-    n = A.shape[0]
     scale = ca.trace(A)
+    rows = _upper(A / scale)
     # (tr A^m)^(1/m) is above, by no more than n^(1/m).
-    power = A / scale
-    for _ in range(_SQUARINGS):
-        power = power @ power
-    ceiling = _rooted(ca.trace(power)) * scale
-    above = ceiling * (2 - _CLOSE)
+    above = _root_of_trace(rows) * (2 - _CLOSE)
     found = above
+    negative = [[-each for each in row] for row in rows]
     for _ in range(_ROUNDS):
-        gap = _root_of_inverse(above * SX.eye(n) - A, scale)
+        gap = _root_of_inverse(_shifted(negative, above))
         found = above - gap
         above = above - _CLOSE * gap
-    return found
+    return found * scale
 
 
-def _root_of_inverse(A: SX, scale: SX) -> SX:
-    """``(tr A^-m)^(-1/m)`` of a positive definite matrix, its numbers first brought to order 1 by a scale."""
-    inverse = _inverse(A / scale)
-    size = ca.trace(inverse)
-    power = inverse / size
-    for _ in range(_SQUARINGS):
-        power = power @ power
-    return scale / (size * _rooted(ca.trace(power)))
+def _upper(A: SX) -> Rows:
+    return [[A[i, j] for j in range(i, A.shape[0])] for i in range(A.shape[0])]
 
 
-def _rooted(value: SX) -> SX:
+def _shifted(rows: Rows, by: SX) -> Rows:
+    return [[row[0] + by, *row[1:]] for row in rows]
+
+
+def _root_of_inverse(rows: Rows) -> SX:
+    """``(tr A^-m)^(-1/m)`` of a positive definite matrix."""
+    inverse = _inverse(rows)
+    size = sum((row[0] for row in inverse), SX(0))
+    return 1 / (size * _root_of_trace([[each / size for each in row] for row in inverse]))
+
+
+def _root_of_trace(rows: Rows) -> SX:
+    """``(tr A^m)^(1/m)``; the last square's trace is the sum of all squared entries."""
+    for _ in range(_SQUARINGS - 1):
+        rows = _square(rows)
+    value = sum((row[0] ** 2 + 2 * sum((each**2 for each in row[1:]), SX(0)) for row in rows), SX(0))
     for _ in range(_SQUARINGS):
         value = ca.sqrt(value)
     return value
 
 
-def _inverse(A: SX) -> SX:
-    """Inverse of a positive definite matrix by Gauss and Jordan; no pivoting is needed."""
-    n = A.shape[0]
-    rows = [[A[i, j] for j in range(n)] for i in range(n)]
+def _square(rows: Rows) -> Rows:
+    full = _full(rows)
+    return [
+        [sum((a * b for a, b in zip(full[i], full[j], strict=True)), SX(0)) for j in range(i, len(rows))]
+        for i in range(len(rows))
+    ]
+
+
+def _full(rows: Rows) -> Rows:
+    return [[rows[min(i, j)][abs(i - j)] for j in range(len(rows))] for i in range(len(rows))]
+
+
+def _inverse(rows: Rows) -> Rows:
+    """Inverse of a positive definite matrix, one row after the other swept; no pivoting is needed.
+
+    Sweeping k turns ``a_kk`` into ``-1/a_kk``, the rest of row k into ``a_kj/a_kk`` and every other entry into ``a_ij -
+    a_ik a_kj / a_kk``, and keeps the matrix symmetric; after all rows it is minus the inverse.
+    """
+    n = len(rows)
+    rows = [list(row) for row in rows]
     for k in range(n):
-        pivot = 1 / rows[k][k]
-        scaled = [each * pivot for each in rows[k]]
+        pivot = 1 / rows[k][0]
+        column = [rows[min(i, k)][abs(i - k)] for i in range(n)]
+        scaled = [each * pivot for each in column]
         for i in range(n):
-            if i == k:
-                continue
-            factor = rows[i][k]
-            rows[i] = [rows[i][j] - factor * scaled[j] if j != k else -factor * pivot for j in range(n)]
-        rows[k] = [scaled[j] if j != k else pivot for j in range(n)]
-    return ca.blockcat(rows)
+            for j in range(i, n):
+                if k not in (i, j):
+                    rows[i][j - i] = rows[i][j - i] - column[i] * scaled[j]
+        for i in range(n):
+            rows[min(i, k)][abs(i - k)] = scaled[i] if i != k else -pivot
+    return [[-each for each in row] for row in rows]

@@ -32,6 +32,8 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
         console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
     if result.get("limits"):
         console.print(_limits(result))
+    if "tolerance" in result:
+        console.print(_tolerance(case, result))
     for line in _verdict(case, result):
         console.print(line)
 
@@ -198,12 +200,17 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
     """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
     reached = "reached" in result
     held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", []) if not reached}
-    table = _table("", "reached" if reached else "value", "unit", "free between", *(["held by"] if held else []))
+    owed = {row["name"]: row["derivative"] for row in result.get("sensitivity", [])}
+    table = _table(
+        "", "reached" if reached else "value", "unit", "free between", *(["held by"] if held or owed else [])
+    )
     units = case.units
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
         row = [name, _settled(value, given, units, dimension), units.label(dimension), _range(given, units, dimension)]
-        table.add_row(*row, *([_held(held, name, units.label(dimension))] if held else []))
+        unit = units.label(dimension) or "unit"
+        fixed = f"fixed, {owed[name] + 0.0:+.4g} F/{unit}" if name in owed else ""
+        table.add_row(*row, *([_held(held, name, unit) or fixed] if held or owed else []))
 
     for parameter in case.model.parameters:
         shown = result["parameters"][parameter.name]
@@ -258,7 +265,7 @@ def _range(given: Value, units: Units, dimension: Dimension) -> str:
 
 def _held(held: dict[str, Any], name: str, unit: str) -> str:
     side = held.get(name)
-    return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit or 'unit'}"
+    return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit}"
 
 
 def _limbs(case: Case, result: dict[str, Any]) -> Table:
@@ -297,6 +304,13 @@ def _limits(result: dict[str, Any]) -> Table:
         margin += ", active" if row["active"] else ""
         table.add_row(row["key"], f"{row['limit']:g}", row["unit"], value, margin, shown, cost)
     return table
+
+
+def _tolerance(case: Case, result: dict[str, Any]) -> Text:
+    lost, unit = result["tolerance"], case.units.length
+    part = f" ({100 * lost['loss'] / result['F']:.2g} %)" if result["F"] else ""
+    text = f"{lost['joint_centre']:g} {unit} at every joint centre: F may be worse by {lost['loss']:.4g}{part}"
+    return _labelled("tolerance", text)
 
 
 def _beside(value: float, limit: float) -> str:
