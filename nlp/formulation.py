@@ -42,7 +42,7 @@ from screwsynth.nlp.sampling import starting_points
 
 #: How many points are looked at for the size of F over several poses, and a level that no F comes near, in parts of it.
 _PROBES = 32
-_FAR = 3.0
+_FAR = 2.0
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -143,7 +143,7 @@ def _worst_pose(layout: Layout, sense: Sense) -> Nlp:
     states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
     sizes = [float(state[MAGNITUDE][0, 0]) for state in states if np.isfinite(state[MAGNITUDE]).all()]
     ceiling = max([*sizes, whole.objective_scale])
-    level = layout.sheet.place("level", Dimension.NUMBER, Free(-_FAR * ceiling, _FAR * ceiling, ceiling / 2))
+    level = layout.sheet.place("level", Dimension.NUMBER, Free(-ceiling, _FAR * ceiling, ceiling / 2))
     size = layout.sheet.place("ceiling", Dimension.NUMBER, ceiling)
     reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
     constraints = []

@@ -28,8 +28,10 @@ _IPOPT_TOLERANCE = 1e-8
 #: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
 _NEAR = 1e-2
 #: What part of its slack the multiplier of a side must exceed for the side to be held. The generous choice is tried
-#: first; where it holds more sides than can hold at once, the strict one follows.
-_SHARES = (1e-4, 1.0)
+#: first; where it does not lead to a point this stationary, because it holds sides that the optimum does not lie on,
+#: stricter ones follow.
+_SHARES = (1e-4, 1.0, 1e2)
+_POLISHED = 1e-10
 #: Two optima are the same when their points differ by less than this, in half ranges.
 SAME_POINT = 1e-4
 #: How far F where Ipopt stopped may be from the optimum it stopped at, in parts of F's scale: its barrier's last bit.
@@ -161,15 +163,17 @@ def _recognised(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | No
 def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     """Correct the point that Ipopt stopped at, and say by the program's own conditions what it is."""
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
-    at = linearise(nlp, stopped)
-    for share in _SHARES if np.isfinite(at.violation) else ():
-        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"], share))
-        # A correction that makes F worse has gone to another stationary point.
-        kept = corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE
-        if kept and corrected.violation <= max(at.violation, FEASIBLE):
-            at = corrected
-            break
+    raw = at = linearise(nlp, stopped)
     stationarity = multipliers(at, at.active())[1]
+    for share in _SHARES if np.isfinite(raw.violation) else ():
+        corrected = correct(nlp, stopped, _held(nlp, raw, found["lam_x"], found["lam_g"], share))
+        left = multipliers(corrected, corrected.active())[1]
+        # A correction that makes F worse has gone to another stationary point.
+        kept = corrected.phi <= raw.phi + _IPOPT_TOLERANCE or raw.violation > FEASIBLE
+        if kept and (corrected.violation, left) <= (max(at.violation, FEASIBLE), stationarity):
+            at, stationarity = corrected, left
+        if kept and corrected.violation <= FEASIBLE and left <= _POLISHED:
+            break
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
     else:
@@ -194,4 +198,7 @@ def _held(
     # Ipopt's variables are scaled already, its constraints are not.
     strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
     near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
-    return [int(j) for j in np.flatnonzero(table.equal | near)]
+    held = np.flatnonzero(table.equal | near)
+    # No more sides than variables can hold a point: those with the least multipliers beside their slack are let go.
+    order = np.where(table.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
+    return [int(j) for j in held[np.sort(np.argsort(-order, kind="stable")[: nlp.n])]]
