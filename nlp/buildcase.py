@@ -99,10 +99,9 @@ def _cone(written: float | ConeTable | None, home: Home | None, units: Units, ke
                 raise CaseError("limits.home", f'is missing: limits.{key} has about = "home"')
             return Cone(largest, home)
         case axes:
-            rows = [axes] if axes and not isinstance(axes[0], list) else axes
-            if any(not isinstance(row, list) or len(row) != 3 for row in rows):
-                raise CaseError(f"limits.{key}.about", "must be a list of 3 numbers, or a list of such lists")
-            return Cone(largest, tuple(_triple(row) for row in rows if isinstance(row, list)))
+            rows = [row for row in axes if isinstance(row, list)]
+            flat = [part for part in axes if not isinstance(part, list)]
+            return Cone(largest, tuple(_triple(row) for row in rows or [flat]))
 
 
 def _triple(values: Sequence[float]) -> Triple:

@@ -37,11 +37,25 @@ class ActuatorTable(Table):
     )
 
 
+def _kind_of_axes(value: object) -> str:
+    if not isinstance(value, list):
+        return "<word>"
+    return "<lists>" if value and isinstance(value[0], list) else "<list>"
+
+
+Axes = Annotated[
+    Annotated[Literal["normal", "home"], Tag("<word>")]
+    | Annotated[Vector, Tag("<list>")]
+    | Annotated[list[Vector], Tag("<lists>")],
+    Discriminator(_kind_of_axes),
+]
+
+
 class ConeTable(Table):
     """The cone of a passive joint."""
 
     max: FiniteFloat = Field(description="half angle")
-    about: Literal["normal", "home"] | list[FiniteFloat] | list[Vector] = Field(
+    about: Axes = Field(
         default="normal",
         description="mounting axes: the plate's normal, the leg's direction at limits.home, a direction in the "
         "plate's frame, or a list with one for each leg",

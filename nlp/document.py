@@ -36,7 +36,7 @@ class Range(Table):
 
 
 #: What pydantic puts into the path of a fault for the branch of a union; no key of a file.
-_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>")
+_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
 
 
 def _number_or_range(value: object) -> str:
@@ -267,6 +267,8 @@ def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
     match fault["type"]:
         case "unknown_key" | "reason":
             sentence = str(context["fault"])
+        case "literal_error" if key == "<word>":
+            sentence = f"must be {context['expected']}, a list of 3 numbers, or a list of such lists"
         case "literal_error":
             sentence = f"must be one of {context['expected']}"
         case "list_type" if key in _FORMS:

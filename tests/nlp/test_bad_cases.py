@@ -411,10 +411,15 @@ LIMITS = [
     limit("angle-too-large", "base_joint_angle = 200", "base_joint_angle.max", "at most 180 deg"),
     limit("angle-text", 'base_joint_angle = "wide"', "base_joint_angle", "number"),
     limit("angle-without-max", 'base_joint_angle = { about = "normal" }', "base_joint_angle.max", "missing"),
-    limit("axis-word", 'base_joint_angle = { max = 9, about = "up" }', "base_joint_angle.about", ""),
-    limit("axis-short", "base_joint_angle = { max = 9, about = [0, 1] }", "base_joint_angle.about", "list of 3"),
+    limit("axis-word", 'base_joint_angle = { max = 9, about = "up" }', "base_joint_angle.about", "'home'", "list of 3"),
+    limit("axis-short", "base_joint_angle = { max = 9, about = [0, 1] }", "base_joint_angle.about", "3 entries"),
     limit("axis-zero", "base_joint_angle = { max = 9, about = [0, 0, 0] }", "base_joint_angle.about", "not all zero"),
-    limit("axis-nested", "base_joint_angle = { max = 9, about = [[0, 0], [1, 1]] }", "base_joint_angle.about", ""),
+    limit(
+        "axis-nested",
+        "base_joint_angle = { max = 9, about = [[0, 0], [1, 1]] }",
+        "base_joint_angle.about[0]",
+        "3 entries",
+    ),
     limit(
         "axes-too-few",
         "base_joint_angle = { max = 9, about = [[0, 0, 1], [0, 1, 1]] }",
