@@ -27,8 +27,8 @@ from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, WrenchKind, matrix_from_axis_angle
 from screwsynth.nlp.case import Case
+from screwsynth.nlp.expressions import Bounded, Constraint, Reading, RobotExpressions
 from screwsynth.nlp.limits import Cone, Home, Homogenised, Interval, unit_axes
-from screwsynth.nlp.program import Bounded, Constraint, Reading, RobotExpressions
 from screwsynth.nlp.segments import squared_distance
 from screwsynth.nlp.sentence import expression, parse
 from screwsynth.nlp.spectrum import largest_eigenvalue, smallest_eigenvalue

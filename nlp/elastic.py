@@ -16,7 +16,8 @@ from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
 from screwsynth.nlp.case import Sense
-from screwsynth.nlp.program import Constraint, Nlp, Reading, Scalar
+from screwsynth.nlp.expressions import Constraint, Reading, Scalar
+from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
 
 #: A number is moved when it is moved by more than this part of itself.

@@ -38,8 +38,8 @@ from screwsynth.models import (
 from screwsynth.nlp.buildable import distinct, limits_of
 from screwsynth.nlp.case import Case, Free, OverPoses, Pose, Task, Value, sizes_of_turn
 from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.expressions import Bounded, Constraint, LegExpressions, Reading, RobotExpressions, Scalar
 from screwsynth.nlp.poses import Step
-from screwsynth.nlp.program import Bounded, Constraint, LegExpressions, Reading, RobotExpressions, Scalar
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
 ROTATION_ANGLE = Reading(

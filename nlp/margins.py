@@ -17,9 +17,10 @@ import numpy as np
 
 from screwsynth.models import Dimension, FloatArray, WrenchKind
 from screwsynth.nlp.evaluation import evaluate
+from screwsynth.nlp.expressions import Bounded, Constraint
 from screwsynth.nlp.kkt import linearise, multipliers
 from screwsynth.nlp.limits import Homogenised
-from screwsynth.nlp.program import Bounded, Constraint, Nlp
+from screwsynth.nlp.program import Nlp
 
 
 @dataclass(frozen=True)

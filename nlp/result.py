@@ -19,16 +19,14 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
+from screwsynth.nlp.designresult import margins_in, relaxation_in, sensitivity_in
 from screwsynth.nlp.evaluation import RobotState, StatedPose, evaluate, stated_poses
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, linearise
-from screwsynth.nlp.margins import costs_of, margins_as_data, margins_of
 from screwsynth.nlp.optimality import Evidence
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.sensitivity import sensitivities
 from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tasks import Compromise, TaskOutcome
-from screwsynth.nlp.tolerance import tolerance_loss
 from screwsynth.nlp.units import Units
 
 if TYPE_CHECKING:
@@ -54,12 +52,12 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         "status": solution.status.value,
         "F": _objective(solution) if answer and state is not None else None,
         **({} if reached is None else {"reached": reached}),
-        **({"relaxation": _relaxation(solution)} if solution.relaxation else {}),
+        **({"relaxation": relaxation_in(solution)} if solution.relaxation else {}),
         **(state_of(case, state, task) if state is not None else {}),
         **(poses_of(solution.nlp, solution.x) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
-        **(_margins(solution.nlp, solution.x, optimal=answer) if state is not None else {}),
-        **(_sensitivity(solution) if answer and state is not None else {}),
+        **(margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else {}),
+        **(sensitivity_in(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
         "seed": solution.seed,
@@ -75,7 +73,7 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     robot = {} if state is None else state_of(case, state)
     if state is not None:
         robot |= poses_of(outcomes[0].own.nlp, compromise.x)
-        robot |= _margins(outcomes[0].own.nlp, compromise.x, optimal=False)
+        robot |= margins_in(outcomes[0].own.nlp, compromise.x, optimal=False)
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
     if not compromise.is_made:
@@ -126,6 +124,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
             for j, state in enumerate(states)
         ],
         "violated": violations(nlps[0], x),
+        **margins_in(nlps[0], x, optimal=False),
         "principal_motions": {
             "rotations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.rotations],
             "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
@@ -264,48 +263,6 @@ def versions() -> dict[str, str]:
 def _reached(solution: Solution) -> dict[str, Any]:
     nlp = solution.nlp
     return {"F": _finite(nlp.evaluate(solution.x)[0]), "violated": violations(nlp, solution.x)}
-
-
-def _margins(nlp: Nlp, x: FloatArray, *, optimal: bool) -> dict[str, Any]:
-    margins = margins_as_data(nlp, margins_of(nlp, x, optimal=optimal))
-    return {"margins": margins, "limits": costs_of(margins)}
-
-
-def _relaxation(solution: Solution) -> list[dict[str, Any]]:
-    """The numbers of the case that must be moved for it to be feasible, all of these at once."""
-    units = solution.nlp.case.units
-    return [
-        {
-            "key": row.key,
-            "limit": units.shown(row.limit, row.dimension),
-            "needed": units.shown(row.needed, row.dimension),
-            "unit": units.label(row.dimension),
-        }
-        for row in solution.relaxation
-    ]
-
-
-def _sensitivity(solution: Solution) -> dict[str, Any]:
-    """What F owes to what is fixed, and what inexact joint centres may cost."""
-    nlp, case = solution.nlp, solution.nlp.case
-    rows = [
-        {
-            "name": row.name,
-            "value": case.units.shown(row.value, row.dimension),
-            "unit": case.units.label(row.dimension),
-            "derivative": row.derivative * case.units.to_internal(1.0, row.dimension),
-        }
-        for row in sensitivities(nlp, solution.x)
-    ]
-    if case.joint_centre_tolerance is None:
-        return {"sensitivity": rows}
-    lost = tolerance_loss(nlp, solution.x, case.joint_centre_tolerance)
-    joints = [
-        {"limb": limb, "plate": plate, "gradient": gradient.tolist()}
-        for (limb, plate), gradient in zip(lost.joints, lost.gradients, strict=True)
-    ]
-    tolerance = {"joint_centre": lost.tolerance, "loss": lost.loss, "loss_there": lost.loss_there, "joints": joints}
-    return {"sensitivity": rows, "tolerance": tolerance}
 
 
 def violations(nlp: Nlp, x: FloatArray) -> list[dict[str, Any]]:

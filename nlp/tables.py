@@ -106,7 +106,9 @@ def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
     for line in _violated(result["violated"]):
         console.print(line)
     console.print(_design(case, result))
-    console.print(_limbs(case, result))
+    console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
+    if result["limits"]:
+        console.print(_limits(result))
     console.print(_jacobian(case, result))
     console.print(_labelled("singular values", _listed(result["singular_values"])))
     console.print(_principal(case, result["principal_motions"]))

@@ -106,8 +106,8 @@ def test_the_limits_of_the_documentation_are_valid() -> None:
     several = screwsynth.nlp.case_from_tables(starter | tomllib.loads(poses), name="shown", source="limits.md")
     assert several.pose_count == 2 + 5 + 6
     case = screwsynth.nlp.case_from_tables(starter | tomllib.loads(limits), name="shown", source="limits.md")
-    written = dataclasses.asdict(case.limits)
-    assert all(written[name] for name in written if name != "quantities")
+    names = [field.name for field in dataclasses.fields(case.limits)]
+    assert all(getattr(case.limits, name) for name in names if name != "quantities")
 
 
 def test_the_limits_shown_in_the_documentation_are_what_the_command_prints() -> None:

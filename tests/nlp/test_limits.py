@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import copy
 import itertools
+import json
 import math
 import tomllib
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -16,14 +19,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from screwsynth.nlp import Case, Solution, Status, case_from_tables, result_of
+from screwsynth.models import hexapod
+from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
 from screwsynth.nlp.case import Search
 from screwsynth.nlp.formulation import formulate
+from screwsynth.nlp.limits import Cone, Interval, Limits
 from screwsynth.nlp.segments import squared_distance
 from screwsynth.nlp.solver import solve_nlp
 from screwsynth.nlp.spectrum import largest_eigenvalue, smallest_eigenvalue
 
 Array = NDArray[np.float64]
+Run = Any
 
 HEXAPOD = """
 [units]
@@ -221,6 +227,97 @@ def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
     assert radians["F"] == pytest.approx(degrees["F"], rel=1e-9)
     assert radians["limits"][0]["unit"] == "rad"
     assert radians["limits"][0]["cost"] == pytest.approx(math.degrees(degrees["limits"][0]["cost"]), rel=1e-6)
+
+
+THREE_UPU = """
+[robot]
+model = "three-upu"
+axes = "tsai"
+[robot.parameters]
+base_radius = { min = 20, max = 60 }
+platform_radius = { min = 10, max = 40 }
+[pose]
+position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 80 }]
+[[task]]
+sense = "max"
+axis = [1, 2, 3]
+point = [4, 0, 10]
+pitch = 2
+"""
+
+
+def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
+    limits = {
+        "leg_length": {"max": 50},
+        "base_joint_angle": 40,
+        "radius_ratio": {"min": 0.4},
+        "joint_spacing": {"min": 20},
+        "leg_clearance": {"min": 18},
+        "rate_share": {"max": 0.6},
+        "smallest_singular_value": {"min": 0.05, "length": 30},
+    }
+    result = result_of(solved(case_with(limits, THREE_UPU), starts=16))
+    assert result["status"] == "optimal"
+    radii = {plate: result["parameters"][f"{plate}_radius"] for plate in ("base", "platform")}
+    corners = np.array([[math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0] for k in range(3)])
+    b, p = radii["base"] * corners, np.array(result["pose"]["position"])
+    ends = p + radii["platform"] * corners
+    rows = {row["key"]: row for row in result["limits"]}
+    assert rows["leg_length.max"]["value"] == pytest.approx(np.linalg.norm(ends - b, axis=1).max(), rel=1e-9)
+    assert rows["radius_ratio.min"]["value"] == pytest.approx(radii["platform"] / radii["base"], rel=1e-9)
+    assert rows["joint_spacing.min"]["value"] == pytest.approx(math.sqrt(3) * min(radii.values()), rel=1e-9)
+    pairs = ((0, 1), (0, 2), (1, 2))
+    clearance = min(segment_distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs)
+    assert rows["leg_clearance.min"]["value"] == pytest.approx(clearance, rel=1e-7)
+    J = np.array(result["jacobian"])
+    J[:3, 3:] -= np.cross(p, J[:3, :3])
+    J[:, 3:] /= 30
+    smallest = np.linalg.svd(J, compute_uv=False)[-1]
+    assert rows["smallest_singular_value.min"]["value"] == pytest.approx(smallest, rel=1e-7)
+    squares = np.array(result["rates"]).reshape(2, 3) ** 2
+    assert rows["rate_share.max"]["value"] == pytest.approx(squares.sum(axis=0).max() / squares.sum(), rel=1e-9)
+    assert min(row["margin"] for row in result["margins"]) >= -1e-8
+
+
+def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
+    model = hexapod()
+    bare = replace(model, legs=(), built=())
+    parameters = {item.name: item.typical for item in bare.parameters}
+    common: dict[str, Any] = {"model": bare, "parameters": parameters, "position": [Free(-9, 9), 0, 35]}
+    task = Task.screw("max", axis=[1, 2, 3], point=[0, 0, 9], pitch=1)
+    for limits in (Limits(leg_clearance=1.0), Limits(joint_spacing=1.0), Limits(base_joint_angle=Cone(1.0))):
+        with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
+            Case(**common, tasks=[task], limits=limits)
+    with pytest.raises(CaseError, match=r"tolerance\.joint_centre"):
+        Case(**common, tasks=[task], joint_centre_tolerance=0.1)
+    limited = Case(**common, tasks=[task], limits=Limits(quantities={"leg_length": Interval(max=37.0)}))
+    solution = solved(limited)
+    assert solution.state is not None
+    assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+
+
+def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
+    text = HEXAPOD.replace("x1 = { min = 8, max = 16 }", "x1 = 12").replace("x3 = { min = 2, max = 28 }", "x3 = 20")
+    result = result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text)))
+    row = next(row for row in result["limits"] if row["key"] == "footprint.base")
+    assert (row["cost"], row["active"]) == (0.0, [])
+    assert row["margin"] == pytest.approx(1, rel=1e-9)
+    solution = solved(case_with({"footprint": {"base": 11}, "leg_length": {"max": 45}}, text))
+    assert solution.status is Status.INFEASIBLE
+    assert [(row.key, round(row.needed, 4)) for row in solution.relaxation] == [("footprint.base", 12.0)]
+
+
+def test_evaluate_shows_margins_and_exits_with_1_outside_of_a_limit(cli: Run, tmp_path: Path) -> None:
+    path = tmp_path / "case.toml"
+    path.write_text(HEXAPOD + "[limits]\nleg_length = { max = 30 }\n", encoding="utf-8")
+    code, out, _ = cli("evaluate", str(path))
+    assert code == 1
+    assert "violated: leg_length limb 1-" in out
+    assert "leg_length.max" in out
+    code, out, _ = cli("evaluate", str(path), "--set", "p_z=20", "--json", "-")
+    result = json.loads(out)
+    assert code == (1 if result["violated"] else 0)
+    assert {row["cost"] for row in result["margins"]} == {None}
 
 
 #: (24,) the ends of two segments.
