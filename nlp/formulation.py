@@ -220,8 +220,9 @@ def _vector(values: Sequence[float]) -> FloatArray:
 def _check_limbs(nlp: Nlp) -> None:
     """Refuse a limb whose direction vanishes whatever the solver chooses."""
     program = nlp.program
-    values = program.kernels.robot_state(nlp.start, nlp.arguments)[SQUARES].ravel()
-    free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
-    for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
-        if not varies and not value > 0:
-            raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)
+    for robot, kernel in zip(program.robots, program.kernels.robot_states, strict=True):
+        values = kernel(nlp.start, nlp.arguments)[SQUARES].ravel()
+        free = ca.which_depends(robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
+        for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
+            if not varies and not value > 0:
+                raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)

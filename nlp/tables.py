@@ -49,6 +49,8 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
         console.print(Text(f"violated: {name}", style="red"))
     if "parameters" in combined:
         console.print(_design(case, combined))
+    if combined.get("limits"):
+        console.print(_limits(combined))
     table = _table("task", "sense", "weight", "F", "best alone", "loss", "at this point")
     for task in combined["tasks"]:
         shown = [_number(task[key]) if task[key] is not None else "none" for key in ("F", "best", "loss")]

@@ -6,6 +6,7 @@ import copy
 import itertools
 import json
 import math
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -216,6 +217,38 @@ def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
     assert row["cost"] < 0
 
 
+def test_a_custom_equation_costs_what_moving_its_right_hand_side_does() -> None:
+    solution = solved(case_with({"custom": ["x1 == 2*x2"], "leg_length": {"max": 45}}))
+    row = next(row for row in result_of(solution)["margins"] if row["key"] == "custom[0]")
+    assert row["bound"] == "equal"
+    assert row["active"]
+    ends = [
+        solved(case_with({"custom": [f"x1 == 2*x2 + {h}"], "leg_length": {"max": 45}}), solution.x).F
+        for h in (-1e-3, 1e-3)
+    ]
+    assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
+    apart = solved(case_with({"custom": ["x1 == 5*x2"]}))
+    assert apart.status is Status.INFEASIBLE
+    # x1 is at most 16 and x2 at least 4: 4 short.
+    assert [(row.key, round(abs(row.needed), 4)) for row in apart.relaxation] == [("custom[0]", 4.0)]
+
+
+def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
+    text = HEXAPOD
+    for name, value in (("x1", 12), ("x2", 8), ("x3", 20), ("x4", 8)):
+        text = re.sub(rf"{name} = .*", f"{name} = {value}", text)
+    text = re.sub(r"position = .*", "position = [0, 0, 35]", text)
+    text = re.sub(r"rotation = .*", "", text)
+    assert solved(case_with({"leg_length": {"max": 45}}, text)).status is Status.EVALUATED
+    solution = solved(case_with({"leg_length": {"max": 30}}, text))
+    assert solution.status is Status.INFEASIBLE
+    assert solution.state is not None
+    longest = solution.state.quantities["leg_length"].max()
+    assert [(row.key, row.needed) for row in solution.relaxation] == [
+        ("leg_length.max", pytest.approx(longest, rel=1e-6))
+    ]
+
+
 def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
     degrees = result_of(solved(case_with({"base_joint_angle": 12})))
     text = HEXAPOD.replace('length = "cm"', 'length = "cm"\nangle = "rad"')
@@ -254,7 +287,7 @@ def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
         "joint_spacing": {"min": 20},
         "leg_clearance": {"min": 18},
         "rate_share": {"max": 0.6},
-        "smallest_singular_value": {"min": 0.05, "length": 30},
+        "smallest_singular_value": {"min": 0.015, "length": 30},
     }
     result = result_of(solved(case_with(limits, THREE_UPU), starts=16))
     assert result["status"] == "optimal"
