@@ -245,6 +245,21 @@ def test_commands_show_every_pose_and_generated_code_is_refused(cli: Run, tmp_pa
     assert not (tmp_path / "c").exists()
 
 
+def test_numbers_of_each_listed_pose_can_be_set(cli: Run, tmp_path: Path) -> None:
+    path = tmp_path / "poses.toml"
+    path.write_text(HEAD + LISTED + TASK.replace("SENSE", "max"), encoding="utf-8")
+    words = ["--set", "pose2_p_z=33", "--set", "pose2_angle=7", "--set", "x1=11", "--set", "pose1_axis=0,1,0"]
+    code, out, err = cli("evaluate", str(path), *words, "--json", "-")
+    assert code == 0, err
+    second = json.loads(out)["poses"][1]["pose"]
+    assert second["position"] == [3, 0, 33]
+    assert second["angle"] == pytest.approx(7)
+    code, _, err = cli("evaluate", str(path), "--set", "angle=7")
+    assert code == 2
+    assert "angle: cannot be set" in err
+    assert "pose1_angle" in err
+
+
 def test_a_task_of_one_pose_has_one_program_for_all_tasks() -> None:
     assert len(formulate_each(case_of(GRID))[0].program.robots) == 4
 
