@@ -9,7 +9,7 @@ back to the words of the case. How each is written, and why it is exact:
   ``shortest >= d + stroke`` means ``2 l_i - l_j >= d``; no extra unknowns;
 * joint angles: ``n . s / |s| >= cos(limit)``;
 * ``joint_spacing``, ``footprint``, ``radius_ratio``: squared;
-* ``leg_clearance``: the squared distance of segments in closed form (:mod:`screwsynth.nlp.segments`);
+* ``leg_clearance``: a smooth function of the exact distance of segments (:mod:`screwsynth.nlp.segments`);
 * singular values: eigenvalues of ``J'J`` (:mod:`screwsynth.nlp.spectrum`);
 * ``rate_share``: a limb's part of F.
 """
@@ -108,9 +108,8 @@ def _at_pose(case: Case, robot: RobotExpressions, where: str) -> Iterator[Bounde
     yield from _of_joints(case, robot, where)
     if limits.leg_clearance is not None:
         for one, other in itertools.combinations(robot.legs, 2):
-            squared = squared_distance(one.base, one.span, other.base, other.span)
             name = f"leg_clearance limbs {one.name} and {other.name}{where}"
-            yield _sided(name, squared, _SQUARED_LENGTH, "leg_clearance", Interval(min=limits.leg_clearance))
+            yield _apart(name, squared_distance(one.base, one.span, other.base, other.span), limits.leg_clearance)
     yield from _of_singular_values(case, robot, where)
     if limits.rate_share is not None:
         yield from _of_rates(case, robot, limits.rate_share, where)
@@ -119,6 +118,30 @@ def _at_pose(case: Case, robot: RobotExpressions, where: str) -> Iterator[Bounde
             for i, owner in enumerate(quantity.owners):
                 name, interval = f"{quantity.name} limb {owner}{where}", limits.quantities[quantity.name]
                 yield _sided(name, values[i], Reading(quantity.dimension), quantity.name, interval)
+
+
+def _apart(name: str, squared: SX, limit: float) -> Bounded:
+    """A limit on a distance from below: ``1 - (1 - d^2/D^2)^3`` for d below D, which is twice the limit, and 1 beyond.
+
+    It grows with d and is smooth to second order, and legs that are far apart have no part in any derivative: where
+    such legs happen to be parallel, second derivatives of their distance are not finite.
+    """
+    far = 4 * limit**2
+
+    def near(squared: SX) -> SX:
+        return 1 - ca.fmax(0, 1 - squared / far) ** 3
+
+    def distance(value: float) -> float:
+        return math.sqrt(far * (1 - max(1 - value, 0.0) ** (1 / 3)))
+
+    reading = Reading(
+        Dimension.LENGTH,
+        from_value=lambda value: distance(max(value, 0.0)),
+        slope=lambda value: 6 * max(1 - value, 0.0) ** (2 / 3) * distance(max(value, 0.0)) / far,
+        to_value=lambda number: near(number * number),
+    )
+    whole = _sided(name, near(squared), reading, "leg_clearance", Interval(min=limit))
+    return replace(whole, constraint=replace(whole.constraint, exact=ca.sqrt(squared)))
 
 
 def _of_joints(case: Case, robot: RobotExpressions, where: str) -> Iterator[Bounded]:
@@ -248,7 +271,9 @@ def distinct(limits: Sequence[Bounded], x: SX, p: SX, values: Sequence[float], a
     """
     if not limits:
         return []
-    function = ca.Function("limits", [x, p], [ca.densify(ca.vertcat(*[item.constraint.expression for item in limits]))])
+    constraints = [item.constraint for item in limits]
+    measured = [each.expression if each.exact is None else each.exact for each in constraints]
+    function = ca.Function("limits", [x, p], [ca.densify(ca.vertcat(*measured))])
     columns = np.column_stack([function(point, values).full().ravel() for point in at])
     kept: list[int] = []
     for i, row in enumerate(columns):

@@ -48,6 +48,7 @@ class Constraint:
         keys: dotted keys below ``limits`` of the case's numbers that are its lower and its upper bound; empty for a
             bound that is none of the case's limits.
         pose: index of the pose that it is at.
+        exact: (1, 1) the measured number itself, where the expression tells it near the limit only.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Constraint:
     reading: Reading
     keys: tuple[str, str] = ("", "")
     pose: int = 0
+    exact: SX | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,6 +70,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
     g = nlp.evaluate(x)[1]
+    exact = _exact(nlp, x, nlp.program.constraints)
     rows = []
     for j, side in enumerate(nlp.sides.sides):
         if side.constraint is None:
@@ -84,7 +85,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
                 name=side.name,
                 key=key,
                 bound=side.bound,
-                value=_value(nlp, x, constraint, float(g[side.constraint])),
+                value=_value(nlp, x, constraint, float(g[side.constraint]), exact),
                 limit=constraint.reading.from_value(limit),
                 dimension=constraint.reading.dimension,
                 active=j in active,
@@ -101,12 +102,13 @@ def _met(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     expressions = ca.vertcat(*[item.constraint.expression for item in nlp.met])
     function = ca.Function("met", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
     values = function(x, nlp.arguments).full().ravel()
+    exact = _exact(nlp, x, [item.constraint for item in nlp.met])
     return [
         Margin(
             name=item.constraint.name,
             key=key,
             bound=bound,
-            value=_value(nlp, x, item.constraint, float(value)),
+            value=_value(nlp, x, item.constraint, float(value), exact),
             limit=item.constraint.reading.from_value(limit),
             dimension=item.constraint.reading.dimension,
             active=False,
@@ -129,8 +131,19 @@ def _sides(item: Bounded) -> list[tuple[Literal["min", "max", "equal"], str, flo
     return sides
 
 
-def _value(nlp: Nlp, x: FloatArray, constraint: Constraint, measured: float) -> float:
+def _exact(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint]) -> dict[str, float]:
+    """Measured numbers by name, of the constraints that say them near their limits only."""
+    told = {each.name: each.exact for each in constraints if each.exact is not None}
+    if not told:
+        return {}
+    function = ca.Function("exact", [nlp.program.x, nlp.program.p], [ca.densify(ca.vertcat(*told.values()))])
+    return dict(zip(told, map(float, function(x, nlp.arguments).full().ravel()), strict=True))
+
+
+def _value(nlp: Nlp, x: FloatArray, constraint: Constraint, measured: float, exact: dict[str, float]) -> float:
     """The measured number; singular values, which the program keeps to from the safe side, as they are."""
+    if constraint.name in exact:
+        return exact[constraint.name]
     limits = nlp.case.limits
     if constraint.keys[0].startswith("smallest_singular_value") and limits.smallest_singular_value is not None:
         return float(_singular_values(nlp, x, constraint.pose, limits.smallest_singular_value)[-1])

@@ -15,8 +15,9 @@ import casadi as ca
 from casadi import SX
 
 #: Keeps the division defined for parallel lines, in parts of the squared lengths; the sine of the lines' angle counts
-#: squared beside it. Whatever s it gives there, t and s are improved once more.
-_PARALLEL = 1e-14
+#: squared beside it. Whatever s it gives there, t and s are improved once more, and what is left makes the squared
+#: distance too large by a quarter of this part of a leg's squared length at most.
+_PARALLEL = 1e-10
 
 
 def squared_distance(p: SX, d: SX, q: SX, e: SX) -> SX:
