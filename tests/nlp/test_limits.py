@@ -20,14 +20,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from screwsynth.models import hexapod
+from screwsynth.models import Model, hexapod, stewart_gough, three_upu
 from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
 from screwsynth.nlp.case import Search
 from screwsynth.nlp.formulation import formulate
+from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.limits import Cone, Interval, Limits
 from screwsynth.nlp.segments import squared_distance
 from screwsynth.nlp.solver import solve_nlp
 from screwsynth.nlp.spectrum import largest_eigenvalue, smallest_eigenvalue
+from screwsynth.nlp.starter import starter_case
 
 Array = NDArray[np.float64]
 Run = Any
@@ -387,6 +389,33 @@ def test_gradient_of_the_distance_is_that_of_the_nearest_points() -> None:
             high, low = (float(_DISTANCE(*(flat + s * step).reshape(4, 3))[0]) for s in (1, -1))
             numeric[i] = (high - low) / 2e-6
         np.testing.assert_allclose(gradient, numeric, atol=2e-5)
+
+
+def test_derivatives_are_finite_for_parallel_legs_that_are_far_apart() -> None:
+    text = HEXAPOD.replace("octahedral", "aligned").replace("max = 9 }", "max = 16 }")
+    nlp = formulate(case_with({"leg_clearance": {"min": 1.0}}, text))
+    x = np.array(nlp.start)
+    for name in ("x1", "x2"):
+        x[nlp.program.index(name)] = 12.0
+    for name in ("x3", "x4"):
+        x[nlp.program.index(name)] = math.radians(20)
+    hessian = nlp.program.kernels.hessian(x, nlp.arguments, 0.0, np.ones(len(nlp.program.constraints)))[0]
+    # All six legs are parallel here, the nearest two 8.2 cm apart.
+    angle = nlp.program.index("q_x")
+    hessian[angle : angle + 3, angle : angle + 3] = 0
+    np.testing.assert_allclose(hessian, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("model", [stewart_gough(), hexapod(), three_upu(axes="tsai")], ids=lambda model: model.name)
+def test_a_starter_case_with_its_limits_is_solved_from_every_start(model: Model) -> None:
+    text = re.sub(
+        r"^# (\[limits\]|leg_length|base_joint_angle|leg_clearance)", r"\1", starter_case(model), flags=re.MULTILINE
+    )
+    case = case_with({}, text)
+    assert case.limits.leg_clearance
+    solution = solved(case, starts=16)
+    assert solution.status is Status.OPTIMAL
+    assert all(start.status is StartStatus.CONVERGED for start in solution.starts)
 
 
 _A = SX.sym("A", 6, 6)

@@ -154,6 +154,8 @@ IMPOSSIBLE = {
     "short": (("leg_length", "max"), 15.0, {"leg_length.max"}),
     # Six rates that are each less than a tenth of F do not add up to F.
     "shares": (("rate_share", "max"), 0.1, {"rate_share.max"}),
+    # Joints of neighbouring legs are no farther apart than the platform's circle lets them be.
+    "clearance": (("leg_clearance", "min"), 13.0, {"leg_clearance.min", "footprint.platform"}),
     # Footprints that exclude the smallest radii that the case allows.
     "base": (("footprint", "base"), 18.0, {"footprint.base"}),
 }
