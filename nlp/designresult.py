@@ -11,6 +11,9 @@ from screwsynth.nlp.sensitivity import sensitivities
 from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tolerance import tolerance_loss
 
+#: What stands in a result where the robot is not defined.
+NO_MARGINS: dict[str, Any] = {"margins": [], "limits": []}
+
 
 def margins_in(nlp: Nlp, x: FloatArray, *, optimal: bool) -> dict[str, Any]:
     """Margins in every limit of the case, and one row for each number of it."""

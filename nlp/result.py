@@ -56,7 +56,9 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **(state_of(case, state, task) if state is not None else {}),
         **(poses_of(solution.nlp, solution.x) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
-        **(margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else {}),
+        **(
+            margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else {"margins": [], "limits": []}
+        ),
         **(sensitivity_in(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
@@ -73,7 +75,9 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     robot = {} if state is None else state_of(case, state)
     if state is not None:
         robot |= poses_of(outcomes[0].own.nlp, compromise.x)
-        robot |= margins_in(outcomes[0].own.nlp, compromise.x, optimal=False)
+        # Where one program brought the tasks together, a limit has a cost: of that program's value.
+        nlp, x = (outcomes[0].own.nlp, compromise.x) if combined is None else (combined.nlp, combined.x)
+        robot |= margins_in(nlp, x, optimal=combined is not None and compromise.is_made)
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
     if not compromise.is_made:

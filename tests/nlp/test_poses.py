@@ -18,7 +18,9 @@ from screwsynth.models import matrix_from_axis_angle, screw_from_axis
 from screwsynth.nlp import Case, CaseError, Kind, Status, case_from_tables, evaluate, formulate, result_of, solve
 from screwsynth.nlp.formulation import formulate_each
 from screwsynth.nlp.poses import along_screw, over_grid
+from screwsynth.nlp.result import compromise_of
 from screwsynth.nlp.tasks import solve_tasks
+from screwsynth.nlp.tolerance import BuiltRobot, tolerance_loss
 
 Array = NDArray[np.float64]
 Run = Any
@@ -218,6 +220,35 @@ def test_several_tasks_over_several_poses_are_brought_together() -> None:
     assert compromise.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
     states = [evaluate(compromise.outcomes[0].own.nlp, compromise.x, k).F for k in range(3)]
     assert pytest.approx(np.mean(states), rel=1e-9) == compromise.outcomes[0].F
+
+
+@pytest.mark.parametrize("over", ["sum", "mean", "worst"])
+def test_inexact_joints_cost_what_sampling_over_all_poses_finds(over: str) -> None:
+    solution = solve(case_of(ALONG, over))
+    robot = BuiltRobot(solution.nlp, solution.x)
+    assert robot.evaluate(np.zeros((12, 3)))[0] == pytest.approx(solution.F, rel=1e-9)
+    lost = tolerance_loss(solution.nlp, solution.x, 1e-3)
+    assert lost.loss_there == pytest.approx(lost.loss, rel=1e-2)
+    random = np.random.default_rng(2)
+    for _ in range(100):
+        errors = random.normal(size=(12, 3))
+        errors *= 1e-3 / np.linalg.norm(errors, axis=1, keepdims=True)
+        assert solution.F - robot.evaluate(errors)[0] <= 1.01 * lost.loss
+
+
+def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None:
+    def together(longest: float) -> dict[str, Any]:
+        first = TASK.replace("SENSE", "max")
+        second = first.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
+        text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + second + first
+        tables = tomllib.loads(f"{text}\n[limits]\nleg_length = {{ max = {longest} }}\n")
+        result: dict[str, Any] = compromise_of(solve_tasks(case_from_tables(tables, name="two", source="two.toml")))
+        return result["combined"]
+
+    (row,) = together(40.0)["limits"]
+    assert row["active"]
+    high, low = (together(40.0 + step)["value"] for step in (1e-2, -1e-2))
+    assert row["cost"] == pytest.approx((high - low) / 2e-2, rel=0.01)
 
 
 def test_an_optimum_over_poses_has_its_evidence() -> None:
