@@ -19,7 +19,7 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
-from screwsynth.nlp.designresult import margins_in, relaxation_in, sensitivity_in
+from screwsynth.nlp.designresult import NO_MARGINS, margins_in, relaxation_in, sensitivity_in
 from screwsynth.nlp.evaluation import RobotState, StatedPose, evaluate, stated_poses
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, linearise
@@ -56,9 +56,7 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **(state_of(case, state, task) if state is not None else {}),
         **(poses_of(solution.nlp, solution.x) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
-        **(
-            margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else {"margins": [], "limits": []}
-        ),
+        **(margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else NO_MARGINS),
         **(sensitivity_in(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
