@@ -8,19 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
-    from screwsynth.nlp.case import (
-        Case,
-        Expectation,
-        Free,
-        Method,
-        OverPoses,
-        Pose,
-        Published,
-        Rotation,
-        Search,
-        Sense,
-        Task,
-    )
+    from screwsynth.nlp.case import Case
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
     from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
     from screwsynth.nlp.evaluation import RobotState, evaluate
@@ -38,6 +26,18 @@ if TYPE_CHECKING:
     from screwsynth.nlp.tasks import Compromise, TaskOutcome, solve_tasks
     from screwsynth.nlp.tolerance import ToleranceLoss, tolerance_loss
     from screwsynth.nlp.units import Units
+    from screwsynth.nlp.values import (
+        Expectation,
+        Free,
+        Method,
+        OverPoses,
+        Pose,
+        Published,
+        Rotation,
+        Search,
+        Sense,
+        Task,
+    )
 
 __all__ = [
     "ActiveSide",
@@ -100,8 +100,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "case": (
-        "Case",
+    "case": ("Case",),
+    "values": (
         "Expectation",
         "Free",
         "Method",

@@ -19,12 +19,12 @@ from screwsynth.nlp.buildtables import (
     OffsetsTable,
     SmallestTable,
 )
-from screwsynth.nlp.case import Task
 from screwsynth.nlp.document import PoseTable
 from screwsynth.nlp.errors import CaseError, listing
 from screwsynth.nlp.limits import Actuator, Cone, Footprint, Home, Homogenised, Interval, Limits, Triple
 from screwsynth.nlp.poses import HERE, Step, along_screw, over_grid
 from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import Task
 
 #: Poses of one stated pose, beyond which a program would be too large to solve while one waits.
 _MOST = 200

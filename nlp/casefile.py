@@ -14,9 +14,12 @@ from typing import Any
 import screwsynth.cases
 from screwsynth.models import Dimension, FloatArray, component_names, screw_from_axis
 from screwsynth.nlp import buildcase, document
-from screwsynth.nlp.case import (
+from screwsynth.nlp.case import Case
+from screwsynth.nlp.errors import CaseError, InputError, nearest
+from screwsynth.nlp.robots import build_model
+from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import (
     LARGEST,
-    Case,
     Expectation,
     ExpectedValue,
     Free,
@@ -30,9 +33,6 @@ from screwsynth.nlp.case import (
     Task,
     Value,
 )
-from screwsynth.nlp.errors import CaseError, InputError, nearest
-from screwsynth.nlp.robots import build_model
-from screwsynth.nlp.units import Units
 
 _SHIPPED = Path(screwsynth.cases.__file__).parent
 

@@ -15,10 +15,10 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
-from screwsynth.nlp.case import Sense
 from screwsynth.nlp.expressions import Constraint, Reading, Scalar
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.values import Sense
 
 #: A number is moved when it is moved by more than this part of itself.
 MOVED = 1e-6

@@ -9,12 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
-from screwsynth.nlp.case import Case, Free, Pose
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import EvaluationError
 from screwsynth.nlp.expressions import vanished
 from screwsynth.nlp.linear import plain_basis
 from screwsynth.nlp.poses import Step
 from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.values import Free, Pose
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
 ZERO_F = 1e-12

@@ -23,12 +23,13 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Free, OverPoses, Sense
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.expressions import Bounded, Constraint, Reading, Scalar, vanished
 from screwsynth.nlp.layout import Layout, free_directions, lay_out
 from screwsynth.nlp.program import MAGNITUDE, OBJECTIVE, SQUARES, Nlp, Program
 from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.values import Free, OverPoses, Sense
 
 #: How many points are looked at for the size of F over several poses, and a level that no F comes near, in parts of it.
 _PROBES = 32

@@ -36,10 +36,11 @@ from screwsynth.models import (
     matrix_from_quaternion_vector,
 )
 from screwsynth.nlp.buildable import distinct, limits_of
-from screwsynth.nlp.case import Case, Free, OverPoses, Pose, Task, Value, sizes_of_turn
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.expressions import Bounded, Constraint, LegExpressions, Reading, RobotExpressions, Scalar
 from screwsynth.nlp.poses import Step
+from screwsynth.nlp.values import Free, OverPoses, Pose, Task, Value, sizes_of_turn
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
 ROTATION_ANGLE = Reading(

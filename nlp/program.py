@@ -16,9 +16,10 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import FloatArray, Model
-from screwsynth.nlp.case import Case, Sense
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.expressions import Bounded, Constraint, RobotExpressions, Scalar
 from screwsynth.nlp.kernel import Kernel
+from screwsynth.nlp.values import Sense
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

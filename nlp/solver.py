@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Search
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.elastic import Relaxed, elastic, relaxed_limits, stretched_point
 from screwsynth.nlp.errors import CaseError, EvaluationError
 from screwsynth.nlp.evaluation import RobotState, evaluate
@@ -20,6 +20,7 @@ from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.values import Search
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9

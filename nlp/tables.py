@@ -10,8 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from screwsynth.models import Dimension, Model, Parameter, component_names
-from screwsynth.nlp.case import Case, Free, Value, sizes_of_turn
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import Free, Value, sizes_of_turn
 
 if TYPE_CHECKING:
     from screwsynth.nlp.regress import CaseCheck

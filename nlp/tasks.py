@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Method, Search, Sense, Task
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.formulation import formulate_each, formulate_weighted, formulate_worst, near
@@ -34,6 +34,7 @@ from screwsynth.nlp.kkt import FEASIBLE, correct, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import SAME_VALUE, Progress, Solution, Status, solve_nlp, state_or_none
+from screwsynth.nlp.values import Method, Search, Sense, Task
 
 #: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale, weaker and weaker:
 #: the point tends to the nearest of the optimal set, and the correction that follows takes the rest off.

@@ -16,8 +16,8 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import FloatArray, WrenchKind, frozen_array
-from screwsynth.nlp.case import OverPoses
 from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.values import OverPoses
 
 #: Poses whose F is within this part of the worst one's are the worst together.
 _LEVEL = 1e-7
