@@ -22,6 +22,16 @@ def _put(page: Path, opening: str, closing: str, text: str) -> None:
 
 solve = ("solve", "paper-4.1-helical")
 _put(ROOT / "README.md", f"```text\n$ screwsynth {' '.join(solve)}", "```", _printed(*solve))
+limited = ("solve", "hexapod-machining")
+# The design varies in its last digits from machine to machine, its limits do not.
+lines = _printed(*limited).splitlines(keepends=True)
+first, last = (next(i for i, line in enumerate(lines) if line.startswith(word)) for word in ("limit ", "tolerance"))
+_put(
+    ROOT / "docs" / "limits.md",
+    f"<!-- begin: screwsynth {' '.join(limited)} -->",
+    "<!-- end -->",
+    f"```text\n{''.join(lines[first : last + 1])}```\n",
+)
 check = ("check", "--markdown")
 _put(
     ROOT / "docs" / "reproduction.md", f"<!-- begin: screwsynth {' '.join(check)} -->", "<!-- end -->", _printed(*check)

@@ -3,11 +3,12 @@
 from screwsynth.models.arrays import FloatArray, frozen_array
 from screwsynth.models.catalog import RobotFunction, UnknownModelError, model_names, robot_function
 from screwsynth.models.hexapod import hexapod
-from screwsynth.models.legs import Leg, LeggedPlatform, legged_platform
+from screwsynth.models.legs import LeggedPlatform, legged_platform
 from screwsynth.models.model import (
     Body,
     Closure,
     Dimension,
+    Leg,
     Link,
     Model,
     ModelError,

@@ -10,8 +10,8 @@ import math
 
 from casadi import SX
 
-from screwsynth.models.legs import Leg, legged_platform
-from screwsynth.models.model import Dimension, Model, Parameter, PoseSymbols
+from screwsynth.models.legs import legged_platform
+from screwsynth.models.model import Dimension, Leg, Model, Parameter, PoseSymbols
 
 
 def hexapod() -> Model:
@@ -36,6 +36,8 @@ def hexapod() -> Model:
         wrenches=parts.wrenches,
         quantities=parts.quantities,
         scene=parts.scene,
+        legs=parts.legs,
+        built=parts.built,
     )
 
 

@@ -8,29 +8,16 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.model import Body, Dimension, Link, Point, PoseSymbols, Quantity, Scene, Wrench, force_along
-
-
-@dataclass(frozen=True, eq=False)
-class Leg:
-    """A leg between two spherical (or universal) joints, driven along its own axis.
-
-    Attributes:
-        name: the limb's name.
-        base: (3, 1) centre of its base joint in the world frame, length.
-        platform: (3, 1) centre of its platform joint in the platform frame, length.
-    """
-
-    name: str
-    base: SX
-    platform: SX
+from screwsynth.models.model import Body, Dimension, Leg, Link, Point, PoseSymbols, Quantity, Scene, Wrench, force_along
 
 
 @dataclass(frozen=True, eq=False)
 class LeggedPlatform:
-    """Rows, measures and drawing of legs between a base and a platform."""
+    """Rows, measures, drawing and joint centres of legs between a base and a platform."""
 
+    legs: tuple[Leg, ...]
     wrenches: tuple[Wrench, ...]
+    built: tuple[Wrench, ...]
     quantities: tuple[Quantity, ...]
     scene: Scene
 
@@ -51,7 +38,9 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
     spans = [end - leg.base for end, leg in zip(ends, legs, strict=True)]
     lengths = [ca.norm_2(span) for span in spans]
     return LeggedPlatform(
-        wrenches=tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True)),
+        legs=tuple(legs),
+        wrenches=_rows(legs, pose),
+        built=_rows([leg.built for leg in legs], pose),
         quantities=(
             Quantity("leg_length", names, ca.vertcat(*lengths), Dimension.LENGTH, "distance between a leg's joints"),
             Quantity(
@@ -71,6 +60,11 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
         ),
         scene=_scene(legs, ends, pose),
     )
+
+
+def _rows(legs: Sequence[Leg], pose: PoseSymbols) -> tuple[Wrench, ...]:
+    spans = (pose.position + pose.rotation @ leg.platform - leg.base for leg in legs)
+    return tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True))
 
 
 def _angle_between(normal: SX, span: SX) -> SX:

@@ -201,6 +201,29 @@ class Quantity:
     description: str
 
 
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A straight leg between two passive joints, driven along its own axis.
+
+    Attributes:
+        name: the limb's name.
+        base: (3, 1) centre of its base joint in the world frame, length.
+        platform: (3, 1) centre of its platform joint in the platform frame, length.
+        base_error, platform_error: (3, 1) symbols for how far off these a machine's joint centres are built.
+    """
+
+    name: str
+    base: SX
+    platform: SX
+    base_error: SX = field(default_factory=lambda: SX.sym("base_error", 3))
+    platform_error: SX = field(default_factory=lambda: SX.sym("platform_error", 3))
+
+    @property
+    def built(self) -> Leg:
+        """The leg between the joint centres as they are built."""
+        return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)
+
+
 class Body(enum.Enum):
     """What a point of the drawing moves with."""
 
@@ -244,6 +267,8 @@ class Model:
         name: the name in case files.
         description: one sentence for people.
         options: the options that the robot function was called with.
+        legs: the legs between joint centres, for limits on joints, plates and clearances; none for other limbs.
+        built: the rows of a machine whose joint centres are off by the legs' errors; none where that is not said.
         parameters: dimensions that a case fixes or frees.
         pose: symbols of the platform's pose.
         home: (3,) a sensible platform position beside the parameters' typical values.
@@ -269,6 +294,8 @@ class Model:
     unknowns: tuple[Unknown, ...] = ()
     closure: tuple[Closure, ...] = ()
     options: Mapping[str, object] = field(default_factory=dict)
+    legs: tuple[Leg, ...] = ()
+    built: tuple[Wrench, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
@@ -331,6 +358,8 @@ def _check_shapes(model: Model) -> None:
     expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
     expected += [(f"point {point.name}", point.position, (3, 1)) for point in model.scene.points]
+    for leg in model.legs:
+        expected += [(f"leg {leg.name} base", leg.base, (3, 1)), (f"leg {leg.name} platform", leg.platform, (3, 1))]
     for what, expression, shape in expected:
         if expression.shape != shape:
             raise _fail(model, f"{what} should have shape {shape}, got {expression.shape}")
@@ -350,15 +379,27 @@ def _check_symbols(model: Model) -> None:
         *(equation.expression for equation in model.closure),
         *(quantity.values for quantity in model.quantities),
         *(point.position for point in model.scene.points),
+        *(joint for leg in model.legs for joint in (leg.base, leg.platform)),
     ]
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
-    stray = sorted({str(s) for s in ca.symvar(ca.veccat(*used)) if s.element_hash() not in known})
-    if stray:
-        raise _fail(model, f"symbols are used but not declared: {', '.join(stray)}")
+    errors = ca.veccat(SX(0), *[error for leg in model.legs for error in (leg.base_error, leg.platform_error)])
+    known_if_built = known | {errors[i].element_hash() for i in range(errors.numel())}
+    built = [part for row in model.built for part in (row.force, row.moment, row.square)]
+    for expressions, allowed in ((used, known), (built, known_if_built)):
+        stray = sorted({str(s) for s in ca.symvar(ca.veccat(SX(0), *expressions)) if s.element_hash() not in allowed})
+        if stray:
+            raise _fail(model, f"symbols are used but not declared: {', '.join(stray)}")
 
 
 def _check_scene(model: Model) -> None:
     points = {point.name for point in model.scene.points}
+    for leg in model.legs:
+        if leg.name not in model.limbs:
+            raise _fail(model, f"leg {leg.name!r} is no limb: it has no wrench")
+    if model.built and [(row.limb, row.kind) for row in model.built] != [
+        (row.limb, row.kind) for row in model.wrenches
+    ]:
+        raise _fail(model, "the rows of the built machine are not those of the designed one")
     for link in model.scene.links:
         for end in (link.start, link.end):
             if end not in points:

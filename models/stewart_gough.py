@@ -18,8 +18,8 @@ from typing import Literal
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.legs import Leg, legged_platform
-from screwsynth.models.model import Dimension, Model, ModelError, Parameter, PoseSymbols
+from screwsynth.models.legs import legged_platform
+from screwsynth.models.model import Dimension, Leg, Model, ModelError, Parameter, PoseSymbols
 
 _THIRD = 2 * math.pi / 3
 _SIXTH = math.pi / 3
@@ -59,6 +59,8 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
         wrenches=parts.wrenches,
         quantities=parts.quantities,
         scene=parts.scene,
+        legs=parts.legs,
+        built=parts.built,
     )
 
 

@@ -18,8 +18,8 @@ from typing import Literal
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.legs import Leg, legged_platform
-from screwsynth.models.model import Closure, Dimension, Model, ModelError, Parameter, PoseSymbols, couple_about
+from screwsynth.models.legs import legged_platform
+from screwsynth.models.model import Closure, Dimension, Leg, Model, ModelError, Parameter, PoseSymbols, couple_about
 
 _THIRD = 2 * math.pi / 3
 
@@ -42,8 +42,8 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
     ]
     legs = [Leg(str(k + 1), base_radius * _radial(k), platform_radius * _radial(k)) for k in range(3)]
     parts = legged_platform(legs, pose)
-    couples, closure = [], []
-    for k, row in enumerate(parts.wrenches):
+    couples, built, closure = [], [], []
+    for k, (row, row_built) in enumerate(zip(parts.wrenches, parts.built, strict=True)):
         first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
         if first is None:
             parameters.append(_axis(f"u1_{row.limb}", f"first axis of limb {row.limb}'s upper joint", _radial(k)))
@@ -51,13 +51,12 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         if axes == "free":
             parameters.append(_axis(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k)))
             second = parameters[-1].symbol
-            normal = pose.rotation @ ca.cross(first, second)
             closure.append(Closure(f"u1_{row.limb} . u2_{row.limb}", ca.dot(first, second)))
+            normals = [pose.rotation @ ca.cross(first, second)] * 2
         else:
-            # With u2 along u1 x s, the normal of both is the part of s that is perpendicular to u1.
-            u1, s = pose.rotation @ first, row.force
-            normal = s * ca.sumsqr(u1) - u1 * ca.dot(u1, s)
-        couples.append(couple_about(row.limb, normal))
+            normals = [_normal(pose.rotation @ first, each.force) for each in (row, row_built)]
+        couples.append(couple_about(row.limb, normals[0]))
+        built.append(couple_about(row.limb, normals[1]))
     return Model(
         name="three-upu",
         description="3-UPU: three limbs, each with a force along it and a couple about its upper joint's normal",
@@ -68,8 +67,15 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         wrenches=(*parts.wrenches, *couples),
         quantities=parts.quantities,
         scene=parts.scene,
+        legs=parts.legs,
+        built=(*parts.built, *built),
         closure=tuple(closure),
     )
+
+
+def _normal(u1: SX, s: SX) -> SX:
+    """Common normal of u1 and u2 = u1 x s: the part of s that is perpendicular to u1."""
+    return s * ca.sumsqr(u1) - u1 * ca.dot(u1, s)
 
 
 def _radial(k: int) -> SX:

@@ -8,34 +8,61 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
-    from screwsynth.nlp.case import Case, Expectation, Free, Method, Published, Rotation, Search, Sense, Task
+    from screwsynth.nlp.case import Case
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
     from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
     from screwsynth.nlp.ipopt import Start, StartStatus
+    from screwsynth.nlp.limits import Actuator, Cone, Footprint, Home, Homogenised, Interval, Limits
+    from screwsynth.nlp.margins import Margin, margins_of
     from screwsynth.nlp.optimality import ActiveSide, Evidence, Kind, examine
+    from screwsynth.nlp.poses import Step, along_screw, over_grid
     from screwsynth.nlp.program import Nlp, Program
     from screwsynth.nlp.result import result_of
     from screwsynth.nlp.robots import build_model
+    from screwsynth.nlp.sensitivity import Sensitivity, sensitivities
     from screwsynth.nlp.solver import Optimum, Solution, Status, solve
     from screwsynth.nlp.tasks import Compromise, TaskOutcome, solve_tasks
+    from screwsynth.nlp.tolerance import ToleranceLoss, tolerance_loss
     from screwsynth.nlp.units import Units
+    from screwsynth.nlp.values import (
+        Expectation,
+        Free,
+        Method,
+        OverPoses,
+        Pose,
+        Published,
+        Rotation,
+        Search,
+        Sense,
+        Task,
+    )
 
 __all__ = [
     "ActiveSide",
+    "Actuator",
     "Case",
     "CaseError",
     "Compromise",
+    "Cone",
     "EvaluationError",
     "Evidence",
     "Expectation",
+    "Footprint",
     "Free",
+    "Home",
+    "Homogenised",
     "InputError",
+    "Interval",
     "Kind",
+    "Limits",
+    "Margin",
     "Method",
     "Nlp",
     "Optimum",
+    "OverPoses",
+    "Pose",
     "Program",
     "Published",
     "RobotState",
@@ -43,14 +70,18 @@ __all__ = [
     "ScrewsynthError",
     "Search",
     "Sense",
+    "Sensitivity",
     "Solution",
     "Start",
     "StartStatus",
     "Status",
+    "Step",
     "Task",
     "TaskAnalysis",
     "TaskOutcome",
+    "ToleranceLoss",
     "Units",
+    "along_screw",
     "analyse_tasks",
     "build_model",
     "case_from_tables",
@@ -58,19 +89,40 @@ __all__ = [
     "examine",
     "formulate",
     "load_case",
+    "margins_of",
+    "over_grid",
     "result_of",
+    "sensitivities",
     "shipped_cases",
     "solve",
     "solve_tasks",
+    "tolerance_loss",
 ]
 
 _HOMES = {
-    "case": ("Case", "Expectation", "Free", "Method", "Published", "Rotation", "Search", "Sense", "Task"),
+    "case": ("Case",),
+    "values": (
+        "Expectation",
+        "Free",
+        "Method",
+        "OverPoses",
+        "Pose",
+        "Published",
+        "Rotation",
+        "Search",
+        "Sense",
+        "Task",
+    ),
     "robots": ("build_model",),
     "casefile": ("case_from_tables", "load_case", "shipped_cases"),
     "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
     "evaluation": ("RobotState", "evaluate"),
     "formulation": ("formulate",),
+    "limits": ("Actuator", "Cone", "Footprint", "Home", "Homogenised", "Interval", "Limits"),
+    "margins": ("Margin", "margins_of"),
+    "poses": ("Step", "along_screw", "over_grid"),
+    "sensitivity": ("Sensitivity", "sensitivities"),
+    "tolerance": ("ToleranceLoss", "tolerance_loss"),
     "optimality": ("ActiveSide", "Evidence", "Kind", "examine"),
     "program": ("Nlp", "Program"),
     "result": ("result_of",),

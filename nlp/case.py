@@ -6,214 +6,47 @@ itself once, in the words of a case file, so everything behind it can rely on it
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.models import Dimension, FloatArray, Model, Parameter, frozen_array, screw_from_axis, unit_vector
+from screwsynth.models import (
+    Dimension,
+    FloatArray,
+    Model,
+    Parameter,
+    component_names,
+    frozen_array,
+    unit_vector,
+)
 from screwsynth.nlp.errors import CaseError, nearest
+from screwsynth.nlp.limitcheck import checked_limits
+from screwsynth.nlp.limits import Limits
+from screwsynth.nlp.poses import HERE, Step
+from screwsynth.nlp.sentence import SentenceError, parse
 from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import (
+    LARGEST,
+    MAX_FREE_ROTATION,
+    Expectation,
+    Free,
+    Method,
+    OverPoses,
+    Pose,
+    Published,
+    Rotation,
+    Search,
+    Sense,
+    Task,
+    Value,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-#: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
-MAX_FREE_ROTATION = math.radians(179)
-#: No number of a case may be larger, and no twist smaller than its inverse: squares and fourth powers stay finite.
-LARGEST = 1e30
-
-
-class Sense(enum.Enum):
-    """Whether F is to be as large or as small as possible."""
-
-    MAX = "max"
-    MIN = "min"
-
-
-@dataclass(frozen=True)
-class Free:
-    """A number that the solver chooses between two bounds.
-
-    Attributes:
-        lower, upper: finite bounds, ``lower < upper``.
-        start: where the first search begins; the middle when left out.
-    """
-
-    lower: float
-    upper: float
-    start: float | None = None
-
-    @property
-    def first(self) -> float:
-        """Where the first search begins."""
-        return (self.lower + self.upper) / 2 if self.start is None else self.start
-
-
-Value: TypeAlias = float | Free
-
-
-def sizes_of_turn(angle: Value) -> tuple[float, float]:
-    """Smallest and largest size, radians, of a rotation whose axis is free, where an angle's sign means nothing."""
-    if not isinstance(angle, Free):
-        return abs(angle), abs(angle)
-    sizes = sorted((abs(angle.lower), abs(angle.upper)))
-    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
-
-
-@dataclass(frozen=True, eq=False)
-class Rotation:
-    """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
-
-    Attributes:
-        axis: (3,) held axis, any length but zero; None leaves the axis free.
-        angle: radians. With the axis free the sign of an angle means nothing: ``Free(-0.5, 0.5)`` allows every rotation
-            by at most 0.5, about any axis; its start is about z.
-    """
-
-    axis: ArrayLike | None = (0.0, 0.0, 1.0)
-    angle: Value = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """An instantaneous twist deformation (ITD) that the platform must make (equation 12).
-
-    Attributes:
-        twist: (6,) ``(omega, v)`` in the world frame; ``v`` is the velocity of the platform point at the world origin.
-        sense: whether the robot should put much or little work rate into it.
-        name: a few words.
-        weight: positive; what the task counts for beside others.
-    """
-
-    twist: ArrayLike
-    sense: Sense = Sense.MAX
-    name: str = "task"
-    weight: float = 1.0
-
-    @classmethod
-    def screw(
-        cls,
-        sense: Sense | str,
-        *,
-        axis: ArrayLike,
-        pitch: float,
-        point: ArrayLike | None = None,
-        name: str = "task",
-        weight: float = 1.0,
-    ) -> Task:
-        """A unit screw motion from its axis.
-
-        Args:
-            sense: ``"max"`` or ``"min"``.
-            axis: (3,) direction, any length but zero.
-            pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
-            point: (3,) any point of the axis, length; needed unless the pitch is infinite.
-            name: a few words.
-            weight: positive.
-
-        Raises:
-            CaseError: the sense is another word, or the point is missing.
-            ValueError: the axis is zero, or a number is not finite.
-        """
-        if sense not in ("max", "min", Sense.MAX, Sense.MIN):
-            raise CaseError("task.sense", "must be 'max' or 'min'", sense)
-        if point is None and pitch != math.inf:
-            raise CaseError("task.point", "is missing: any point on the axis")
-        return cls(
-            screw_from_axis(axis, (0.0, 0.0, 0.0) if point is None else point, pitch), Sense(sense), name, weight
-        )
-
-
-class Method(enum.Enum):
-    """How several tasks are brought together."""
-
-    AVERAGE = "average"
-    WEIGHTED_SUM = "weighted-sum"
-    WORST_CASE = "worst-case"
-
-
-@dataclass(frozen=True)
-class Search:
-    """How the solver searches.
-
-    Attributes:
-        starts: number of starting points.
-        seed: seed of the random ones.
-        max_iterations: Ipopt's limit for each start.
-        compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. It needs a C
-            compiler, and a second or two the first time.
-    """
-
-    starts: int = 32
-    seed: int = 0
-    max_iterations: int = 500
-    compiled: bool = False
-
-    def __post_init__(self) -> None:
-        for key, value, least in (
-            ("starts", self.starts, 1),
-            ("seed", self.seed, 0),
-            ("max_iterations", self.max_iterations, 1),
-        ):
-            if value < least:
-                raise CaseError(f"solve.{key}", f"must be at least {least}", value)
-
-    def but(self, starts: int | None, seed: int | None, *, compiled: bool = False) -> Search:
-        """The same search with another number of starts or seed where they are given, and compiled if asked."""
-        return Search(
-            self.starts if starts is None else starts,
-            self.seed if seed is None else seed,
-            self.max_iterations,
-            self.compiled or compiled,
-        )
-
-
-@dataclass(frozen=True)
-class ExpectedValue:
-    """A number of the result, by its dotted path there, and how far it may be off."""
-
-    quantity: str
-    value: float
-    within: float
-
-
-@dataclass(frozen=True)
-class Expectation:
-    """What a regression holds the case to; ``tolerance`` is relative, and absolute where F is 0."""
-
-    F: float | None = None
-    tolerance: float = 1e-6
-    singular: bool | None = None
-    values: tuple[ExpectedValue, ...] = ()
-
-
-@dataclass(frozen=True)
-class Published:
-    """A number that the literature prints, and whether this program reproduces it.
-
-    Attributes:
-        quantity: dotted path in the result, such as ``pose.angle``, or ``gain``: by how many percent F exceeds that of
-            the case ``over``.
-        value: as printed.
-        source: where.
-        reproduced: whether this program reproduces it.
-        because: the reason, where it does not.
-        decimals: digits printed behind the point, where the value alone does not show them.
-        over: name of the case that a gain is over.
-    """
-
-    quantity: str
-    value: tuple[float, ...]
-    source: str
-    reproduced: bool
-    because: str = ""
-    decimals: int | None = None
-    over: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +63,11 @@ class Case:
         units: units for people.
         characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
             constraint couples.
+        limits: what a design must keep to be built.
+        steps: displacements of the pose above, one for each pose that the robot takes.
+        further: other poses, with their displacements. The robot's dimensions are the same at all of them.
+        over_poses: what F is over several poses.
+        joint_centre_tolerance: how far off a joint centre may be built, length; None leaves it out.
         search: how the solver searches.
         method: how several tasks are brought together; the average is equation 15.
         title, name: for people; the name is the file's.
@@ -249,6 +87,11 @@ class Case:
     rotation: Rotation = field(default_factory=Rotation)
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
+    limits: Limits = field(default_factory=Limits)
+    steps: tuple[Step, ...] = (HERE,)
+    further: Sequence[Pose] = ()
+    over_poses: OverPoses = OverPoses.SUM
+    joint_centre_tolerance: float | None = None
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE
     title: str = ""
@@ -260,9 +103,11 @@ class Case:
     def __post_init__(self) -> None:
         settle = object.__setattr__
         settle(self, "parameters", MappingProxyType(_parameters(self)))
-        settle(self, "position", _position(self))
-        settle(self, "rotation", _rotation(self))
+        settle(self, "position", _position(self, self.position, "pose"))
+        settle(self, "rotation", _rotation(self, self.rotation, "pose"))
+        settle(self, "further", _further(self))
         settle(self, "tasks", _tasks(self))
+        _check_buildable(self)
         if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
@@ -275,6 +120,32 @@ class Case:
     def axis(self) -> FloatArray | None:
         """Held axis of rotation, (3,) unit, or None when it is free."""
         return None if self.rotation.axis is None else frozen_array(self.rotation.axis, (3,))
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """The poses as they are stated, each with its displacements."""
+        return (Pose(self.position, self.rotation, self.steps), *self.further)
+
+    @property
+    def pose_count(self) -> int:
+        """How many poses the robot takes."""
+        return sum(len(pose.steps) for pose in self.poses)
+
+    @property
+    def pose_prefixes(self) -> tuple[str, ...]:
+        """What stands before the names of each stated pose's numbers: nothing for a single one."""
+        count = 1 + len(self.further)
+        return ("",) if count == 1 else tuple(f"pose{k + 1}_" for k in range(count))
+
+    @property
+    def scalars(self) -> Mapping[str, Dimension]:
+        """Names of the case's own numbers, which ``limits.custom`` may relate, with what they measure."""
+        names = {part: item.dimension for item in self.model.parameters for part in item.components}
+        for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
+            names |= dict.fromkeys((f"{prefix}{part}" for part in component_names("p", 3)), Dimension.LENGTH)
+            if pose.rotation.axis is not None:
+                names[f"{prefix}angle"] = Dimension.ANGLE
+        return names
 
 
 def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
@@ -312,17 +183,47 @@ def _expected(parameter: Parameter) -> str:
     return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
 
 
-def _position(case: Case) -> tuple[Value, ...]:
-    if len(case.position) != 3:
-        raise CaseError("pose.position", "must be a list of 3, each a number or { min, max }")
+def _position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
+    if len(position) != 3:
+        raise CaseError(f"{pose}.position", "must be a list of 3, each a number or { min, max }")
     return tuple(
-        _checked(value, f"pose.position[{index}]", Dimension.LENGTH, case.units)
-        for index, value in enumerate(case.position)
+        _checked(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
+        for index, value in enumerate(position)
     )
 
 
-def _rotation(case: Case) -> Rotation:
-    given, key = case.rotation, "pose.rotation.angle"
+def _further(case: Case) -> tuple[Pose, ...]:
+    keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
+    settled = [
+        Pose(_position(case, pose.position, key), _rotation(case, pose.rotation, key), tuple(pose.steps))
+        for pose, key in zip(case.further, keys, strict=True)
+    ]
+    steps = [case.steps, *(pose.steps for pose in settled)]
+    for key, own in zip(["pose", *keys], steps, strict=True):
+        if not own:
+            raise CaseError(key, "must have at least one pose")
+    if sum(map(len, steps)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
+        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
+    return tuple(settled)
+
+
+def _check_buildable(case: Case) -> None:
+    """Check the limits against the robot, and that each sentence among them can be understood."""
+    checked_limits(case.limits, case.model, case.units)
+    for index, text in enumerate(case.limits.custom):
+        try:
+            parse(text, case.scalars)
+        except SentenceError as error:
+            raise CaseError(f"limits.custom[{index}]", str(error), text) from None
+    tolerance = case.joint_centre_tolerance
+    if tolerance is not None and not (0 < tolerance <= LARGEST):
+        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
+    if tolerance is not None and (not case.model.built or case.model.unknowns):
+        raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")
+
+
+def _rotation(case: Case, given: Rotation, pose: str) -> Rotation:
+    key = f"{pose}.rotation.angle"
     if given.axis is None:
         limit, why = MAX_FREE_ROTATION, "with the axis free"
     else:
@@ -337,7 +238,7 @@ def _rotation(case: Case) -> Rotation:
     if given.axis is None and isinstance(angle, Free) and lopsided:
         fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
         raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
-    axis = None if given.axis is None else _unit(given.axis, "pose.rotation.axis")
+    axis = None if given.axis is None else _unit(given.axis, f"{pose}.rotation.axis")
     return Rotation(axis, angle)
 
 

@@ -13,14 +13,19 @@ from typing import Any
 
 import screwsynth.cases
 from screwsynth.models import Dimension, FloatArray, component_names, screw_from_axis
-from screwsynth.nlp import document
-from screwsynth.nlp.case import (
+from screwsynth.nlp import buildcase, document
+from screwsynth.nlp.case import Case
+from screwsynth.nlp.errors import CaseError, InputError, nearest
+from screwsynth.nlp.robots import build_model
+from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import (
     LARGEST,
-    Case,
     Expectation,
     ExpectedValue,
     Free,
     Method,
+    OverPoses,
+    Pose,
     Published,
     Rotation,
     Search,
@@ -28,9 +33,6 @@ from screwsynth.nlp.case import (
     Task,
     Value,
 )
-from screwsynth.nlp.errors import CaseError, InputError, nearest
-from screwsynth.nlp.robots import build_model
-from screwsynth.nlp.units import Units
 
 _SHIPPED = Path(screwsynth.cases.__file__).parent
 
@@ -125,21 +127,32 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
     search = written.solve
-    if written.combine is not None and len(written.task) == 1:
-        raise CaseError("combine", "means nothing for one task; take it out, or give another [[task]]")
+    poses = written.pose if isinstance(written.pose, list) else [written.pose]
+    tasks = _tasks(written.task)
+    steps = [buildcase.steps(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
+    method, over_poses = _combination(written, sum(map(len, steps)))
+    first, *further = [
+        Pose([_value(part, units, Dimension.LENGTH) for part in pose.position], _rotation(pose.rotation, units), moves)
+        for pose, moves in zip(poses, steps, strict=True)
+    ]
     return Case(
         model=model,
         parameters={
             key: _parameter(key, given, units, dimensions.get(key, Dimension.NUMBER))
             for key, given in written.robot.parameters.items()
         },
-        position=[_value(part, units, Dimension.LENGTH) for part in written.pose.position],
-        rotation=_rotation(written.pose.rotation, units),
-        tasks=_tasks(written.task),
+        position=first.position,
+        rotation=first.rotation,
+        steps=first.steps,
+        further=further,
+        over_poses=over_poses,
+        limits=buildcase.limits(written.limits, model, units),
+        joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
+        tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,
         search=Search(search.starts, search.seed, search.max_iterations),
-        method=Method.AVERAGE if written.combine is None else Method(written.combine.method),
+        method=method,
         title=written.title,
         name=name,
         expect=_expectation(written.expect),
@@ -157,6 +170,23 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         ),
         source=source,
     )
+
+
+def _pose_keys(written: document.Document) -> list[str]:
+    return [f"pose[{k}]" for k in range(len(written.pose))] if isinstance(written.pose, list) else ["pose"]
+
+
+def _combination(written: document.Document, poses: int) -> tuple[Method, OverPoses]:
+    """How tasks and poses are brought together; what means nothing for the case is refused."""
+    combine = written.combine
+    if combine is None:
+        return Method.AVERAGE, OverPoses.SUM
+    if len(written.task) == 1 and (combine.method is not None or combine.over_poses is None):
+        key = "combine" if combine.over_poses is None else "combine.method"
+        raise CaseError(key, "means nothing for one task; take it out, or give another [[task]]")
+    if poses == 1 and combine.over_poses is not None:
+        raise CaseError("combine.over_poses", "means nothing for one pose; take it out, or give another [[pose]]")
+    return Method(combine.method or "average"), OverPoses(combine.over_poses or "sum")
 
 
 def _expectation(written: document.ExpectTable) -> Expectation:
@@ -225,19 +255,23 @@ def _screw(written: document.TaskTable, key: str) -> FloatArray:
 def _set(tables: dict[str, Any], name: str, value: Any) -> None:  # noqa: ANN401 - whatever TOML can hold
     """Replace one number in the document's tables; what it cannot find it refuses."""
     parameters = tables.get("robot", {}).get("parameters", {})
-    pose = tables.setdefault("pose", {})
+    given = tables.setdefault("pose", {})
+    poses = given if isinstance(given, list) else [given]
+    prefixes = [""] if len(poses) == 1 else [f"pose{k + 1}_" for k in range(len(poses))]
     places: dict[str, tuple[Any, int | str]] = {}
-    for key, given in parameters.items():
+    for key, value_there in parameters.items():
         places[key] = (parameters, key)
-        if isinstance(given, list):
-            places.update({part: (given, i) for i, part in enumerate(component_names(key, len(given)))})
-    if isinstance(pose.get("position"), list):
-        places.update({part: (pose["position"], i) for i, part in enumerate(component_names("p", 3))})
-    if name in ("angle", "axis"):
-        places |= {
-            part: (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part) for part in ("angle", "axis")
-        }
+        if isinstance(value_there, list):
+            places.update({part: (value_there, i) for i, part in enumerate(component_names(key, len(value_there)))})
+    for prefix, pose in zip(prefixes, poses, strict=True):
+        if isinstance(pose.get("position"), list):
+            names = component_names(f"{prefix}p", 3)
+            places.update({part: (pose["position"], i) for i, part in enumerate(names)})
+        for part in ("angle", "axis"):
+            if name == f"{prefix}{part}":
+                places[name] = (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part)
+    turns = [f"{prefix}{part}" for prefix in prefixes for part in ("angle", "axis")]
     if name not in places:
-        raise CaseError(name, f"cannot be set; {nearest(name, [*places, 'angle', 'axis'])}")
+        raise CaseError(name, f"cannot be set; {nearest(name, [*places, *turns])}")
     table, place = places[name]
     table[place] = value

@@ -143,14 +143,14 @@ def evaluate(
     """
     from screwsynth.nlp import evaluation
     from screwsynth.nlp.casefile import load_case
-    from screwsynth.nlp.formulation import formulate_each
+    from screwsynth.nlp.formulation import formulate_each, levelled
     from screwsynth.nlp.kkt import assembled
     from screwsynth.nlp.result import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
     nlps = formulate_each(loaded)
-    x = assembled(nlps[0], nlps[0].start)
+    x = levelled(nlps[0], assembled(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [evaluation.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         _write_json(json_file, result)
@@ -181,7 +181,8 @@ def codegen(
             f"--precision {precision}: only double is generated; in single precision, optimising over these functions "
             "was tried and fails"
         )
-    files = generate_c(load_case(case), find_case(case).read_text(encoding="utf-8"))
+    loaded = load_case(case)
+    files = generate_c(loaded, find_case(case).read_text(encoding="utf-8"))
     write_folder(out, files)
     typer.echo(f"{len(files)} files in {out}: make -C {out} test")
 

@@ -18,14 +18,15 @@ import casadi as ca
 import numpy as np
 
 from screwsynth.models import Dimension, FloatArray
-from screwsynth.nlp.case import Case, Sense
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.ctext import comment, identifier, integers, matrix, numbers, texts
-from screwsynth.nlp.errors import InputError
+from screwsynth.nlp.errors import CaseError, InputError
 from screwsynth.nlp.formulation import formulate
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
 from screwsynth.nlp.solver import Status, solve_nlp
 from screwsynth.nlp.staged import Staged, stage
+from screwsynth.nlp.values import Sense
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Ending of each of the files that the prefix names, and its template.
@@ -60,8 +61,11 @@ def generate_c(case: Case, source: str) -> dict[str, str]:
         Text by file name.
 
     Raises:
-        InputError: the case contradicts itself, or its functions have no finite value anywhere.
+        CaseError: the case contradicts itself, or has several poses.
+        InputError: its functions have no finite value anywhere.
     """
+    if case.pose_count > 1:
+        raise CaseError("pose", "gives several poses; C is generated for one", case.pose_count, case.source)
     nlp = formulate(case)
     staged = stage(nlp.program, f"{identifier(case.name)}_CASADI")
     names = _names(nlp, staged)

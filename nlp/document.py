@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     Discriminator,
     Field,
@@ -23,29 +22,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from screwsynth.nlp.errors import CaseError, nearest
-
-#: Keys of the format that this version does not act on yet. They are refused, so that no limit is silently ignored.
-NOT_YET = ("limits", "tolerance")
-
-
-class Table(BaseModel):
-    """A TOML table with its known keys only."""
-
-    # Validators are built when a document is first read, once for the whole tree of tables.
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _only_known_keys(cls, table: object) -> object:
-        if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
-            for key in table:
-                if key not in cls.model_fields:
-                    allowed = nearest(str(key), cls.model_fields)
-                    raise PydanticCustomError(
-                        "unknown_key", "{fault}", {"key": key, "fault": f"no such key; {allowed}"}
-                    )
-        return table
+from screwsynth.nlp.buildtables import AlongTable, GridTable, LimitsTable, ToleranceTable
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.table import Table, Vector
 
 
 class Range(Table):
@@ -57,7 +36,7 @@ class Range(Table):
 
 
 #: What pydantic puts into the path of a fault for the branch of a union; no key of a file.
-_TAGS = ("<number>", "<range>", "<list>")
+_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
 
 
 def _number_or_range(value: object) -> str:
@@ -79,7 +58,6 @@ VectorOrValue = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
     Discriminator(_value_or_list),
 ]
-Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
 class UnitsTable(Table):
@@ -124,6 +102,14 @@ class PoseTable(Table):
         description="origin of the platform frame"
     )
     rotation: RotationTable | None = Field(default=None, description="left out: no rotation")
+    along_task: AlongTable | None = Field(default=None, description="poses along a task's screw motion from this one")
+    grid: GridTable | None = Field(default=None, description="poses over a box about this one")
+
+
+Poses = Annotated[
+    Annotated[PoseTable, Tag("<pose>")] | Annotated[list[PoseTable], Field(min_length=1), Tag("<poses>")],
+    Discriminator(lambda value: "<poses>" if isinstance(value, list) else "<pose>"),
+]
 
 
 class TaskTable(Table):
@@ -143,10 +129,14 @@ class TaskTable(Table):
 
 
 class CombineTable(Table):
-    """How several tasks are brought together."""
+    """How several tasks are brought together, and several poses."""
 
-    method: Literal["average", "weighted-sum", "worst-case"] = Field(
-        description="average of the tasks' optima (equation 15), best weighted sum, or best worst task"
+    method: Literal["average", "weighted-sum", "worst-case"] | None = Field(
+        default=None,
+        description="average of the tasks' optima (equation 15), best weighted sum, or best worst task",
+    )
+    over_poses: Literal["sum", "mean", "worst"] | None = Field(
+        default=None, description="what F is over several poses; the sum if left out"
     )
 
 
@@ -206,9 +196,11 @@ class Document(Table):
     title: str = Field(default="", description="one line for people")
     units: UnitsTable = UnitsTable()
     robot: RobotTable
-    pose: PoseTable
+    pose: Poses
     task: Annotated[list[TaskTable], Field(min_length=1)]
-    combine: CombineTable | None = Field(default=None, description="several tasks only; average if left out")
+    combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
+    limits: LimitsTable | None = Field(default=None, description="what can be built")
+    tolerance: ToleranceTable | None = Field(default=None, description="what it may cost to build inexactly")
     solve: SolveTable = SolveTable()
     expect: ExpectTable = ExpectTable()
     published: list[PublishedTable] = Field(default_factory=list)
@@ -220,9 +212,6 @@ def parse_document(tables: dict[str, Any]) -> Document:
     Raises:
         CaseError: with the dotted key of the fault.
     """
-    for key in NOT_YET:
-        if key in tables:
-            raise CaseError(key, "is not supported yet by this version; take it out")
     try:
         return Document.model_validate(tables)
     except ValidationError as error:
@@ -278,6 +267,8 @@ def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
     match fault["type"]:
         case "unknown_key" | "reason":
             sentence = str(context["fault"])
+        case "literal_error" if key == "<word>":
+            sentence = f"must be {context['expected']}, a list of 3 numbers, or a list of such lists"
         case "literal_error":
             sentence = f"must be one of {context['expected']}"
         case "list_type" if key in _FORMS:

@@ -9,10 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from screwsynth.models import FloatArray, axis_angle_from_matrix, frozen_array
-from screwsynth.nlp.case import Free
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import EvaluationError
+from screwsynth.nlp.expressions import vanished
 from screwsynth.nlp.linear import plain_basis
-from screwsynth.nlp.program import Nlp, vanished
+from screwsynth.nlp.poses import Step
+from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.values import Free, Pose
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
 ZERO_F = 1e-12
@@ -65,12 +68,23 @@ class RobotState:
         return self.rank < 6
 
 
-def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
+@dataclass(frozen=True, eq=False)
+class StatedPose:
+    """A pose that a case states: ``p`` (3,), ``R`` (3, 3), and the rotation as a unit axis (3,) and radians."""
+
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+
+
+def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     """The robot at a point of the program.
 
     Args:
         nlp: the program.
         x: (n,) values of its free variables.
+        pose: index of the pose, of a case with several.
 
     Returns:
         The robot with the rates of the program's task; of its first, where it combines several.
@@ -80,7 +94,7 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
-    outputs = nlp.program.kernels.robot_state(x, nlp.arguments)
+    outputs = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
     components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
     for row, square in zip(model.wrenches, squares.ravel(), strict=True):
         if not square > 0:
@@ -88,9 +102,9 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
-    if case.axis is not None:
-        held = case.rotation.angle
-        axis, angle = case.axis, float(x[nlp.program.index("angle")]) if isinstance(held, Free) else held
+    prefix, stated, step = _stated(case)[pose]
+    if step.is_identity:
+        axis, angle = _turn(nlp, x, prefix, stated, rotation)
     rank, free_twists = _rank(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
@@ -117,6 +131,33 @@ def evaluate(nlp: Nlp, x: FloatArray) -> RobotState:
             }
         ),
     )
+
+
+def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
+    """The poses that a case states, at a point (n,), before their displacements."""
+    found: dict[str, StatedPose] = {}
+    for k, (prefix, stated, step) in enumerate(_stated(nlp.case)):
+        if prefix not in found:
+            outputs = nlp.program.kernels.robot_states[k](x, nlp.arguments)
+            rotation, position = step.rotation.T @ outputs[1], step.rotation.T @ (outputs[2].ravel() - step.translation)
+            axis, angle = _turn(nlp, x, prefix, stated, rotation)
+            found[prefix] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
+    return list(found.values())
+
+
+def _turn(nlp: Nlp, x: FloatArray, prefix: str, stated: Pose, rotation: FloatArray) -> tuple[FloatArray, float]:
+    """A stated pose's rotation as axis and angle: the held axis with a signed angle where there is one."""
+    if stated.rotation.axis is None:
+        return axis_angle_from_matrix(rotation)
+    held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
+    return axis, float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
+
+
+def _stated(case: Case) -> list[tuple[str, Pose, Step]]:
+    """The stated pose that each pose comes from: what its names begin with, the pose, and the displacement."""
+    return [
+        (prefix, pose, step) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True) for step in pose.steps
+    ]
 
 
 def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:

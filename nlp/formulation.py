@@ -23,10 +23,17 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import Dimension, FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Free, Sense
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.layout import Bounded, Layout, free_directions, lay_out
-from screwsynth.nlp.program import SQUARES, Constraint, Nlp, Program, Reading, Scalar, vanished
+from screwsynth.nlp.expressions import Bounded, Constraint, Reading, Scalar, vanished
+from screwsynth.nlp.layout import Layout, free_directions, lay_out
+from screwsynth.nlp.program import MAGNITUDE, OBJECTIVE, SQUARES, Nlp, Program
+from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.values import Free, OverPoses, Sense
+
+#: How many points are looked at for the size of F over several poses, and a level that no F comes near, in parts of it.
+_PROBES = 32
+_FAR = 2.0
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -40,7 +47,9 @@ def formulate(case: Case, task: int = 0) -> Nlp:
         CaseError: a limb has zero length whatever the solver chooses, or fixed numbers contradict each other.
     """
     layout = lay_out(case, [case.tasks[task]])
-    return assemble(layout, layout.robot.F[0], case.tasks[task].sense)
+    if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
+        return _worst_pose(layout, case.tasks[task].sense)
+    return assemble(layout, layout.F[0], case.tasks[task].sense)
 
 
 def formulate_each(case: Case) -> list[Nlp]:
@@ -76,7 +85,7 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
         layout.sheet.place(f"weight{j}", Dimension.NUMBER, s * w)
         for j, (s, w) in enumerate(zip(signs, weights, strict=True))
     ]
-    objective = sum((place * layout.robot.F[j] for j, place in enumerate(places)), SX(0))
+    objective = sum((place * layout.F[j] for j, place in enumerate(places)), SX(0))
     return assemble(layout, objective, sense)
 
 
@@ -101,7 +110,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
     reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
     constraints = []
     for j, task in enumerate(case.tasks):
-        F = layout.robot.F[j]
+        F = layout.F[j]
         weight = sheet.place(f"weight{j}", Dimension.NUMBER, weights[j])
         own = sheet.place(f"best{j}", Dimension.NUMBER, best[j])
         if senses == {Sense.MAX}:
@@ -113,6 +122,37 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         # In parts of the ceiling, so that the rows are of order 1 like the scaled variables.
         constraints.append(Bounded(Constraint(f"task {task.name}", room / size, reading), 0.0, math.inf))
     return assemble(layout, level, Sense.MAX if senses == {Sense.MAX} else Sense.MIN, constraints)
+
+
+def _worst_pose(layout: Layout, sense: Sense) -> Nlp:
+    """The worst pose as one program: the best level that F keeps at every pose.
+
+    The level is bounded far away from every F, by the size that F would have without cancellation.
+    """
+    whole = assemble(layout, layout.F[0], sense)
+    points = starting_points(whole, _PROBES, 0)
+    states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
+    sizes = [float(state[MAGNITUDE][0, 0]) for state in states if np.isfinite(state[MAGNITUDE]).all()]
+    ceiling = max([*sizes, whole.objective_scale])
+    level = layout.sheet.place("level", Dimension.NUMBER, Free(-ceiling, _FAR * ceiling, ceiling / 2))
+    size = layout.sheet.place("ceiling", Dimension.NUMBER, ceiling)
+    reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
+    constraints = []
+    for k, robot in enumerate(layout.robots):
+        room = robot.F[0] - level if sense is Sense.MAX else level - robot.F[0]
+        constraints.append(Bounded(Constraint(f"F pose {k + 1}", room / size, reading), 0.0, math.inf))
+    return assemble(layout, level, sense, constraints)
+
+
+def levelled(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """The point with the level of the worst pose put where F is; any other program's point as it is."""
+    names = [variable.name for variable in nlp.program.variables]
+    if "level" not in names or len(nlp.program.robots) == 1:
+        return x
+    values = [float(kernel(x, nlp.arguments)[OBJECTIVE][0, 0]) for kernel in nlp.program.kernels.robot_states]
+    moved = np.array(x)
+    moved[names.index("level")] = min(values) if nlp.sense is Sense.MAX else max(values)
+    return moved
 
 
 def near(nlp: Nlp, target: FloatArray, strength: float) -> Nlp:
@@ -153,7 +193,8 @@ def assemble(layout: Layout, objective: SX, sense: Sense, constraints: Sequence[
         p=ca.vertcat(SX(0, 1), *sheet.p),
         objective=objective,
         constraints=tuple(item.constraint for item in bounded),
-        robot=layout.robot,
+        robot=layout.robots[0],
+        further=layout.robots[1:],
         model=case.model,
         directions=free_directions(case.model, sheet.variables),
     )
@@ -167,6 +208,7 @@ def assemble(layout: Layout, objective: SX, sense: Sense, constraints: Sequence[
         start=_vector([bound.first for bound in sheet.bounds]),
         g_lower=_vector([item.lower for item in bounded]),
         g_upper=_vector([item.upper for item in bounded]),
+        met=layout.met,
     )
     _check_limbs(nlp)
     return nlp
@@ -179,8 +221,9 @@ def _vector(values: Sequence[float]) -> FloatArray:
 def _check_limbs(nlp: Nlp) -> None:
     """Refuse a limb whose direction vanishes whatever the solver chooses."""
     program = nlp.program
-    values = program.kernels.robot_state(nlp.start, nlp.arguments)[SQUARES].ravel()
-    free = ca.which_depends(program.robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
-    for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
-        if not varies and not value > 0:
-            raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)
+    for robot, kernel in zip(program.robots, program.kernels.robot_states, strict=True):
+        values = kernel(nlp.start, nlp.arguments)[SQUARES].ravel()
+        free = ca.which_depends(robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
+        for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
+            if not varies and not value > 0:
+                raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)

@@ -20,19 +20,26 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.case import Search
 from screwsynth.nlp.kkt import FEASIBLE, STATIONARY, Linearisation, correct, linearise, multipliers
 from screwsynth.nlp.library import shared_library
 from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.values import Search
 
 #: Ipopt's tolerance. The Newton correction behind it converges quadratically, so tighter would only cost iterations.
 _IPOPT_TOLERANCE = 1e-8
 #: A side farther than this, in half ranges, from where Ipopt stopped is not one that the optimum lies on.
 _NEAR = 1e-2
+#: What part of its slack the multiplier of a side must exceed for the side to be held. The generous choice is tried
+#: first; where it does not lead to a point this stationary, because it holds sides that the optimum does not lie on,
+#: stricter ones follow.
+_SHARES = (1e-4, 1.0, 1e2)
+_POLISHED = 1e-10
 #: Two optima are the same when their points differ by less than this, in half ranges.
 SAME_POINT = 1e-4
 #: How far F where Ipopt stopped may be from the optimum it stopped at, in parts of F's scale: its barrier's last bit.
 _SAME_F = 1e-6
+#: How many starting points are looked at for the size of each constraint.
+_LOOKED_AT = 4
 #: A second thread is worth its own solver from this many starts on.
 _STARTS_PER_JOB = 12
 
@@ -82,18 +89,19 @@ def search_from(nlp: Nlp, points: FloatArray, search: Search, jobs: int | None) 
     problem = _compiled(symbols) if search.compiled else symbols
     for _ in range(min(threads, len(points))):
         solvers.put(ca.nlpsol("solver", "ipopt", problem, _options(search.max_iterations)))
-    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale]])
+    sizes = _row_sizes(nlp, points)
+    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale], sizes])
+    lower, upper = nlp.g_lower / sizes, nlp.g_upper / sizes
 
     def search_one(point: FloatArray) -> tuple[dict[str, FloatArray], str, int]:
         solver = solvers.get()
         try:
-            result = solver(
-                x0=(point - nlp.centre) / nlp.scale, p=parameters, lbx=-1, ubx=1, lbg=nlp.g_lower, ubg=nlp.g_upper
-            )
+            result = solver(x0=(point - nlp.centre) / nlp.scale, p=parameters, lbx=-1, ubx=1, lbg=lower, ubg=upper)
             stats = solver.stats()
         finally:
             solvers.put(solver)
         found = {key: result[key].full().ravel() for key in ("x", "lam_x", "lam_g")}
+        found["lam_g"] = found["lam_g"] / sizes
         return found, str(stats["return_status"]), int(stats.get("iter_count", 0))
 
     known: list[Start] = []
@@ -109,12 +117,25 @@ def search_from(nlp: Nlp, points: FloatArray, search: Search, jobs: int | None) 
             yield replace(start, iterations=iterations)
 
 
+def _row_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
+    """(c,) typical length of each limit's gradient in scaled variables, so that Ipopt sees rows of order 1.
+
+    The program's other constraints are written that way already and have 1.
+    """
+    rows = np.array([nlp.program.kernels.derivatives(x, nlp.arguments)[3] for x in points[:_LOOKED_AT]]) * nlp.scale
+    lengths = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
+    lengths = np.where(np.isfinite(lengths), lengths, 0.0).max(axis=0, initial=0.0)
+    limits = np.array([any(constraint.keys) for constraint in nlp.program.constraints], dtype=bool)
+    return np.where(limits & (lengths > 0), lengths, 1.0)
+
+
 def _problem(nlp: Nlp) -> dict[str, SX]:
     """The program's structure over scaled variables and a scaled objective to be minimised."""
     program = nlp.program
     s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
+    sizes = SX.sym("sizes", len(program.constraints))
     F, g = program.values.call([centre + scale * s, program.p])
-    return {"x": s, "p": ca.vertcat(program.p, centre, scale, weight), "f": weight * F, "g": g}
+    return {"x": s, "p": ca.vertcat(program.p, centre, scale, weight, sizes), "f": weight * F, "g": g / sizes}
 
 
 def _compiled(problem: dict[str, SX]) -> str:
@@ -163,13 +184,17 @@ def _recognised(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | No
 def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     """Correct the point that Ipopt stopped at, and say by the program's own conditions what it is."""
     stopped = np.clip(nlp.centre + nlp.scale * found["x"], nlp.lower, nlp.upper)
-    at = linearise(nlp, stopped)
-    if np.isfinite(at.violation):
-        corrected = correct(nlp, stopped, _held(nlp, at, found["lam_x"], found["lam_g"]))
-        # A correction that makes F worse has gone to another stationary point.
-        if corrected.phi <= at.phi + _IPOPT_TOLERANCE or at.violation > FEASIBLE:
-            at = corrected
+    raw = at = linearise(nlp, stopped)
     stationarity = multipliers(at, at.active())[1]
+    for share in _SHARES if np.isfinite(raw.violation) else ():
+        corrected = correct(nlp, stopped, _held(nlp, raw, found["lam_x"], found["lam_g"], share))
+        left = multipliers(corrected, corrected.active())[1]
+        # A correction that makes F worse has gone to another stationary point.
+        kept = corrected.phi <= raw.phi + _IPOPT_TOLERANCE or raw.violation > FEASIBLE
+        if kept and (corrected.violation, left) <= (max(at.violation, FEASIBLE), stationarity):
+            at, stationarity = corrected, left
+        if kept and corrected.violation <= FEASIBLE and left <= _POLISHED:
+            break
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
     else:
@@ -181,15 +206,20 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     return Start(status, at.x, at.F, stationarity, at.violation, 0)
 
 
-def _held(nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray) -> list[int]:
+def _held(
+    nlp: Nlp, at: Linearisation, bound_multipliers: FloatArray, multipliers_of_g: FloatArray, share: float
+) -> list[int]:
     """Sides that an interior-point solution may lie on: near, with a multiplier that is not small beside the slack.
 
-    An interior-point method ends with multiplier * slack about equal on all sides. The choice is generous, because a
-    side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
+    An interior-point method ends with multiplier * slack about equal on all sides. A small share makes the choice
+    generous: a side that does not belong gets a multiplier of the wrong sign and is let go by the correction.
     """
     table = nlp.sides
     reported = np.concatenate([bound_multipliers, multipliers_of_g])[table.place]
     # Ipopt's variables are scaled already, its constraints are not.
     strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
-    near = (at.slack < _NEAR) & (strength > _NEAR**2 * np.maximum(at.slack, 0.0))
-    return [int(j) for j in np.flatnonzero(table.equal | near)]
+    near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
+    held = np.flatnonzero(table.equal | near)
+    # No more sides than variables can hold a point: those with the least multipliers beside their slack are let go.
+    order = np.where(table.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
+    return [int(j) for j in held[np.sort(np.argsort(-order, kind="stable")[: nlp.n])]]

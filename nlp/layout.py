@@ -10,6 +10,9 @@ The variables are the free components of the parameters, of the position ``p``, 
 A parameter that is a direction has its three components as variables and its unit length as an equation: the sphere
 then has no poles. Its bounds of -1 and 1, which the length implies, are moved outwards so that they never hold a point
 that the length already holds.
+
+Several poses share the robot's dimensions; each stated pose has its own position and rotation, and the poses along a
+trajectory or a grid follow from it.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from casadi import SX
 
 from screwsynth.models import (
     Dimension,
+    FloatArray,
     Model,
     Parameter,
     WrenchKind,
@@ -31,9 +35,12 @@ from screwsynth.models import (
     matrix_from_axis_angle,
     matrix_from_quaternion_vector,
 )
-from screwsynth.nlp.case import Case, Free, Task, Value, sizes_of_turn
+from screwsynth.nlp.buildable import distinct, limits_of
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.program import Constraint, Reading, RobotExpressions, Scalar
+from screwsynth.nlp.expressions import Bounded, Constraint, LegExpressions, Reading, RobotExpressions, Scalar
+from screwsynth.nlp.poses import Step
+from screwsynth.nlp.values import Free, OverPoses, Pose, Task, Value, sizes_of_turn
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
 ROTATION_ANGLE = Reading(
@@ -83,22 +90,30 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Bounded:
-    """A constraint with its bounds."""
-
-    constraint: Constraint
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True, eq=False)
 class Layout:
-    """A case laid out as symbols, before it is said what the objective is."""
+    """A case laid out as symbols, before it is said what the objective is.
+
+    Attributes:
+        case: the case.
+        sheet: its numbers as symbols.
+        robots: the robot at each pose.
+        constraints: what the variables can change.
+        met: limits that hold whatever is chosen.
+    """
 
     case: Case
     sheet: Sheet
-    robot: RobotExpressions
+    robots: tuple[RobotExpressions, ...]
     constraints: tuple[Bounded, ...]
+    met: tuple[Bounded, ...] = ()
+
+    @property
+    def F(self) -> SX:  # noqa: N802 - the objective's name
+        """(tasks, 1) objective of each task: the sum or the mean over the poses."""
+        if len(self.robots) == 1:
+            return self.robots[0].F
+        total = sum((robot.F for robot in self.robots), SX(0))
+        return total / len(self.robots) if self.case.over_poses is OverPoses.MEAN else total
 
 
 def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
@@ -106,9 +121,20 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
     sheet = Sheet()
     model = case.model
     placed = [sheet.place_all(item.name, item.dimension, _components(case, item)) for item in model.parameters]
-    position = sheet.place_all("p", Dimension.LENGTH, tuple(case.position))
-    rotation, constraints = _rotation(case, sheet)
-    unknowns = [sheet.place(item.name, item.dimension, Free(item.lower, item.upper)) for item in model.unknowns]
+    stated = []
+    constraints: list[Bounded] = []
+    for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True):
+        position = sheet.place_all(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
+        rotation, held = _rotation(pose, prefix, sheet)
+        stated += [(rotation, position, step) for step in pose.steps]
+        constraints += held
+    unknowns = [
+        ca.vertcat(
+            SX(0, 1),
+            *[sheet.place(f"{at}{u.name}", u.dimension, Free(u.lower, u.upper)) for u in model.unknowns],
+        )
+        for at in (f"at{k + 1}_" if len(stated) > 1 else "" for k in range(len(stated)))
+    ]
     length = sheet.place("characteristic_length", Dimension.LENGTH, case.characteristic_length)
     twists = [
         sheet.place_all(
@@ -116,18 +142,57 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         )
         for index, t in enumerate(tasks)
     ]
-    symbols = _Symbols(ca.vertcat(SX(0, 1), *placed), ca.vertcat(SX(0, 1), *unknowns), rotation, position)
-    robot, closure = _robot(model, symbols, length, twists)
+    parameters = ca.vertcat(SX(0, 1), *placed)
+    robots = []
     constraints += [
         Bounded(Constraint(f"|{item.name}|", ca.sumsqr(symbol), _LENGTH_OF_DIRECTION), 1.0, 1.0)
         for item, symbol in zip(model.parameters, placed, strict=True)
         if item.is_direction
     ]
-    constraints += [
-        Bounded(Constraint(equation.name, closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0)
-        for index, equation in enumerate(model.closure)
-    ]
-    return Layout(case, sheet, robot, tuple(_varying(case, constraints, sheet)))
+    for k, (rotation, position, step) in enumerate(stated):
+        symbols = _Symbols(parameters, unknowns[k], *_displaced(rotation, position, step))
+        robot, closure = _robot(model, symbols, length, twists)
+        robots.append(robot)
+        where = f" pose {k + 1}" if len(stated) > 1 else ""
+        constraints += [
+            Bounded(Constraint(f"{equation.name}{where}", closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0)
+            for index, equation in enumerate(model.closure)
+        ]
+    constraints = _varying(case, constraints, sheet)
+    limits, met = _limits(case, robots, sheet) if case.limits else ([], [])
+    return Layout(case, sheet, tuple(robots), (*constraints, *limits), tuple(met))
+
+
+def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
+    """A stated pose after one of its displacements."""
+    if step.is_identity:
+        return rotation, position
+    Q, t = SX(step.rotation.tolist()), SX(step.translation.tolist())
+    return Q @ rotation, Q @ position + t
+
+
+def _limits(case: Case, robots: Sequence[RobotExpressions], sheet: Sheet) -> tuple[list[Bounded], list[Bounded]]:
+    """The case's limits: those that the variables can change or that do not hold, and those that hold anyway."""
+    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
+    names = [scalar.name for scalar in (*sheet.variables, *sheet.arguments)]
+    limits = limits_of(case, robots, dict(zip(names, (*sheet.x, *sheet.p), strict=True)))
+    limits = distinct(limits, x, p, sheet.values, _somewhere(sheet.bounds))
+    expressions = ca.vertcat(*[item.constraint.expression for item in limits])
+    free = ca.which_depends(expressions, x, 1, True) if len(sheet.x) else [False] * len(limits)
+    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(_somewhere(sheet.bounds)[0], sheet.values)
+    varying: list[Bounded] = []
+    met: list[Bounded] = []
+    for item, varies, value in zip(limits, free, values.full().ravel(), strict=True):
+        holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
+        (met if holds and not varies else varying).append(item)
+    return varying, met
+
+
+def _somewhere(bounds: Sequence[Free]) -> FloatArray:
+    """(3, n) points of the box that no symmetry singles out."""
+    parts = np.modf(np.outer(np.arange(1, 4), np.sqrt(2.0 + np.arange(len(bounds)))))[0]
+    lower, upper = np.array([[bound.lower, bound.upper] for bound in bounds]).reshape(-1, 2).T
+    return np.asarray(lower + (0.1 + 0.8 * parts) * (upper - lower), dtype=np.float64)
 
 
 def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:
@@ -179,23 +244,23 @@ def _varying(case: Case, constraints: Sequence[Bounded], sheet: Sheet) -> list[B
     return varying
 
 
-def _rotation(case: Case, sheet: Sheet) -> tuple[SX, list[Bounded]]:
-    axis, angle = case.axis, case.rotation.angle
+def _rotation(pose: Pose, prefix: str, sheet: Sheet) -> tuple[SX, list[Bounded]]:
+    axis, angle = pose.rotation.axis, pose.rotation.angle
     if axis is not None:
-        n = sheet.place_all("axis", Dimension.NUMBER, [float(c) for c in axis])
-        return matrix_from_axis_angle(n, sheet.place("angle", Dimension.ANGLE, angle)), []
+        n = sheet.place_all(f"{prefix}axis", Dimension.NUMBER, [float(c) for c in np.asarray(axis)])
+        return matrix_from_axis_angle(n, sheet.place(f"{prefix}angle", Dimension.ANGLE, angle)), []
     smallest, largest = sizes_of_turn(angle)
     radius = math.sin(largest / 2)
     if radius == 0:
-        q = sheet.place_all("q", Dimension.NUMBER, (0.0, 0.0, 0.0))
+        q = sheet.place_all(f"{prefix}q", Dimension.NUMBER, (0.0, 0.0, 0.0))
         return matrix_from_quaternion_vector(q), []
     inner = math.sin(smallest / 2)
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
     # The ball implies |q_x| <= radius and so on: bounds that touched it would share its multiplier where it binds.
     room = min(_ROOM * radius, 1.0)
     along_z = Free(-room, room, math.sin(start / 2))
-    q = sheet.place_all("q", Dimension.NUMBER, (Free(-room, room), Free(-room, room), along_z))
-    ball = Constraint("angle", ca.sumsqr(q), ROTATION_ANGLE)
+    q = sheet.place_all(f"{prefix}q", Dimension.NUMBER, (Free(-room, room), Free(-room, room), along_z))
+    ball = Constraint(f"{prefix}angle", ca.sumsqr(q), ROTATION_ANGLE)
     return matrix_from_quaternion_vector(q), [Bounded(ball, inner**2 if inner else -math.inf, radius**2)]
 
 
@@ -222,10 +287,10 @@ def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tup
         model.pose.position,
     ]
     quantities = [quantity.values for quantity in model.quantities]
-    inlined = ca.Function("model", symbols, [force, moment, square, closure, *quantities])
-    force, moment, square, closure, *quantities = inlined.call(
-        [put.parameters, put.unknowns, put.rotation, put.position]
-    )
+    joints = [joint for leg in model.legs for joint in (leg.base, leg.platform)]
+    inlined = ca.Function("model", symbols, [force, moment, square, closure, *quantities, *joints])
+    force, moment, square, closure, *others = inlined.call([put.parameters, put.unknowns, put.rotation, put.position])
+    quantities, joints = others[: len(quantities)], others[len(quantities) :]
     couple_scale = [length if row.kind is WrenchKind.COUPLE else SX(1) for row in model.wrenches]
     rows, rates, objectives, magnitudes = [], [], [], []
     for i, scale in enumerate(couple_scale):
@@ -261,5 +326,9 @@ def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tup
         squares=square,
         magnitude=ca.vertcat(*magnitudes),
         quantities=tuple(quantities),
+        legs=tuple(
+            LegExpressions(leg.name, base, platform, put.position + put.rotation @ platform - base)
+            for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
+        ),
     )
     return robot, closure

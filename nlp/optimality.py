@@ -21,10 +21,10 @@ from types import MappingProxyType
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.case import Sense
 from screwsynth.nlp.kkt import FEASIBLE, STATIONARY, Linearisation, correct, lagrangian_hessian, linearise, multipliers
 from screwsynth.nlp.linear import plain_basis
 from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.values import Sense
 
 #: A multiplier below this, in scaled terms, does not hold the point at its side: the side is weakly active.
 STRONG = 1e-9

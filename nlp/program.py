@@ -7,7 +7,6 @@ Variables are in the units of the case (radians for angles); :attr:`Nlp.scale` b
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -16,87 +15,20 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from screwsynth.models import Dimension, FloatArray, Model, Wrench, WrenchKind
-from screwsynth.nlp.case import Case, Sense
+from screwsynth.models import FloatArray, Model
+from screwsynth.nlp.case import Case
+from screwsynth.nlp.expressions import Bounded, Constraint, RobotExpressions, Scalar
 from screwsynth.nlp.kernel import Kernel
+from screwsynth.nlp.values import Sense
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Places of two results among those of :attr:`Program.robot_state`.
-SQUARES, MAGNITUDE = 6, 7
+#: Places of three results among those of :meth:`Program.robot_state`.
+OBJECTIVE, SQUARES, MAGNITUDE = 5, 6, 7
 #: Multiples of the golden section, modulo 1, spread evenly.
 _GOLDEN = 0.6180339887498949
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """A named scalar of a program: a free variable or an argument that a case fixes."""
-
-    name: str
-    dimension: Dimension
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How a constraint's limit reads in the words of a case.
-
-    A limit on an angle may be a limit on a smoother function of it in the program.
-
-    Attributes:
-        dimension: what the limit measures for people.
-        from_value: the number for people (radians for angles) from the program's limit.
-        slope: derivative of the program's limit with respect to the number for people, at the program's limit.
-    """
-
-    dimension: Dimension
-    from_value: Callable[[float], float] = lambda value: value
-    slope: Callable[[float], float] = lambda _: 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`."""
-
-    name: str
-    expression: SX
-    reading: Reading
-
-
-def vanished(row: Wrench) -> str:
-    """Why a row whose direction is zero is none, for messages."""
-    if row.kind is WrenchKind.COUPLE:
-        return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
-    return f"limb {row.limb!r} has zero length: its two joints coincide"
-
-
-@dataclass(frozen=True, eq=False)
-class RobotExpressions:
-    """The robot at the program's point: every expression in the program's variables and arguments.
-
-    Attributes:
-        parameters: (n, 1) components of all parameters, in the model's order.
-        rotation: (3, 3) ``R``.
-        position: (3, 1) ``p``, length.
-        jacobian: (m, 6) unit wrenches ``J``, couple rows scaled by the characteristic length.
-        rates: (m, tasks) ``L_i ^ chi_j``.
-        F: (tasks, 1) objective of each task (equation 14).
-        squares: (m, 1) squared length of each row's direction: a limb of zero length has 0.
-        magnitude: (tasks, 1) what F would be without cancellation, ``sum (|m_i| |omega| + |f_i| |v|)^2`` with moments
-            and velocity taken at the platform's origin, so that it does not depend on where the world's origin is.
-        quantities: each of the model's quantities.
-    """
-
-    parameters: SX
-    rotation: SX
-    position: SX
-    jacobian: SX
-    rates: SX
-    F: SX
-    squares: SX
-    magnitude: SX
-    quantities: tuple[SX, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +42,10 @@ class Program:
         p: (k, 1) symbols of the arguments.
         objective: (1, 1) expression that is maximised or minimised.
         constraints: beside the variables' bounds.
-        robot: the robot's expressions.
+        robot: the robot's expressions, at the first pose where there are several.
         model: the robot itself.
         directions: indices in ``x`` of the three components of each unit vector that is wholly free.
+        further: the robot's expressions at the other poses.
     """
 
     variables: tuple[Scalar, ...]
@@ -124,6 +57,12 @@ class Program:
     robot: RobotExpressions
     model: Model
     directions: tuple[tuple[int, int, int], ...] = ()
+    further: tuple[RobotExpressions, ...] = ()
+
+    @property
+    def robots(self) -> tuple[RobotExpressions, ...]:
+        """The robot's expressions at every pose."""
+        return (self.robot, *self.further)
 
     def index(self, name: str) -> int:
         """Place of a free variable in ``x``."""
@@ -154,9 +93,14 @@ class Program:
         return ca.Function("hessian", [self.x, self.p, weight, multipliers], [hessian])
 
     @cached_property
-    def robot_state(self) -> ca.Function:
-        """``(x, p) ->`` every expression of :class:`RobotExpressions`, in its order."""
-        robot = self.robot
+    def argument_derivatives(self) -> ca.Function:
+        """``(x, p) -> (dF/dp as a row, dg/dp)``."""
+        outputs = [ca.jacobian(self.objective, self.p), ca.jacobian(self.g, self.p)]
+        return ca.Function("argument_derivatives", [self.x, self.p], [ca.densify(output) for output in outputs])
+
+    def robot_state(self, pose: int = 0) -> ca.Function:
+        """``(x, p) ->`` every number of :class:`RobotExpressions`, in its order, at one of the poses."""
+        robot = self.robots[pose]
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
         outputs += [robot.squares, robot.magnitude, *robot.quantities]
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
@@ -192,9 +136,19 @@ class Kernels:
         return Kernel(self._program.hessian)
 
     @cached_property
+    def argument_derivatives(self) -> Kernel:
+        """Derivatives by what is fixed."""
+        return Kernel(self._program.argument_derivatives)
+
+    @cached_property
     def robot_state(self) -> Kernel:
-        """The robot's expressions."""
-        return Kernel(self._program.robot_state)
+        """The robot's expressions, at the first pose."""
+        return self.robot_states[0]
+
+    @cached_property
+    def robot_states(self) -> tuple[Kernel, ...]:
+        """The robot's expressions at each pose."""
+        return tuple(Kernel(self._program.robot_state(pose)) for pose in range(len(self._program.robots)))
 
 
 @dataclass(frozen=True)
@@ -245,6 +199,8 @@ class Nlp:
         lower, upper: (n,) bounds of the variables, ``lower < upper``.
         start: (n,) first starting point.
         g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
+        met: limits of the case that hold whatever is chosen, and so are no constraints of the program.
+        size: size of the objective, where it is not made of the robot's F.
     """
 
     program: Program
@@ -256,6 +212,8 @@ class Nlp:
     start: FloatArray
     g_lower: FloatArray
     g_upper: FloatArray
+    met: tuple[Bounded, ...] = ()
+    size: float | None = None
 
     @property
     def n(self) -> int:
@@ -316,6 +274,8 @@ class Nlp:
         Where the robot is not defined there, as with limbs of zero length, it is taken at the first of a few points
         around the middle where it is.
         """
+        if self.size is not None:
+            return self.size
         around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
             size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[MAGNITUDE]))

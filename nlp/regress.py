@@ -20,13 +20,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from screwsynth.models import component_names
-from screwsynth.nlp.case import Case, Published, Search
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.casefile import load_case
 from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
 from screwsynth.nlp.formulation import formulate_each
 from screwsynth.nlp.result import compromise_of, result_of
 from screwsynth.nlp.solver import Status, solve, solve_nlp
 from screwsynth.nlp.tasks import solve_tasks
+from screwsynth.nlp.values import Published, Search
 
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
 FLAT = 1e-5

@@ -19,7 +19,8 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
-from screwsynth.nlp.evaluation import RobotState
+from screwsynth.nlp.designresult import NO_MARGINS, margins_in, relaxation_in, sensitivity_in
+from screwsynth.nlp.evaluation import RobotState, StatedPose, evaluate, stated_poses
 from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.optimality import Evidence
@@ -49,10 +50,14 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **_head(case),
         "sense": solution.nlp.sense.value,
         "status": solution.status.value,
-        "F": state.F if answer and state is not None else None,
+        "F": _objective(solution) if answer and state is not None else None,
         **({} if reached is None else {"reached": reached}),
+        **({"relaxation": relaxation_in(solution)} if solution.relaxation else {}),
         **(state_of(case, state, task) if state is not None else {}),
+        **(poses_of(solution.nlp, solution.x) if state is not None else {}),
         "optimality": None if solution.evidence is None else _optimality(solution.nlp, solution.evidence),
+        **(margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else NO_MARGINS),
+        **(sensitivity_in(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
         "certificate": None,
         "seed": solution.seed,
@@ -66,6 +71,11 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     case, outcomes = compromise.case, compromise.outcomes
     state, combined = outcomes[0].state, compromise.combined
     robot = {} if state is None else state_of(case, state)
+    if state is not None:
+        robot |= poses_of(outcomes[0].own.nlp, compromise.x)
+        # Where one program brought the tasks together, a limit has a cost: of that program's value.
+        nlp, x = (outcomes[0].own.nlp, compromise.x) if combined is None else (combined.nlp, combined.x)
+        robot |= margins_in(nlp, x, optimal=combined is not None and compromise.is_made)
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
     if not compromise.is_made:
@@ -103,18 +113,61 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
     analysis = analyse_tasks(states[0].jacobian)
     return {
         **_head(case),
-        "F": states[0].F,
+        "F": nlps[0].evaluate(x)[0] if case.pose_count > 1 else states[0].F,
         **state_of(case, states[0]),
+        **poses_of(nlps[0], x),
         "tasks": [
-            {**_task(case, j), "F": state.F, "rates": state.rates.tolist(), "task_is_free": state.is_zero}
+            {
+                **_task(case, j),
+                "F": nlps[j].evaluate(x)[0] if case.pose_count > 1 else state.F,
+                "rates": state.rates.tolist(),
+                "task_is_free": state.is_zero,
+            }
             for j, state in enumerate(states)
         ],
         "violated": violations(nlps[0], x),
+        **margins_in(nlps[0], x, optimal=False),
         "principal_motions": {
             "rotations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.rotations],
             "translations": [{"F": each.F, **motion_of(each.twist)} for each in analysis.translations],
         },
         "versions": versions(),
+    }
+
+
+def _objective(solution: Solution) -> float:
+    """F of the solution; over several poses, their sum, mean or worst."""
+    state, nlp = solution.state, solution.nlp
+    return nlp.evaluate(solution.x)[0] if state is None or len(nlp.program.robots) > 1 else state.F
+
+
+def poses_of(nlp: Nlp, x: FloatArray) -> dict[str, Any]:
+    """The poses that the case states, and the robot at every pose, for cases with several; else nothing.
+
+    F and rates are those of the program's task, of its first where it combines several.
+    """
+    if len(nlp.program.robots) == 1:
+        return {}
+    stated = [_pose_of(nlp.case, pose) for pose in stated_poses(nlp, x)]
+    states = [evaluate(nlp, x, k) for k in range(len(nlp.program.robots))]
+    parts = ("pose", "jacobian", "rates", "rank", "singular", "singular_values", "quantities")
+    return {
+        "pose": stated[0],
+        "stated_poses": stated,
+        "over_poses": nlp.case.over_poses.value,
+        "poses": [
+            {"F": state.F, **{key: value for key, value in state_of(nlp.case, state).items() if key in parts}}
+            for state in states
+        ],
+    }
+
+
+def _pose_of(case: Case, pose: RobotState | StatedPose) -> dict[str, Any]:
+    return {
+        "position": pose.position.tolist(),
+        "axis": pose.axis.tolist(),
+        "angle": case.units.shown(pose.angle, Dimension.ANGLE),
+        "rotation_matrix": pose.rotation.tolist(),
     }
 
 
@@ -142,7 +195,7 @@ def _outcome(outcome: TaskOutcome, *, answered: bool) -> dict[str, Any]:
         "name": outcome.task.name,
         "sense": outcome.task.sense.value,
         "weight": outcome.task.weight,
-        "F": None if state is None else state.F,
+        "F": None if state is None else outcome.F,
         "best": best,
         "loss": _finite(loss),
         "relative_loss": _finite(loss / best) if best else None,
@@ -156,12 +209,7 @@ def state_of(case: Case, state: RobotState, task: int = 0) -> dict[str, Any]:
     """The robot at a point: parameters, pose, task, Jacobian, rates and rank."""
     return {
         "parameters": parameters_of(case, state),
-        "pose": {
-            "position": state.position.tolist(),
-            "axis": state.axis.tolist(),
-            "angle": case.units.shown(state.angle, Dimension.ANGLE),
-            "rotation_matrix": state.rotation.tolist(),
-        },
+        "pose": _pose_of(case, state),
         "task": _task(case, task),
         "limbs": [row.limb for row in case.model.wrenches],
         "jacobian": state.jacobian.tolist(),

@@ -32,9 +32,11 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
     for triple in nlp.program.directions:
         points[:, triple] = _sphere(generator, count - 1)
     names = [variable.name for variable in nlp.program.variables]
-    if "q_x" in names:
-        at = names.index("q_x")
-        ball = [constraint.name for constraint in nlp.program.constraints].index("angle")
+    for prefix in nlp.case.pose_prefixes:
+        if f"{prefix}q_x" not in names:
+            continue
+        at = names.index(f"{prefix}q_x")
+        ball = [constraint.name for constraint in nlp.program.constraints].index(f"{prefix}angle")
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
         # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
         radii = np.cbrt(inner + unit[:, at] * (outer - inner))

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Search
+from screwsynth.nlp.case import Case
+from screwsynth.nlp.elastic import Relaxed, elastic, relaxed_limits, stretched_point
 from screwsynth.nlp.errors import CaseError, EvaluationError
 from screwsynth.nlp.evaluation import RobotState, evaluate
 from screwsynth.nlp.formulation import formulate
@@ -19,11 +20,16 @@ from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.values import Search
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9
 #: A point that is better than the best optimum by more than this part of F's scale is no rounding of it.
 _BETTER = 1e-6
+
+
+#: Starting points of the search for the smallest relaxation.
+_ELASTIC_STARTS = 8
 
 
 class Status(enum.Enum):
@@ -74,6 +80,8 @@ class Solution:
         optima: distinct optima that converged starts found, best first.
         seed: of the starting points.
         seconds: wall time.
+        relaxation: for an infeasible case, the smallest movement of its limits found that makes it feasible; empty
+            where none was found.
     """
 
     status: Status
@@ -85,6 +93,7 @@ class Solution:
     optima: tuple[Optimum, ...]
     seed: int
     seconds: float
+    relaxation: tuple[Relaxed, ...] = ()
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name
@@ -138,7 +147,7 @@ def solve_nlp(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Solve a program.
+    """Solve a program; where its limits seem to contradict each other, find out which and by how much.
 
     Args:
         nlp: the program.
@@ -147,6 +156,36 @@ def solve_nlp(
         jobs: as for :func:`solve`.
         progress: as for :func:`solve`.
     """
+    began = time.perf_counter()
+    solution = _searched(nlp, search, first=first, jobs=jobs, progress=progress)
+    limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
+    if solution.status is not Status.INFEASIBLE or not limited:
+        return solution
+    stretched = elastic(nlp)
+    points = [stretched_point(nlp, x) for x in (solution.x, nlp.start)]
+    relaxed = _searched(stretched, replace(search, starts=min(search.starts, _ELASTIC_STARTS)), first=points, jobs=jobs)
+    # An optimum of relaxations is often degenerate, with more limits active than it takes; what counts is that it is
+    # feasible.
+    feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
+    if not feasible:
+        return replace(solution, seconds=time.perf_counter() - began)
+    least = min(feasible, key=lambda start: start.F)
+    moved = relaxed_limits(nlp, least.x)
+    if not moved:
+        # The limits can be met after all: the search only did not find out where.
+        solution = _searched(nlp, search, first=[*first, least.x[: nlp.n]], jobs=jobs)
+    return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
+
+
+def _searched(
+    nlp: Nlp,
+    search: Search,
+    *,
+    first: Sequence[FloatArray] = (),
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """Search a program from many starting points."""
     began = time.perf_counter()
     if nlp.n == 0:
         x = frozen_array(nlp.start, (0,))

@@ -56,6 +56,17 @@ def starter_case(model: Model) -> str:
         f"point = [0, 0, {z:g}]            # any point on it",
         "pitch = 2                     # translation per radian; 0: a rotation; inf: a translation along the axis",
         "",
+        "# [limits]                    # what can be built; see the documentation for all of them",
+        *(
+            [
+                f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",
+                "# base_joint_angle = 45       # half angle of each joint's cone about the base's normal",
+                f"# leg_clearance = {{ min = {0.02 * z:g} }}",
+            ]
+            if model.legs
+            else ["# rate_share = { max = 0.5 }"]
+        ),
+        "",
         "[solve]",
         "starts = 32                   # starting points; more find the best of several optima more surely",
         "seed = 0",

@@ -10,14 +10,17 @@ from rich.table import Table
 from rich.text import Text
 
 from screwsynth.models import Dimension, Model, Parameter, component_names
-from screwsynth.nlp.case import Case, Free, Value, sizes_of_turn
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.units import Units
+from screwsynth.nlp.values import Free, Value, sizes_of_turn
 
 if TYPE_CHECKING:
     from screwsynth.nlp.regress import CaseCheck
 
 #: A free number below this part of its range is shown as 0; in JSON it stands as it is.
 _NOISE = 1e-9
+#: So many violated limits are shown.
+_SHOWN = 8
 #: A rotation by less than this has no axis that means anything.
 _TURNED = 1e-9
 
@@ -27,7 +30,11 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
     console.print(_headline(case, result))
     if "parameters" in result:
         console.print(_design(case, result))
-        console.print(_limbs(case, result))
+        console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
+    if result.get("limits"):
+        console.print(_limits(result))
+    if "tolerance" in result:
+        console.print(_tolerance(case, result))
     for line in _verdict(case, result):
         console.print(line)
 
@@ -43,6 +50,8 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
         console.print(Text(f"violated: {name}", style="red"))
     if "parameters" in combined:
         console.print(_design(case, combined))
+    if combined.get("limits"):
+        console.print(_limits(combined))
     table = _table("task", "sense", "weight", "F", "best alone", "loss", "at this point")
     for task in combined["tasks"]:
         shown = [_number(task[key]) if task[key] is not None else "none" for key in ("F", "best", "loss")]
@@ -100,7 +109,9 @@ def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
     for line in _violated(result["violated"]):
         console.print(line)
     console.print(_design(case, result))
-    console.print(_limbs(case, result))
+    console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
+    if result["limits"]:
+        console.print(_limits(result))
     console.print(_jacobian(case, result))
     console.print(_labelled("singular values", _listed(result["singular_values"])))
     console.print(_principal(case, result["principal_motions"]))
@@ -177,12 +188,13 @@ def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
     top = Group(_title(case), _task(result["task"], case.units)) if "task" in result else _title(case)
     if result["F"] is None:
         return Group(top, Text(f"{status}: this is not an optimum", style="bold red"))
+    over = f", {result['over_poses']} over {len(result['poses'])} poses" if "poses" in result else ""
     word = {"max": "largest", "min": "smallest"}[result["sense"]] if status == "optimal" else "fixed point:"
     if status == "optimal" and result["optimality"]["kind"].startswith("stationary"):
         status = "stationary, not proven optimal"
     if result["singular"]:
         status += f", singular: rank {result['rank']}"
-    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status})"))
+    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status}{over})"))
 
 
 def _task(task: dict[str, Any], units: Units) -> Text:
@@ -193,27 +205,52 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
     """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
     reached = "reached" in result
     held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", []) if not reached}
-    table = _table("", "reached" if reached else "value", "unit", "free between", *(["held by"] if held else []))
+    owed = {row["name"]: row["derivative"] for row in result.get("sensitivity", [])}
+    table = _table(
+        "", "reached" if reached else "value", "unit", "free between", *(["held by"] if held or owed else [])
+    )
     units = case.units
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
         row = [name, _settled(value, given, units, dimension), units.label(dimension), _range(given, units, dimension)]
-        table.add_row(*row, *([_held(held, name, units.label(dimension))] if held else []))
+        unit = units.label(dimension) or "unit"
+        fixed = f"fixed, {owed[name] + 0.0:+.4g} F/{unit}" if name in owed else ""
+        table.add_row(*row, *([_held(held, name, unit) or fixed] if held or owed else []))
 
     for parameter in case.model.parameters:
         shown = result["parameters"][parameter.name]
         values = shown if isinstance(shown, list) else [shown]
         for name, value, given in zip(parameter.components, values, case.components(parameter.name), strict=True):
             add(name, parameter.dimension, value, given)
-    for name, value, given in zip(component_names("p", 3), result["pose"]["position"], case.position, strict=True):
-        add(name, Dimension.LENGTH, value, given)
-    angle, turned = case.rotation.angle, abs(units.to_internal(result["pose"]["angle"], Dimension.ANGLE)) > _TURNED
-    if case.axis is None and isinstance(angle, Free):
-        # The sign of the angle means nothing then: what is allowed is its size.
-        angle = Free(*sizes_of_turn(angle))
-    axis = _listed(result["pose"]["axis"]) if turned or case.axis is not None else "none"
-    table.add_row("axis", axis, "", "" if case.axis is not None else "any direction")
-    add("angle", Dimension.ANGLE, result["pose"]["angle"], angle)
+    stated = result.get("stated_poses", [result["pose"]])
+    for prefix, pose, found in zip(case.pose_prefixes, case.poses, stated, strict=True):
+        for name, value, given in zip(component_names("p", 3), found["position"], pose.position, strict=True):
+            add(f"{prefix}{name}", Dimension.LENGTH, value, given)
+        angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
+        turned = abs(units.to_internal(found["angle"], Dimension.ANGLE)) > _TURNED
+        if not is_held and isinstance(angle, Free):
+            # The sign of the angle means nothing then: what is allowed is its size.
+            angle = Free(*sizes_of_turn(angle))
+        axis = _listed(found["axis"]) if turned or is_held else "none"
+        table.add_row(f"{prefix}axis", axis, "", "" if is_held else "any direction")
+        add(f"{prefix}angle", Dimension.ANGLE, found["angle"], angle)
+    return table
+
+
+def _poses(case: Case, result: dict[str, Any]) -> Table:
+    """The robot at every pose: F, where it stands, and the range of each measure over its limbs."""
+    measures = [item for item in case.model.quantities if item.name in result["poses"][0]["quantities"]]
+    words = [item.name.replace("_", " ").removesuffix(" angle") for item in measures]
+    labels = [f"{word}\n{case.units.label(item.dimension)}" for word, item in zip(words, measures, strict=True)]
+    table = _table("pose", "F", *component_names("p", 3), "angle", *labels, "rank")
+    for k, pose in enumerate(result["poses"]):
+        ranges = []
+        for item in measures:
+            values = pose["quantities"][item.name].values()
+            low = "" if item.dimension is Dimension.ANGLE else f"{min(values):.5g} .. "
+            ranges.append(f"{low}{max(values):.5g}")
+        at = [_number(value) for value in (*pose["pose"]["position"], pose["pose"]["angle"])]
+        table.add_row(str(k + 1), _number(pose["F"]), *at, *ranges, str(pose["rank"]))
     return table
 
 
@@ -233,7 +270,7 @@ def _range(given: Value, units: Units, dimension: Dimension) -> str:
 
 def _held(held: dict[str, Any], name: str, unit: str) -> str:
     side = held.get(name)
-    return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit or 'unit'}"
+    return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit}"
 
 
 def _limbs(case: Case, result: dict[str, Any]) -> Table:
@@ -260,6 +297,37 @@ def _jacobian(case: Case, result: dict[str, Any]) -> Table:
     return table
 
 
+def _limits(result: dict[str, Any]) -> Table:
+    """Every limit of the case: how near the design comes to it, where, and what it costs."""
+    table = _table("limit", "", "unit", "nearest", "margin", "where", "costs")
+    for row in result["limits"]:
+        where = [_place(name) for name in row["active"]] or [_place(row["nearest"])]
+        shown = ", ".join(where[:3]) + (f" and {len(where) - 3} more" if len(where) > 3 else "")
+        unit = row["unit"] or "unit"
+        cost = f"{row['cost'] + 0.0:+.4g} F/{unit}" if row["active"] and row["cost"] else ""
+        value, margin = ("none" if row[key] is None else _beside(row[key], row["limit"]) for key in ("value", "margin"))
+        margin += ", active" if row["active"] else ""
+        table.add_row(row["key"], f"{row['limit']:g}", row["unit"], value, margin, shown, cost)
+    return table
+
+
+def _tolerance(case: Case, result: dict[str, Any]) -> Text:
+    lost, unit = result["tolerance"], case.units.length
+    part = f" ({100 * lost['loss'] / result['F']:.2g} %)" if result["F"] else ""
+    text = f"{lost['joint_centre']:g} {unit} at every joint centre: F may be worse by {lost['loss']:.4g}{part}"
+    return _labelled("tolerance", text)
+
+
+def _beside(value: float, limit: float) -> str:
+    """A number, 0 where it is rounding error beside a limit."""
+    return f"{0.0 if abs(value) < _NOISE * (abs(limit) or 1.0) else value:.6g}"
+
+
+def _place(name: str) -> str:
+    """Where a limit is, from its name: everything behind what it limits."""
+    return name.partition(" ")[2]
+
+
 def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
     evidence = result["optimality"]
     if evidence is not None:
@@ -272,13 +340,18 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
             smallest = f", smallest curvature {min(curvature):.2e}" if curvature else ", no free direction left"
             yield _labelled("evidence", checks + ("" if "reached" in result else smallest))
     yield from _violated((result.get("reached") or {}).get("violated", []))
+    for row in result.get("relaxation", []):
+        unit = f" {row['unit']}" if row["unit"] else ""
+        yield Text(f"would be feasible with {row['key']} = {row['needed']:.6g}{unit} instead of {row['limit']:g}{unit}")
     yield from _starts(result["starts"])
     if "rank" in result and "reached" not in result:
         yield from _singularity(case, result)
 
 
-def _violated(sides: Iterable[dict[str, Any]]) -> Iterable[Text]:
-    for side in sides:
+def _violated(sides: Sequence[dict[str, Any]]) -> Iterable[Text]:
+    if len(sides) > _SHOWN:
+        yield Text(f"{len(sides)} limits are violated; the first {_SHOWN}:", style="red")
+    for side in sides[:_SHOWN]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side["bound"]]
         yield Text(f"violated: {side['name']} = {side['value']:.6g}, must be {wanted} {side['limit']:.6g}", style="red")
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.case import Case, Method, Search, Sense, Task
+from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.formulation import formulate_each, formulate_weighted, formulate_worst, near
@@ -34,6 +34,7 @@ from screwsynth.nlp.kkt import FEASIBLE, correct, linearise
 from screwsynth.nlp.optimality import Evidence, Kind, examine
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import SAME_VALUE, Progress, Solution, Status, solve_nlp, state_or_none
+from screwsynth.nlp.values import Method, Search, Sense, Task
 
 #: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale, weaker and weaker:
 #: the point tends to the nearest of the optimal set, and the correction that follows takes the rest off.
@@ -52,7 +53,9 @@ class TaskOutcome:
         own: what the task could have by itself.
         unique: whether its own optimum is the only one.
         x: (n,) the member of its optimal set that was used.
-        state: the robot at the combined point, with this task's rates; None where it does not exist.
+        state: the robot at the combined point, with this task's rates; None where it does not exist. At the first
+            pose, where there are several.
+        F: the task's objective at the combined point; NaN where it does not exist.
         evidence: what the combined point is for this task alone.
         loss: how much worse its F is than its own optimum; negative where the combined search came upon a better one.
     """
@@ -62,6 +65,7 @@ class TaskOutcome:
     unique: bool
     x: FloatArray
     state: RobotState | None
+    F: float
     evidence: Evidence
     loss: float
 
@@ -188,10 +192,10 @@ def _weights(case: Case) -> tuple[list[float], list[str]]:
 
 def _outcome(nlp: Nlp, task: Task, own: Solution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
     state = state_or_none(nlp, x)
-    F = float("nan") if state is None else state.F
+    F = float("nan") if state is None else nlp.evaluate(x)[0]
     best = nlp.evaluate(own.x)[0]
     loss = best - F if task.sense is Sense.MAX else F - best
-    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, examine(nlp, x), loss)
+    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss)
 
 
 def _combined(
@@ -309,8 +313,7 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
         if size > 0:
             Q[list(triple)] /= size
     names = [variable.name for variable in nlp.program.variables]
-    if "q_x" in names:
-        at = names.index("q_x")
+    for at in (names.index(f"{prefix}q_x") for prefix in nlp.case.pose_prefixes if f"{prefix}q_x" in names):
         Q[at : at + 3] = _mean_rotation([point[at : at + 3] for point in points], shares)
     return np.asarray(Q, dtype=np.float64)
 

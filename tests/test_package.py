@@ -1,5 +1,6 @@
 """The package as a whole: what it exports, what its wheel holds, and that its README is true."""
 
+import dataclasses
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 import screwsynth.models
 import screwsynth.nlp
+from screwsynth.nlp.starter import starter_case
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -95,3 +97,24 @@ def test_the_case_file_of_the_documentation_is_valid() -> None:
     (written,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
     case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
     assert case.tasks[0].name == "drive the screw"
+
+
+def test_the_limits_of_the_documentation_are_valid() -> None:
+    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    limits, poses = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    starter = tomllib.loads(starter_case(screwsynth.models.stewart_gough()))
+    several = screwsynth.nlp.case_from_tables(starter | tomllib.loads(poses), name="shown", source="limits.md")
+    assert several.pose_count == 2 + 5 + 6
+    case = screwsynth.nlp.case_from_tables(starter | tomllib.loads(limits), name="shown", source="limits.md")
+    names = [field.name for field in dataclasses.fields(case.limits)]
+    assert all(getattr(case.limits, name) for name in names if name != "quantities")
+
+
+def test_the_limits_shown_in_the_documentation_are_what_the_command_prints() -> None:
+    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(
+        r"<!-- begin: screwsynth solve hexapod-machining -->\n```text\n(.*?)```", text, flags=re.DOTALL
+    )
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "solve", "hexapod-machining", "--starts", "4"]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert shown in "".join(f"{line.rstrip()}\n" for line in printed.splitlines())

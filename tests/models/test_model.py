@@ -14,6 +14,7 @@ from screwsynth.models import (
     Body,
     Closure,
     Dimension,
+    Leg,
     Link,
     Model,
     ModelError,
@@ -30,6 +31,7 @@ from screwsynth.models import (
     force_along,
     hexapod,
     stewart_gough,
+    three_upu,
 )
 from screwsynth.nlp import Case, Nlp, RobotState, Rotation, Task, evaluate, formulate
 
@@ -430,3 +432,32 @@ def test_translational_three_limb_robots_have_their_known_ranks_and_work_rates()
             assert abs(twist[2]) < 1e-14
         below = np.concatenate([axis, np.cross([0.0, 0.0, 1.3], axis)])
         assert not state_of(three_limbs("radial"), below, 1.0).is_zero
+
+
+@pytest.mark.parametrize("model", [stewart_gough(), hexapod(), three_upu(axes="tsai"), three_upu()])
+def test_rows_of_a_machine_built_exactly_are_those_of_the_design(model: Model) -> None:
+    errors = ca.vertcat(*[error for leg in model.legs for error in (leg.base_error, leg.platform_error)])
+    symbols = [ca.vertcat(*[item.symbol for item in model.parameters]), model.pose.rotation, model.pose.position]
+
+    def rows(wrenches: tuple[Wrench, ...]) -> ca.Function:
+        parts = [ca.vertcat(row.force, row.moment, row.square) for row in wrenches]
+        return ca.Function("rows", [*symbols, errors], [ca.horzcat(*parts)])
+
+    random = np.random.default_rng(1)
+    values = [random.normal(size=symbol.shape) for symbol in symbols]
+    exact = np.zeros(errors.numel())
+    assert rows(model.built)(*values, exact).full() == pytest.approx(rows(model.wrenches)(*values, exact).full())
+    off = rows(model.built)(*values, exact + 0.1).full() - rows(model.wrenches)(*values, exact).full()
+    assert np.abs(off).max() > 1e-3
+
+
+def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
+    sound = stewart_gough()
+    with pytest.raises(ModelError, match="leg 'x' is no limb"):
+        replace(sound, legs=(*sound.legs, Leg("x", SX.zeros(3), SX.zeros(3))))
+    with pytest.raises(ModelError, match="rows of the built machine"):
+        replace(sound, built=sound.built[1:])
+    with pytest.raises(ModelError, match="leg 1- base should have shape"):
+        replace(sound, legs=(Leg("1-", SX.zeros(2), SX.zeros(3)),))
+    with pytest.raises(ModelError, match="symbols are used but not declared"):
+        replace(sound, legs=())

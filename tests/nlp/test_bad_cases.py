@@ -272,7 +272,12 @@ WRONG_TYPES = [
     hexapod("joint-nested", "[113, 41, 0]", "[[113, 41, 0]]", "robot.parameters.base_2", *ONE),
     hexapod("joint-with-text", "[113, 41, 0]", '[113, "41", 0]', "robot.parameters.base_2[1]", *ONE),
     hexapod("joint-with-bool", "[113, 41, 0]", "[113, 41, false]", "robot.parameters.base_2[2]", *ONE),
-    Broken("pose-is-list", edited(HEXAPOD, ("[pose]", "[[pose]]")).encode(), "pose", ("table",)),
+    Broken(
+        "pose-without-position",
+        edited(HEXAPOD, ("[pose]", "[[pose]]\n[[pose]]")).encode(),
+        "pose[0].position",
+        ("missing",),
+    ),
     paper("position-is-number", POSITION, "position = 3", "pose.position", "list"),
     paper("position-is-range", POSITION, "position = { min = 0, max = 3 }", "pose.position", "list"),
     paper("position-of-two", POSITION, "position = [0, 35]", "pose.position", "3 entries", "got 2"),
@@ -376,15 +381,116 @@ OUT_OF_RANGE = [
     paper("tolerance-zero", "tolerance = 1e-6", "tolerance = 0", "expect.tolerance", "greater than 0"),
 ]
 
-NOT_YET = [
-    paper("limits", "[expect]", "[limits]\nbase_joint_angle = 45\n[expect]", "limits", "not supported yet"),
-    paper("limits-empty", "[expect]", "[limits]\n[expect]", "limits", "not supported yet"),
+COMBINED = [
     paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "means nothing for one task"),
-    paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance", "not supported yet"),
+    paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance.position", "joint_centre"),
     paper("two-tasks-of-one-name", TASK, TASK + TASK, "task[1].name", "used by an earlier task"),
     paper("combine-misspelt", "[expect]", '[combine]\nmethod = "mean"\n[expect]', "combine.method", "average"),
     paper("angle-range-lopsided", ROTATION, "rotation = { angle = { min = -30, max = 5 } }", "pose.rotation.angle.min"),
     paper("fault-in-second-task", TASK, TASK + '[[task]]\nsense = "most"\n', "task[1].sense", "'max'", "'min'"),
+]
+
+
+def limit(name: str, toml: str, key: str, *gist: str) -> Broken:
+    """The paper's case with limits that are not allowed."""
+    return paper(name, "[expect]", f"[limits]\n{toml}\n[expect]", f"limits.{key}" if key else "limits", *gist)
+
+
+LIMITS = [
+    limit(
+        "limit-unknown", "leg_lenght = { min = 3 }", "leg_lenght", "stewart-gough", "leg_length", "platform_joint_angle"
+    ),
+    limit("limit-is-number", "leg_length = 30", "leg_length", "table"),
+    limit("limit-empty", "leg_length = {}", "leg_length", "must have min, max, or both"),
+    limit("limit-crossed", "leg_length = { min = 40, max = 30 }", "leg_length.min", "below max = 30 cm"),
+    limit("limit-negative", "leg_length = { min = -3 }", "leg_length.min", "above 0 cm"),
+    limit("limit-infinite", "leg_length = { max = inf }", "leg_length.max", "finite"),
+    limit("limit-text", 'leg_length = { max = "far" }', "leg_length.max", "number"),
+    limit("limit-misspelt-side", "leg_length = { mx = 3 }", "leg_length.mx", "allowed: min, max"),
+    limit("angle-zero", "base_joint_angle = 0", "base_joint_angle.max", "above 0 deg and at most 180 deg"),
+    limit("angle-too-large", "base_joint_angle = 200", "base_joint_angle.max", "at most 180 deg"),
+    limit("angle-text", 'base_joint_angle = "wide"', "base_joint_angle", "number"),
+    limit("angle-without-max", 'base_joint_angle = { about = "normal" }', "base_joint_angle.max", "missing"),
+    limit("axis-word", 'base_joint_angle = { max = 9, about = "up" }', "base_joint_angle.about", "'home'", "list of 3"),
+    limit("axis-short", "base_joint_angle = { max = 9, about = [0, 1] }", "base_joint_angle.about", "3 entries"),
+    limit("axis-zero", "base_joint_angle = { max = 9, about = [0, 0, 0] }", "base_joint_angle.about", "not all zero"),
+    limit(
+        "axis-nested",
+        "base_joint_angle = { max = 9, about = [[0, 0], [1, 1]] }",
+        "base_joint_angle.about[0]",
+        "3 entries",
+    ),
+    limit(
+        "axes-too-few",
+        "base_joint_angle = { max = 9, about = [[0, 0, 1], [0, 1, 1]] }",
+        "base_joint_angle.about",
+        "one for each of the 6 legs, got 2",
+    ),
+    limit("home-missing", 'base_joint_angle = { max = 9, about = "home" }', "home", "missing"),
+    limit("home-alone", "home = { position = [0, 0, 30] }", "home", "means nothing"),
+    limit("home-short", "home = { position = [0, 30] }", "home.position", "3 entries"),
+    limit("spacing-zero", "joint_spacing = { min = 0 }", "joint_spacing.min", "above 0 cm"),
+    limit("spacing-max", "joint_spacing = { max = 3 }", "joint_spacing.max", "allowed: min"),
+    limit("footprint-empty", "footprint = {}", "footprint", "must have base or platform"),
+    limit("actuator-empty", "actuator = {}", "actuator", "must have stroke_max or dead_length"),
+    limit("condition-below-one", "condition_number = { max = 0.5, length = 8 }", "condition_number.max", "above 1"),
+    limit("condition-no-length", "condition_number = { max = 5 }", "condition_number.length", "missing"),
+    limit("share-above-one", "rate_share = { max = 1.5 }", "rate_share.max", "at most 1"),
+    limit("custom-is-text", 'custom = "x1 >= 0"', "custom", "list"),
+    limit("custom-wrong-name", 'custom = ["x1 >= x9"]', "custom[0]", "'x9' at position 7", "allowed: x1, x2"),
+    limit("custom-wrong-sign", 'custom = ["x1 > 0"]', "custom[0]", "'>' at position 4"),
+    limit("custom-free-angle", 'custom = ["angle <= 20"]', "custom[0]", "'angle' at position 1"),
+    paper(
+        "tolerance-zero-joint",
+        "[expect]",
+        "[tolerance]\njoint_centre = 0\n[expect]",
+        "tolerance.joint_centre",
+        "positive",
+    ),
+    paper("over-poses-of-one", "[expect]", '[combine]\nover_poses = "sum"\n[expect]', "combine.over_poses", "one pose"),
+    paper(
+        "along-and-grid",
+        ROTATION,
+        f"{ROTATION}\nalong_task = {{ first = 0, last = 1, count = 2 }}\ngrid = {{}}",
+        "pose.grid",
+        "beside",
+    ),
+    paper(
+        "along-one",
+        ROTATION,
+        f"{ROTATION}\nalong_task = {{ first = 0, last = 1, count = 1 }}",
+        "pose.along_task.count",
+        "2",
+    ),
+    paper(
+        "along-nowhere",
+        ROTATION,
+        f"{ROTATION}\nalong_task = {{ first = 1, last = 1, count = 3 }}",
+        "pose.along_task.last",
+        "differ",
+    ),
+    paper(
+        "along-no-task",
+        ROTATION,
+        f'{ROTATION}\nalong_task = {{ task = "mill", first = 0, last = 1, count = 3 }}',
+        "pose.along_task.task",
+        "no task",
+    ),
+    paper("grid-empty", ROTATION, f"{ROTATION}\ngrid = {{}}", "pose.grid", "offsets"),
+    paper(
+        "grid-crossed",
+        ROTATION,
+        f"{ROTATION}\ngrid = {{ x = {{ min = 3, max = 1, count = 3 }} }}",
+        "pose.grid.x.min",
+        "below max",
+    ),
+    paper(
+        "grid-huge",
+        ROTATION,
+        f"{ROTATION}\ngrid = {{ " + ", ".join(f"{axis} = {{ min = 0, max = 1, count = 9 }}" for axis in "xyz") + " }",
+        "pose.grid",
+        "729 poses",
+    ),
 ]
 
 LINES = [
@@ -457,7 +563,7 @@ def not_finite() -> list[Broken]:
     return found
 
 
-BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *NOT_YET, *LINES, *LIMBS, *not_finite()]
+BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *COMBINED, *LIMITS, *LINES, *LIMBS, *not_finite()]
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -10,9 +10,10 @@ from casadi import SX
 
 from screwsynth.models import Dimension
 from screwsynth.nlp import Kind, Nlp, examine, formulate, load_case
-from screwsynth.nlp.case import Sense
+from screwsynth.nlp.expressions import Constraint, Reading, Scalar
 from screwsynth.nlp.linear import nonnegative_least_squares, plain_basis
-from screwsynth.nlp.program import Constraint, Program, Reading, Scalar
+from screwsynth.nlp.program import Program
+from screwsynth.nlp.values import Sense
 
 
 def program_of(

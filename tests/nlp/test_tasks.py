@@ -27,7 +27,7 @@ from screwsynth.nlp import (
     solve,
     solve_tasks,
 )
-from screwsynth.nlp.case import Value
+from screwsynth.nlp.values import Value
 
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]

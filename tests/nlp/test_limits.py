@@ -1,0 +1,443 @@
+"""Limits: what they measure, that they hold, and what they cost, each against an independent route."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import json
+import math
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from screwsynth.models import Model, hexapod, stewart_gough, three_upu
+from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
+from screwsynth.nlp.formulation import formulate
+from screwsynth.nlp.ipopt import StartStatus
+from screwsynth.nlp.limits import Cone, Interval, Limits
+from screwsynth.nlp.segments import squared_distance
+from screwsynth.nlp.solver import solve_nlp
+from screwsynth.nlp.spectrum import largest_eigenvalue, smallest_eigenvalue
+from screwsynth.nlp.starter import starter_case
+from screwsynth.nlp.values import Search
+
+Array = NDArray[np.float64]
+Run = Any
+
+HEXAPOD = """
+[units]
+length = "cm"
+
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+
+[robot.parameters]
+x1 = { min = 8, max = 16 }
+x2 = { min = 4, max = 9 }
+x3 = { min = 2, max = 28 }
+x4 = { min = 2, max = 28 }
+
+[pose]
+position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 50 }]
+rotation = { angle = { min = -30, max = 30 } }
+
+[[task]]
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+"""
+
+#: Sets of limits, each with some that are active at the optimum.
+SETS: dict[str, dict[str, Any]] = {
+    "legs": {"leg_length": {"min": 25, "max": 40}},
+    "cones": {"base_joint_angle": 12, "platform_joint_angle": {"max": 9, "about": "normal"}},
+    "cones-about-axes": {"base_joint_angle": {"max": 20, "about": [0.2, 0, 1]}},
+    "cones-about-home": {
+        "platform_joint_angle": {"max": 14, "about": "home"},
+        "home": {"position": [0, 0, 30], "angle": 5},
+    },
+    "plates": {"joint_spacing": {"min": 7}, "footprint": {"base": 13, "platform": 8}, "leg_length": {"max": 45}},
+    "ratio": {"radius_ratio": {"max": 0.5}, "leg_length": {"max": 45}},
+    "clearance": {"leg_clearance": {"min": 8}, "leg_length": {"max": 45}},
+    "condition": {"condition_number": {"max": 10, "length": 8}},
+    "singular-value": {"smallest_singular_value": {"min": 0.21, "length": 8}},
+    "shares": {"rate_share": {"max": 0.3}},
+    "custom": {"custom": ["x1 - 2*x2 >= 0", "cos(x3) <= 0.95"]},
+    "actuator": {"actuator": {"dead_length": 24, "stroke_max": 20}, "leg_length": {"max": 38}},
+}
+
+
+def case_with(limits: dict[str, Any], text: str = HEXAPOD) -> Case:
+    tables = tomllib.loads(text)
+    if limits:
+        tables["limits"] = copy.deepcopy(limits)
+    return case_from_tables(tables, name="hexapod", source="hexapod.toml")
+
+
+def solved(case: Case, *first: Array, starts: int = 4) -> Solution:
+    return solve_nlp(formulate(case), Search(starts=1 if first else starts), first=first)
+
+
+def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:
+    """Base joints, platform joints in their own frame, and platform joints in the world, from the design alone."""
+    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
+    base, platform = [], []
+    for k, sign in itertools.product(range(3), (-1, 1)):
+        for radius, azimuth, into in (
+            (x1, 120 * k + sign * x3, base),
+            (x2, 120 * k + sign * (60 - x4), platform),
+        ):
+            angle = math.radians(azimuth)
+            into.append([radius * math.cos(angle), radius * math.sin(angle), 0.0])
+    a, b = np.array(platform), np.array(base)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
+    return b, a, p + a @ R.T
+
+
+def degrees_between(u: Array, v: Array) -> float:
+    return math.degrees(math.acos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)))
+
+
+def segment_distance(p: Array, q: Array, r: Array, s: Array, rounds: int = 12) -> float:
+    """Distance between segments pq and rs by brute force: a grid over both, refined about its best point."""
+    low, high = np.zeros(2), np.ones(2)
+    best = math.inf
+    for _ in range(rounds):
+        u, v = (np.linspace(low[i], high[i], 21) for i in range(2))
+        apart = (p + u[:, None] * (q - p))[:, None] - (r + v[:, None] * (s - r))[None]
+        distances = np.linalg.norm(apart, axis=2)
+        i, j = np.unravel_index(np.argmin(distances), distances.shape)
+        best = min(best, float(distances[i, j]))
+        width = (high - low) / 8
+        centre = np.array([u[i], v[j]])
+        low, high = np.maximum(centre - width, 0), np.minimum(centre + width, 1)
+    return best
+
+
+def measured(result: dict[str, Any], limits: dict[str, Any], home: dict[str, Any] | None = None) -> dict[str, float]:
+    """What each limit measures at its worst place, by NumPy alone."""
+    b, a, ends = joints(result)
+    R, p, spans = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"]), ends - b
+    lengths = np.linalg.norm(spans, axis=1)
+    J = np.array(result["jacobian"])
+    J = np.hstack([J[:, :3], (J[:, 3:] - np.cross(p, J[:, :3])) / 8])
+    values = np.linalg.svd(J, compute_uv=False)
+    rates = np.array(result["rates"])
+    pairs = list(itertools.combinations(range(6), 2))
+    normals = {"base_joint_angle": np.tile([0.0, 0, 1], (6, 1)), "platform_joint_angle": np.tile(R[:, 2], (6, 1))}
+    about = limits.get("base_joint_angle")
+    if isinstance(about, dict) and isinstance(about["about"], list):
+        normals["base_joint_angle"] = np.tile(about["about"], (6, 1))
+    if home is not None:
+        c, s = math.cos(math.radians(home["angle"])), math.sin(math.radians(home["angle"]))
+        R0 = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        at_home = np.array(home["position"]) + a @ R0.T - b
+        normals["platform_joint_angle"] = at_home @ R0 @ R.T
+    x = result["parameters"]
+    return {
+        "leg_length.min": lengths.min(),
+        "leg_length.max": lengths.max(),
+        "actuator.dead_length": lengths.min(),
+        "base_joint_angle.max": max(map(degrees_between, normals["base_joint_angle"], spans)),
+        "platform_joint_angle.max": max(map(degrees_between, normals["platform_joint_angle"], spans)),
+        "joint_spacing.min": min(np.linalg.norm(each[i] - each[j]) for each in (a, b) for i, j in pairs),
+        "footprint.base": np.linalg.norm(b[:, :2], axis=1).max(),
+        "footprint.platform": np.linalg.norm(a[:, :2], axis=1).max(),
+        "radius_ratio.max": math.sqrt((a[:, :2] ** 2).sum() / (b[:, :2] ** 2).sum()),
+        "leg_clearance.min": min(segment_distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs),
+        "condition_number.max": values[0] / values[-1],
+        "smallest_singular_value.min": values[-1],
+        "rate_share.max": (rates**2).max() / (rates**2).sum(),
+        "custom[0]": x["x1"] - 2 * x["x2"],
+        "custom[1]": math.cos(math.radians(x["x3"])) - 0.95,
+    }
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_limits_hold_and_margins_are_what_numpy_measures(name: str) -> None:
+    limits = SETS[name]
+    solution = solved(case_with(limits))
+    assert solution.status is Status.OPTIMAL
+    result = result_of(solution)
+    found = measured(result, limits, limits.get("home"))
+    assert result["limits"]
+    for row in result["limits"]:
+        # Grid refinement of a distance is good to a few parts in 1e9.
+        assert row["value"] == pytest.approx(found[row["key"]], rel=1e-7, abs=1e-8), row
+        assert row["margin"] >= -1e-8, row
+    assert any(row["active"] for row in result["margins"])
+    assert len({row["name"] for row in result["margins"]}) * 2 >= len(result["margins"])
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_what_a_limit_costs_is_what_moving_it_does(name: str) -> None:
+    case = case_with(SETS[name])
+    solution = solved(case)
+    for row in result_of(solution)["limits"]:
+        key = row["key"]
+        if not row["active"] or key.startswith("custom"):
+            continue
+        step = 1e-4 * max(1.0, abs(row["limit"]))
+        ends = []
+        for moved in (row["limit"] - step, row["limit"] + step):
+            again = solved(case_with(with_number(SETS[name], key, moved)), solution.x)
+            assert again.status is Status.OPTIMAL
+            ends.append(again.F)
+        difference = (ends[1] - ends[0]) / (2 * step)
+        assert row["cost"] == pytest.approx(difference, rel=0.01, abs=1e-6 * solution.F), key
+
+
+def with_number(limits: dict[str, Any], key: str, number: float) -> dict[str, Any]:
+    """The limits with one number of theirs changed."""
+    changed = copy.deepcopy(limits)
+    name, _, side = key.partition(".")
+    if isinstance(changed[name], dict):
+        changed[name][side] = number
+    else:
+        changed[name] = number
+    return changed
+
+
+def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
+    solution = solved(case_with({"custom": ["x1 - 2*x2 >= 0"]}))
+    (row,) = result_of(solution)["limits"]
+    assert row["active"]
+    ends = [solved(case_with({"custom": [f"x1 - 2*x2 >= {h}"]}), solution.x).F for h in (-1e-3, 1e-3)]
+    assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
+    assert row["cost"] < 0
+
+
+def test_a_custom_equation_costs_what_moving_its_right_hand_side_does() -> None:
+    solution = solved(case_with({"custom": ["x1 == 2*x2"], "leg_length": {"max": 45}}))
+    row = next(row for row in result_of(solution)["margins"] if row["key"] == "custom[0]")
+    assert row["bound"] == "equal"
+    assert row["active"]
+    ends = [
+        solved(case_with({"custom": [f"x1 == 2*x2 + {h}"], "leg_length": {"max": 45}}), solution.x).F
+        for h in (-1e-3, 1e-3)
+    ]
+    assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
+    apart = solved(case_with({"custom": ["x1 == 5*x2"]}))
+    assert apart.status is Status.INFEASIBLE
+    # x1 is at most 16 and x2 at least 4: 4 short.
+    assert [(row.key, round(abs(row.needed), 4)) for row in apart.relaxation] == [("custom[0]", 4.0)]
+
+
+def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
+    text = HEXAPOD
+    for name, value in (("x1", 12), ("x2", 8), ("x3", 20), ("x4", 8)):
+        text = re.sub(rf"{name} = .*", f"{name} = {value}", text)
+    text = re.sub(r"position = .*", "position = [0, 0, 35]", text)
+    text = re.sub(r"rotation = .*", "", text)
+    assert solved(case_with({"leg_length": {"max": 45}}, text)).status is Status.EVALUATED
+    solution = solved(case_with({"leg_length": {"max": 30}}, text))
+    assert solution.status is Status.INFEASIBLE
+    assert solution.state is not None
+    longest = solution.state.quantities["leg_length"].max()
+    assert [(row.key, row.needed) for row in solution.relaxation] == [
+        ("leg_length.max", pytest.approx(longest, rel=1e-6))
+    ]
+
+
+def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
+    degrees = result_of(solved(case_with({"base_joint_angle": 12})))
+    text = HEXAPOD.replace('length = "cm"', 'length = "cm"\nangle = "rad"')
+    for degree in (2, 28, 30):
+        for sign in ("= ", "= -"):
+            text = text.replace(f"{sign}{degree},", f"{sign}{math.radians(degree)},")
+            text = text.replace(f"{sign}{degree} }}", f"{sign}{math.radians(degree)} }}")
+    radians = result_of(solved(case_with({"base_joint_angle": math.radians(12)}, text)))
+    assert radians["F"] == pytest.approx(degrees["F"], rel=1e-9)
+    assert radians["limits"][0]["unit"] == "rad"
+    assert radians["limits"][0]["cost"] == pytest.approx(math.degrees(degrees["limits"][0]["cost"]), rel=1e-6)
+
+
+THREE_UPU = """
+[robot]
+model = "three-upu"
+axes = "tsai"
+[robot.parameters]
+base_radius = { min = 20, max = 60 }
+platform_radius = { min = 10, max = 40 }
+[pose]
+position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 80 }]
+[[task]]
+sense = "max"
+axis = [1, 2, 3]
+point = [4, 0, 10]
+pitch = 2
+"""
+
+
+def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
+    limits = {
+        "leg_length": {"max": 50},
+        "base_joint_angle": 40,
+        "radius_ratio": {"min": 0.4},
+        "joint_spacing": {"min": 20},
+        "leg_clearance": {"min": 18},
+        "rate_share": {"max": 0.6},
+        "smallest_singular_value": {"min": 0.015, "length": 30},
+    }
+    result = result_of(solved(case_with(limits, THREE_UPU), starts=16))
+    assert result["status"] == "optimal"
+    radii = {plate: result["parameters"][f"{plate}_radius"] for plate in ("base", "platform")}
+    corners = np.array([[math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0] for k in range(3)])
+    b, p = radii["base"] * corners, np.array(result["pose"]["position"])
+    ends = p + radii["platform"] * corners
+    rows = {row["key"]: row for row in result["limits"]}
+    assert rows["leg_length.max"]["value"] == pytest.approx(np.linalg.norm(ends - b, axis=1).max(), rel=1e-9)
+    assert rows["radius_ratio.min"]["value"] == pytest.approx(radii["platform"] / radii["base"], rel=1e-9)
+    assert rows["joint_spacing.min"]["value"] == pytest.approx(math.sqrt(3) * min(radii.values()), rel=1e-9)
+    pairs = ((0, 1), (0, 2), (1, 2))
+    clearance = min(segment_distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs)
+    assert rows["leg_clearance.min"]["value"] == pytest.approx(clearance, rel=1e-7)
+    J = np.array(result["jacobian"])
+    J[:3, 3:] -= np.cross(p, J[:3, :3])
+    J[:, 3:] /= 30
+    smallest = np.linalg.svd(J, compute_uv=False)[-1]
+    assert rows["smallest_singular_value.min"]["value"] == pytest.approx(smallest, rel=1e-7)
+    squares = np.array(result["rates"]).reshape(2, 3) ** 2
+    assert rows["rate_share.max"]["value"] == pytest.approx(squares.sum(axis=0).max() / squares.sum(), rel=1e-9)
+    assert min(row["margin"] for row in result["margins"]) >= -1e-8
+
+
+def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
+    model = hexapod()
+    bare = replace(model, legs=(), built=())
+    parameters = {item.name: item.typical for item in bare.parameters}
+    common: dict[str, Any] = {"model": bare, "parameters": parameters, "position": [Free(-9, 9), 0, 35]}
+    task = Task.screw("max", axis=[1, 2, 3], point=[0, 0, 9], pitch=1)
+    for limits in (Limits(leg_clearance=1.0), Limits(joint_spacing=1.0), Limits(base_joint_angle=Cone(1.0))):
+        with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
+            Case(**common, tasks=[task], limits=limits)
+    with pytest.raises(CaseError, match=r"tolerance\.joint_centre"):
+        Case(**common, tasks=[task], joint_centre_tolerance=0.1)
+    limited = Case(**common, tasks=[task], limits=Limits(quantities={"leg_length": Interval(max=37.0)}))
+    solution = solved(limited)
+    assert solution.state is not None
+    assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+
+
+def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
+    text = HEXAPOD.replace("x1 = { min = 8, max = 16 }", "x1 = 12").replace("x3 = { min = 2, max = 28 }", "x3 = 20")
+    result = result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text)))
+    row = next(row for row in result["limits"] if row["key"] == "footprint.base")
+    assert (row["cost"], row["active"]) == (0.0, [])
+    assert row["margin"] == pytest.approx(1, rel=1e-9)
+    solution = solved(case_with({"footprint": {"base": 11}, "leg_length": {"max": 45}}, text))
+    assert solution.status is Status.INFEASIBLE
+    assert [(row.key, round(row.needed, 4)) for row in solution.relaxation] == [("footprint.base", 12.0)]
+
+
+def test_evaluate_shows_margins_and_exits_with_1_outside_of_a_limit(cli: Run, tmp_path: Path) -> None:
+    path = tmp_path / "case.toml"
+    path.write_text(HEXAPOD + "[limits]\nleg_length = { max = 30 }\n", encoding="utf-8")
+    code, out, _ = cli("evaluate", str(path))
+    assert code == 1
+    assert "violated: leg_length limb 1-" in out
+    assert "leg_length.max" in out
+    code, out, _ = cli("evaluate", str(path), "--set", "p_z=20", "--json", "-")
+    result = json.loads(out)
+    assert code == (1 if result["violated"] else 0)
+    assert {row["cost"] for row in result["margins"]} == {None}
+
+
+#: (24,) the ends of two segments.
+_P = [SX.sym(name, 3) for name in "pdqe"]
+_DISTANCE = ca.Function("distance", _P, [squared_distance(*_P), ca.gradient(squared_distance(*_P), ca.vertcat(*_P))])
+number = st.floats(-5, 5, allow_nan=False).map(lambda value: round(value, 3))
+point = st.tuples(number, number, number).map(np.array)
+
+
+@settings(max_examples=150, deadline=None)
+@given(point, point, point, point, st.sampled_from(["any", "parallel", "crossing", "end-to-end"]))
+def test_distance_of_segments_is_that_of_brute_force(p: Array, d: Array, q: Array, e: Array, kind: str) -> None:
+    if np.linalg.norm(d) < 0.1 or np.linalg.norm(e) < 0.1:
+        return
+    if kind == "parallel":
+        e = 0.7 * d
+    elif kind == "crossing":
+        q = p + 0.4 * d - 0.3 * e
+    elif kind == "end-to-end":
+        q = p + d
+    found = math.sqrt(max(float(_DISTANCE(p, d, q, e)[0]), 0.0))
+    assert found == pytest.approx(segment_distance(p, p + d, q, q + e), abs=2e-5, rel=1e-7)
+
+
+def test_gradient_of_the_distance_is_that_of_the_nearest_points() -> None:
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        ends = random.normal(size=(4, 3))
+        gradient = _DISTANCE(*ends)[1].full().ravel()
+        flat, numeric = ends.ravel(), np.zeros(12)
+        for i in range(12):
+            step = np.zeros(12)
+            step[i] = 1e-6
+            high, low = (float(_DISTANCE(*(flat + s * step).reshape(4, 3))[0]) for s in (1, -1))
+            numeric[i] = (high - low) / 2e-6
+        np.testing.assert_allclose(gradient, numeric, atol=2e-5)
+
+
+def test_derivatives_are_finite_for_parallel_legs_that_are_far_apart() -> None:
+    text = HEXAPOD.replace("octahedral", "aligned").replace("max = 9 }", "max = 16 }")
+    nlp = formulate(case_with({"leg_clearance": {"min": 1.0}}, text))
+    x = np.array(nlp.start)
+    for name in ("x1", "x2"):
+        x[nlp.program.index(name)] = 12.0
+    for name in ("x3", "x4"):
+        x[nlp.program.index(name)] = math.radians(20)
+    hessian = nlp.program.kernels.hessian(x, nlp.arguments, 0.0, np.ones(len(nlp.program.constraints)))[0]
+    # All six legs are parallel here, the nearest two 8.2 cm apart.
+    angle = nlp.program.index("q_x")
+    hessian[angle : angle + 3, angle : angle + 3] = 0
+    np.testing.assert_allclose(hessian, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("model", [stewart_gough(), hexapod(), three_upu(axes="tsai")], ids=lambda model: model.name)
+def test_a_starter_case_with_its_limits_is_solved_from_every_start(model: Model) -> None:
+    text = re.sub(
+        r"^# (\[limits\]|leg_length|base_joint_angle|leg_clearance)", r"\1", starter_case(model), flags=re.MULTILINE
+    )
+    case = case_with({}, text)
+    assert case.limits.leg_clearance
+    solution = solved(case, starts=16)
+    assert solution.status is Status.OPTIMAL
+    assert all(start.status is StartStatus.CONVERGED for start in solution.starts)
+
+
+_A = SX.sym("A", 6, 6)
+_EIGENVALUES = ca.Function("eigenvalues", [_A], [smallest_eigenvalue(_A), largest_eigenvalue(_A)])
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(1e-3, 10), min_size=6, max_size=6), st.integers(0, 1000), st.integers(1, 4))
+def test_eigenvalues_are_on_the_safe_side_and_close(values: list[float], seed: int, repeated: int) -> None:
+    values = sorted(values)
+    values[:repeated] = [values[0]] * repeated
+    Q = np.linalg.qr(np.random.default_rng(seed).normal(size=(6, 6)))[0]
+    smallest, largest = (float(each) for each in _EIGENVALUES(Q @ np.diag(values) @ Q.T))
+    slack = 1e-9 * values[-1]
+    factor = 1.01 * (1 - 6 ** (-1 / 8)) ** 2
+    assert values[0] * (1 - factor) - slack <= smallest <= values[0] + slack
+    assert values[-1] - slack <= largest <= values[-1] * (1 + 0.3 * factor) + slack
+    if values[repeated] > 1.5 * values[0] and repeated == 1:
+        assert smallest == pytest.approx(values[0], rel=1e-3)
+
+
+def test_a_singular_matrix_has_no_eigenvalue_but_nothing_breaks() -> None:
+    smallest, largest = (float(each) for each in _EIGENVALUES(np.diag([0.0, 0, 1, 2, 3, 4])))
+    assert abs(smallest) < 1e-8
+    assert largest == pytest.approx(4, rel=0.02)

@@ -1,0 +1,284 @@
+"""The shipped hexapod machine tool: what its limits cost, the design without them, and limits that cannot all hold."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, result_of, solve
+from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.solver import solve_nlp
+from screwsynth.nlp.tolerance import BuiltRobot
+from screwsynth.nlp.values import Search
+
+Array = NDArray[np.float64]
+Run = Any
+TABLES = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
+
+
+def case_of(tables: dict[str, Any]) -> Case:
+    return case_from_tables(copy.deepcopy(tables), name="machine", source="machine.toml")
+
+
+def changed(*path: str | int, to: Any) -> dict[str, Any]:  # noqa: ANN401 - whatever TOML can hold
+    """The tables of the case with one thing changed."""
+    tables = copy.deepcopy(TABLES)
+    place: Any = tables
+    for part in path[:-1]:
+        place = place[part]
+    place[path[-1]] = to
+    return tables
+
+
+@pytest.fixture(scope="module")
+def limited() -> Solution:
+    return solve(case_of(TABLES))
+
+
+def again(tables: dict[str, Any], near: Solution) -> Solution:
+    return solve_nlp(formulate(case_of(tables)), Search(starts=1), first=[near.x])
+
+
+def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:
+    """Base joints, platform joints in the platform's frame and in the world, from the design alone."""
+    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
+    base, platform = [], []
+    for k, sign in itertools.product(range(3), (-1, 1)):
+        u, v = (math.radians(120 * k + sign * half) for half in (x3, 60 - x4))
+        base.append([x1 * math.cos(u), x1 * math.sin(u), 0.0])
+        platform.append([x2 * math.cos(v), x2 * math.sin(v), 0.0])
+    b, a = np.array(base), np.array(platform)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
+    return b, a, p + a @ R.T
+
+
+def distance(p: Array, q: Array, r: Array, s: Array) -> float:
+    """Distance between segments pq and rs by brute force over a fine grid, refined."""
+    low, high, best = np.zeros(2), np.ones(2), math.inf
+    for _ in range(12):
+        u, v = (np.linspace(low[i], high[i], 21) for i in range(2))
+        apart = (p + u[:, None] * (q - p))[:, None] - (r + v[:, None] * (s - r))[None]
+        distances = np.linalg.norm(apart, axis=2)
+        i, j = np.unravel_index(np.argmin(distances), distances.shape)
+        best = min(best, float(distances[i, j]))
+        width, centre = (high - low) / 8, np.array([u[i], v[j]])
+        low, high = np.maximum(centre - width, 0), np.minimum(centre + width, 1)
+    return best
+
+
+def slacks(result: dict[str, Any]) -> dict[str, float]:
+    """How far inside each limit of the case a design is, by NumPy alone."""
+    limits = TABLES["limits"]
+    b, a, ends = joints(result)
+    spans = ends - b
+    lengths = np.linalg.norm(spans, axis=1)
+    R = np.array(result["pose"]["rotation_matrix"])
+    at_home = np.array(limits["home"]["position"]) + a - b
+    pairs = list(itertools.combinations(range(6), 2))
+
+    def lean(axes: Array) -> float:
+        cosines = np.einsum("ij,ij->i", axes, spans) / np.linalg.norm(axes, axis=1) / lengths
+        return math.degrees(np.arccos(cosines).max())
+
+    rates = np.array(result["rates"])
+    return {
+        "leg_length.min": lengths.min() - limits["leg_length"]["min"],
+        "leg_length.max": limits["leg_length"]["max"] - lengths.max(),
+        "base_joint_angle.max": limits["base_joint_angle"]["max"] - lean(at_home),
+        "platform_joint_angle.max": limits["platform_joint_angle"]["max"] - lean(at_home @ R.T),
+        "joint_spacing.min": min(np.linalg.norm(each[i] - each[j]) for each in (a, b) for i, j in pairs)
+        - limits["joint_spacing"]["min"],
+        "footprint.base": limits["footprint"]["base"] - np.linalg.norm(b, axis=1).max(),
+        "footprint.platform": limits["footprint"]["platform"] - np.linalg.norm(a, axis=1).max(),
+        "leg_clearance.min": min(distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs)
+        - limits["leg_clearance"]["min"],
+        "rate_share.max": limits["rate_share"]["max"] - (rates**2).max() / (rates**2).sum(),
+    }
+
+
+def test_the_limited_design_keeps_every_limit_and_is_found_from_nearly_every_start(limited: Solution) -> None:
+    assert limited.status is Status.OPTIMAL
+    assert len(limited.starts) == 64
+    assert limited.optima[0].count >= 0.9 * 64
+    result = result_of(limited)
+    found = slacks(result)
+    assert set(found) == {row["key"] for row in result["limits"]}
+    assert min(found.values()) >= -1e-8
+    for row in result["limits"]:
+        assert row["margin"] == pytest.approx(found[row["key"]], abs=1e-7)
+
+
+def test_the_unlimited_optimum_cannot_be_built(limited: Solution) -> None:
+    tables = copy.deepcopy(TABLES)
+    del tables["limits"]
+    free = solve(case_of(tables))
+    assert free.F > limited.F
+    violated = [key for key, slack in slacks(result_of(free)).items() if slack < -0.01]
+    assert len(violated) >= 3, violated
+
+
+KEYS = [
+    ("joint_spacing", "min"),
+    ("footprint", "base"),
+    ("footprint", "platform"),
+    ("leg_length", "min"),
+    ("leg_length", "max"),
+    ("rate_share", "max"),
+]
+
+
+@pytest.mark.parametrize("key", KEYS, ids=".".join)
+def test_each_cost_is_what_moving_the_limit_does(limited: Solution, key: tuple[str, str]) -> None:
+    number = TABLES["limits"][key[0]][key[1]]
+    row = next(row for row in result_of(limited)["limits"] if row["key"] == ".".join(key))
+    assert row["active"]
+    step = 1e-4 * number
+    high, low = (again(changed("limits", *key, to=number + s * step), limited) for s in (1, -1))
+    assert high.status is low.status is Status.OPTIMAL
+    assert row["cost"] == pytest.approx((high.F - low.F) / (2 * step), rel=0.01)
+
+
+IMPOSSIBLE = {
+    # The platform's circle is at most 12.5 in: six joints 13 in apart do not fit on it.
+    "spacing": (("joint_spacing", "min"), 13.0, {"joint_spacing.min", "footprint.platform"}),
+    # The platform stands at least 16 in above the base.
+    "short": (("leg_length", "max"), 15.0, {"leg_length.max"}),
+    # Six rates that are each less than a tenth of F do not add up to F.
+    "shares": (("rate_share", "max"), 0.1, {"rate_share.max"}),
+    # Joints of neighbouring legs are no farther apart than the platform's circle lets them be.
+    "clearance": (("leg_clearance", "min"), 13.0, {"leg_clearance.min", "footprint.platform"}),
+    # Footprints that exclude the smallest radii that the case allows.
+    "base": (("footprint", "base"), 18.0, {"footprint.base"}),
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_an_impossible_variant_names_the_limit_and_by_how_much(name: str) -> None:
+    key, number, culprits = IMPOSSIBLE[name]
+    tables = changed("limits", *key, to=number)
+    tables["solve"]["starts"] = 4
+    if key == ("leg_length", "max"):
+        del tables["limits"]["leg_length"]["min"]
+    solution = solve(case_of(tables))
+    assert solution.status is Status.INFEASIBLE
+    assert not result_of(solution)["F"]
+    moved = {row.key: row for row in solution.relaxation}
+    assert moved
+    assert set(moved) <= culprits
+    # With what is said to be needed there is a design, and with a little less there is none.
+    for part, status in ((1.001, Status.OPTIMAL), (0.98, Status.INFEASIBLE)):
+        relaxed = copy.deepcopy(tables)
+        for row in moved.values():
+            limit, side = row.key.split(".")
+            relaxed["limits"][limit][side] = row.limit + part * (row.needed - row.limit)
+        assert solve(case_of(relaxed)).status is status, part
+
+
+def test_the_command_says_what_would_make_it_possible(cli: Run, tmp_path: Path) -> None:
+    text = find_case("hexapod-machining").read_text(encoding="utf-8")
+    path = tmp_path / "small.toml"
+    path.write_text(text.replace("base = 28", "base = 18"), encoding="utf-8")
+    code, out, _ = cli("solve", str(path), "--starts", "2")
+    assert code == 1
+    assert "would be feasible with footprint.base = 20 in instead of 18 in" in out
+    code, out, _ = cli("solve", str(path), "--starts", "2", "--json", "-")
+    assert code == 1
+    result = json.loads(out)
+    assert result["status"] == "infeasible"
+    assert result["F"] is None
+    (row,) = result["relaxation"]
+    assert row["key"] == "footprint.base"
+    assert row["needed"] == pytest.approx(20, abs=1e-3)
+    assert all(row["cost"] is None for row in result["margins"])
+
+
+#: The machine with a few of its dimensions fixed, and with them as they are.
+FIXED = {"x1": 27.0, "x4": 9.5}
+
+
+@pytest.mark.parametrize("name", [*FIXED, "p_z"])
+def test_sensitivities_are_what_moving_a_fixed_number_does(name: str) -> None:
+    tables = copy.deepcopy(TABLES)
+    tables["solve"]["starts"] = 8
+    tables["robot"]["parameters"] |= FIXED
+    tables["pose"]["position"][2] = 20.0
+    solution = solve(case_of(tables))
+    rows = {row["name"]: row for row in result_of(solution)["sensitivity"]}
+    assert set(rows) == {*FIXED, "p_z"}
+    value = rows[name]["value"]
+    assert value == pytest.approx(20.0 if name == "p_z" else FIXED[name])
+    ends = []
+    for step in (1e-4, -1e-4):
+        moved = copy.deepcopy(tables)
+        if name == "p_z":
+            moved["pose"]["position"][2] = value + step
+        else:
+            moved["robot"]["parameters"][name] = value + step
+        ends.append(again(moved, solution).F)
+    assert rows[name]["derivative"] == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=0.01, abs=1e-4)
+
+
+def F_of(b: Array, ends: Array, twist: Array) -> float:  # noqa: N802 - the objective's name
+    forces = (ends - b) / np.linalg.norm(ends - b, axis=1, keepdims=True)
+    rates = np.cross(b, forces) @ twist[:3] + forces @ twist[3:]
+    return float(rates @ rates)
+
+
+def test_the_loss_by_inexact_joints_is_the_worst_that_sampling_finds(limited: Solution) -> None:
+    result = result_of(limited)
+    b, a, _ = joints(result)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
+    twist, tolerance = np.array(result["task"]["twist"]), TABLES["tolerance"]["joint_centre"]
+    exact = F_of(b, p + a @ R.T, twist)
+    random = np.random.default_rng(5)
+    gradients = np.array([row["gradient"] for row in result["tolerance"]["joints"]])
+    uphill = gradients / np.linalg.norm(gradients, axis=1, keepdims=True)
+    losses = []
+    for spread in (0.0, 0.1, 0.5, *np.full(300, np.inf)):
+        errors = random.normal(size=(12, 3)) if spread == np.inf else -uphill + spread * random.normal(size=(12, 3))
+        errors *= tolerance / np.linalg.norm(errors, axis=1, keepdims=True)
+        losses.append(exact - F_of(b + errors[::2], p + (a + errors[1::2]) @ R.T, twist))
+    loss = result["tolerance"]["loss"]
+    assert losses[0] == pytest.approx(result["tolerance"]["loss_there"], rel=1e-6)
+    assert max(losses) == losses[0]
+    assert losses[0] == pytest.approx(loss, rel=2e-3)
+    assert max(losses[3:]) > 0.2 * loss
+
+
+@pytest.mark.parametrize("axes", ["tsai", "limb", "free"])
+def test_joint_errors_of_a_robot_with_couples_are_those_of_moved_joints(axes: str) -> None:
+    tables = {
+        "robot": {"model": "three-upu", "axes": axes, "parameters": {"base_radius": 50, "platform_radius": 25}},
+        "pose": {"position": [{"min": -5, "max": 5}, 2, 60], "rotation": {"axis": [1, 1, 0], "angle": 10}},
+        "task": [{"sense": "max", "axis": [1, 2, 3], "point": [4, 0, 10], "pitch": 2}],
+        "solve": {"starts": 2},
+    }
+    if axes != "tsai":
+        for k in range(3):
+            c, s = math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3)
+            tables["robot"]["parameters"] |= {f"u1_{k + 1}": [c, s, 0.0]}
+            if axes == "free":
+                tables["robot"]["parameters"] |= {f"u2_{k + 1}": [-s, c, 0.0]}
+    nlp = formulate(case_of(tables))
+    x = np.array([1.5])
+    robot = BuiltRobot(nlp, x)
+    exact, (gradient,) = robot.evaluate(np.zeros((6, 3)))
+    assert exact == pytest.approx(nlp.evaluate(x)[0], rel=1e-12)
+    # A larger base circle moves every base joint outwards.
+    radial = np.zeros((6, 3))
+    for k in range(3):
+        radial[2 * k, :2] = math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3)
+    ends = []
+    for radius in (50 + 1e-4, 50 - 1e-4):
+        tables["robot"]["parameters"]["base_radius"] = radius
+        ends.append(formulate(case_of(tables)).evaluate(x)[0])
+    assert float((gradient * radial).sum()) == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5)
