@@ -154,8 +154,12 @@ class _Machine:
         self._settle(to, c, a, d, lo, hi, span)
 
     def _scaled(self, to: int, x: int, k: float, span: slice) -> None:
-        """Times a constant; by a power of two or -1 nothing is rounded, but that saves nothing worth a branch."""
+        """Times a constant; by 1 or -1 nothing is rounded."""
         w = self.work
+        if abs(k) == 1:
+            lo, hi = (w.lo[x], w.hi[x]) if k > 0 else (-w.hi[x], -w.lo[x])
+            self._settle(to, w.c[x] * k, w.a[x, span] * k, w.d[x], lo, hi, span)
+            return
         one, other = w.lo[x] * k, w.hi[x] * k
         lo, hi = (one, other) if k >= 0 else (other, one)
         lo, hi = _widened(lo, hi, TINY)

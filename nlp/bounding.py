@@ -86,6 +86,13 @@ class _Model:
     gradient_lo: FloatArray  # (R, n, B)
     gradient_hi: FloatArray
 
+    def expression(self, r: int, sign: float) -> _Quadratic:
+        """The upper model of ``sign`` times one expression."""
+        low, high = self.slope_lo[r], self.slope_hi[r]
+        low, high = (low, high) if sign > 0 else (-high, -low)
+        middle = sign * self.middle[r] + self.error[r]
+        return _Quadratic.made(middle, sign * self.b[r], sign * self.A[r], self.w[r], low, high, np.abs(self.middle[r]))
+
 
 class NumpyEngine:
     """The reference engine: everything on arrays with the boxes last.
@@ -103,6 +110,9 @@ class NumpyEngine:
         self.functions = len(form.functions)
         self.equation = np.array([False] * self.functions + [row.is_equation for row in form.rows])
         self.depends = np.array(form.dependence, dtype=bool)
+
+    def close(self) -> None:
+        """Nothing to let go."""
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
         """Examine boxes against a value that their bounds must not exceed.
@@ -204,9 +214,9 @@ class NumpyEngine:
         weights[:J, bad], weights[0, bad] = 0.0, 1.0
         return weights
 
-    def _quadratic_bound(self, model: _Model, weights: FloatArray) -> tuple[FloatArray, _Lagrangian]:
+    def _quadratic_bound(self, model: _Model, weights: FloatArray) -> tuple[FloatArray, _Quadratic]:
         """Upper bound of the Lagrangian over the box, and its model."""
-        L = _Lagrangian.combined(model, weights)
+        L = _Quadratic.combined(model, weights)
         mean = L.middle + np.maximum(np.abs(L.slope_lo), np.abs(L.slope_hi)).sum(axis=0)
         # Where the slope has a sign, the largest value is on that face.
         s = np.where(L.slope_lo >= 0, 1.0, np.where(L.slope_hi <= 0, -1.0, 0.0))
@@ -285,7 +295,7 @@ class NumpyEngine:
     def _contract(
         self,
         model: _Model,
-        L: _Lagrangian,
+        L: _Quadratic,
         lo: FloatArray,
         hi: FloatArray,
         cut_lower: NDArray[np.int32],
@@ -295,50 +305,47 @@ class NumpyEngine:
         verdict: NDArray[np.int32],
         reason: NDArray[np.int32],
     ) -> None:
-        """Move ends of boxes past points where a function is at most the threshold, or a row cannot hold.
-
-        From the affine forms: ``c + sum a_i e_i + d >= t`` bounds each ``a_i e_i`` by what the others leave.
-        """
+        """Move ends of boxes past points where a function is at most the threshold, or a row cannot hold."""
         centre, radius = box
-        J, forms = self.functions, model.value
+        J = self.functions
         e_lo, e_hi = np.full(lo.shape, -1.0), np.full(lo.shape, 1.0)
         why_lo, why_hi = cut_lower.copy(), cut_upper.copy()
+
+        def keep(part: tuple[FloatArray, FloatArray], r: int) -> None:
+            raised, lowered = part[0] > e_lo, part[1] < e_hi
+            e_lo[raised], e_hi[lowered] = part[0][raised], part[1][lowered]
+            why_lo[raised], why_hi[lowered] = r, r
+
         for r in range(len(self.equation)):
-            rad = np.abs(forms.a[r]).sum(axis=0)
-            slack = (forms.d[r] + (np.abs(forms.c[r]) + rad + abs(threshold)) * (64 * ULP)) + TINY
             for sign in (1.0, -1.0):
-                # sign (c + a e) + d >= level is what points of interest fulfil.
                 if (r < J and sign < 0) or (r >= J and sign > 0 and not self.equation[r]):
                     continue
-                a = sign * forms.a[r]
-                level = (threshold if r < J else 0.0) - sign * forms.c[r] - slack
-                needed = (level - (rad - np.abs(a))) / a
-                needed = np.where(a > 0, needed - np.abs(needed) * (8 * ULP), needed + np.abs(needed) * (8 * ULP))
-                raised = (a > 0) & (needed > e_lo)
-                lowered = (a < 0) & (needed < e_hi)
-                e_lo[raised], e_hi[lowered] = needed[raised], needed[lowered]
-                why_lo[raised], why_hi[lowered] = r, r
+                level = threshold if r < J else 0.0
+                keep(_reaching_affine(model.value, r, sign, level), r)
+                keep(model.expression(r, sign).reaching(level), r)
+        if len(self.equation) > 1:
+            keep(L.reaching(threshold), 0)
         new_lo = centre + radius * e_lo
         new_lo -= (np.abs(centre) + radius) * (4 * ULP)
         new_hi = centre + radius * e_hi
         new_hi += (np.abs(centre) + radius) * (4 * ULP)
         # A cut is worth its leaf in a proof when it takes off a part that one can see.
-        worth = 2 * _WORTH * radius
-        moved = (why_lo >= 0) & (cut_lower == -2) & (cut_upper == -2) & (new_lo - (centre - radius) > worth)
-        lo[moved], cut_lower[moved] = np.maximum(new_lo, lo)[moved], why_lo[moved]
-        moved = (why_hi >= 0) & (cut_upper == -2) & (cut_lower != -1) & ((centre + radius) - new_hi > worth)
-        hi[moved], cut_upper[moved] = np.minimum(new_hi, hi)[moved], why_hi[moved]
+        worth = _WORTH * (hi - lo)
+        moved = (why_lo >= 0) & (cut_lower == -2) & (cut_upper == -2) & (new_lo - lo > worth)
+        lo[moved], cut_lower[moved] = new_lo[moved], why_lo[moved]
+        moved = (why_hi >= 0) & (cut_upper == -2) & (cut_lower != -1) & (hi - new_hi > worth)
+        hi[moved], cut_upper[moved] = new_hi[moved], why_hi[moved]
         emptied = lo > hi
         which = emptied.any(axis=0)
         verdict[which], reason[which] = Verdict.EMPTIED, emptied.argmax(axis=0)[which]
 
     def _split(
-        self, L: _Lagrangian, lower: FloatArray, upper: FloatArray, lo: FloatArray, hi: FloatArray
+        self, L: _Quadratic, lower: FloatArray, upper: FloatArray, lo: FloatArray, hi: FloatArray
     ) -> NDArray[np.int32]:
         """The variable along which the Lagrangian can change most on what is left of the box."""
         width = upper - lower
         left = (hi - lo) / np.where(width > 0, width, 1.0)
-        score = np.fmax(np.abs(L.slope_lo), np.abs(L.slope_hi)) * left
+        score = (_LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) + L.w) * left
         relative = (hi - lo) / (self.form.upper - self.form.lower)[:, None]
         finite = np.isfinite(score).all(axis=0)
         score = np.where(finite, score, relative)
@@ -348,13 +355,17 @@ class NumpyEngine:
         return score.argmax(axis=0).astype(np.int32)
 
 
+#: What the linear part of the Lagrangian counts for beside the curved part when a box is cut.
+_LINEAR = 0.3
 #: A contraction that takes off less than this part of a side is not made.
-_WORTH = 0.05
+_WORTH = 0.1
+#: What is taken off the level that a quadratic must reach, in parts of its terms: far more than its root's rounding.
+_ROOT_SLACK = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class _Lagrangian:
-    """The quadratic model of a weighted sum of expressions."""
+class _Quadratic:
+    """An upper model ``middle + b e + 1/2 e'He + w |e|`` of a function on the box, e in [-1, 1]^n."""
 
     middle: FloatArray  # (B,) upper bound of its value at the centre
     b: FloatArray  # (n, B)
@@ -364,14 +375,33 @@ class _Lagrangian:
     slope_hi: FloatArray
     rounding: FloatArray  # (B,) what all sums of the bound may have lost
 
+    def reaching(self, level: float) -> tuple[FloatArray, FloatArray]:
+        """Ends (n, B) of the e_i for which the model can reach a level, the other e_j being anything."""
+        diagonal = np.einsum("iib->ib", self.H)
+        others = np.abs(self.H).sum(axis=(0, 1)) - np.abs(diagonal).sum(axis=0)
+        most = _largest(np.abs(self.b) + self.w, diagonal)
+        total = self.middle + self.rounding + 0.5 * others + most.sum(axis=0)
+        need = level - (total - most)
+        size = np.abs(need) + np.abs(self.b) + self.w + np.abs(diagonal) + np.abs(total) + abs(level)
+        need = need - (_ROOT_SLACK * size + TINY)
+        right_first, right_last = _roots(self.b + self.w, diagonal, need)
+        left_first, left_last = _roots(-self.b + self.w, diagonal, need)
+        # No solution on one side: its last is below its first, and the other side's first is the end.
+        low = np.where(left_last >= left_first, -left_last, right_first)
+        high = np.where(right_last >= right_first, right_last, -left_first)
+        # What is not finite says nothing.
+        known = np.isfinite(need) & np.isfinite(self.b) & np.isfinite(self.w) & np.isfinite(diagonal)
+        return np.where(known, low, -1.0), np.where(known, high, 1.0)
+
     @classmethod
-    def combined(cls, model: _Model, weights: FloatArray) -> _Lagrangian:
+    def combined(cls, model: _Model, weights: FloatArray) -> _Quadratic:
+        """The model of a sum of expressions, weighted by (R, B)."""
         size = np.abs(weights)
         used = size > 0
         keep = used[:, None]
 
         def total(values: FloatArray, by: FloatArray) -> FloatArray:
-            return np.einsum("rb,r...b->...b", by, values)
+            return np.asarray(np.einsum("rb,r...b->...b", by, values))
 
         middle = total(np.where(used, model.middle, 0.0), weights) + total(np.where(used, model.error, 0.0), size)
         b = total(np.where(keep, model.b, 0.0), weights)
@@ -380,13 +410,59 @@ class _Lagrangian:
         positive = (weights > 0)[:, None]
         low = np.where(positive, model.slope_lo, model.slope_hi)
         high = np.where(positive, model.slope_hi, model.slope_lo)
+        lows, highs = total(np.where(keep, low, 0.0), weights), total(np.where(keep, high, 0.0), weights)
+        largest = total(np.where(used, np.abs(model.middle), 0.0), size)
+        return cls.made(middle, b, A, w, lows, highs, largest)
+
+    @classmethod
+    def made(
+        cls,
+        middle: FloatArray,
+        b: FloatArray,
+        A: FloatArray,
+        w: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        largest: FloatArray,
+    ) -> _Quadratic:
         reach = np.abs(A).sum(axis=1) + w
-        rounding = 64 * ULP * (total(np.where(used, np.abs(model.middle), 0.0), size) + (np.abs(b) + 2 * reach).sum(axis=0)) + TINY
+        rounding = 64 * ULP * (largest + (np.abs(b) + 2 * reach).sum(axis=0)) + TINY
         margin = 64 * ULP * (np.abs(b) + reach) + TINY
-        slope_lo = np.fmax(total(np.where(keep, low, 0.0), weights), b - reach) - margin
-        slope_hi = np.fmin(total(np.where(keep, high, 0.0), weights), b + reach) + margin
-        H = 0.5 * (A + np.swapaxes(A, 0, 1))
-        return cls(middle, b, H, w, slope_lo, slope_hi, rounding)
+        low, high = np.fmax(low, b - reach) - margin, np.fmin(high, b + reach) + margin
+        return cls(middle, b, 0.5 * (A + np.swapaxes(A, 0, 1)), w, low, high, rounding)
+
+
+def _reaching_affine(forms: Forms, r: int, sign: float, level: float) -> tuple[FloatArray, FloatArray]:
+    """As :meth:`_Quadratic.reaching`, for ``sign`` times an expression, from its affine form.
+
+    ``c + sum a_i e_i + d >= level`` bounds each ``a_i e_i`` by what the others leave.
+    """
+    a = sign * forms.a[r]
+    rad = np.abs(a).sum(axis=0)
+    slack = forms.d[r] + (np.abs(forms.c[r]) + rad + abs(level)) * (64 * ULP) + TINY
+    needed = (level - sign * forms.c[r] - slack - (rad - np.abs(a))) / a
+    margin = np.abs(needed) * (8 * ULP)
+    low = np.where((a > 0) & (needed > -1), needed - margin, -1.0)
+    high = np.where((a < 0) & (needed < 1), needed + margin, 1.0)
+    return low, high
+
+
+def _roots(linear: FloatArray, quadratic: FloatArray, need: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """First and last t in [0, 1] with ``linear t + 1/2 quadratic t^2 >= need``; last < first where there is none."""
+    at_end = linear + 0.5 * quadratic >= need
+    at_start = need <= 0
+    root = np.sqrt(np.maximum(linear * linear + 2 * quadratic * need, 0.0))
+    # The roots of 1/2 q t^2 + l t - need, each in the form without cancellation.
+    small = np.where(linear >= 0, 2 * need / (linear + root), (root - linear) / quadratic)
+    large = np.where(linear >= 0, -(linear + root) / quadratic, 2 * need / (linear - root))
+    peak = (quadratic < 0) & (linear > 0) & (linear < -quadratic) & (linear * linear >= -2 * quadratic * need)
+    # Rising to a peak and falling again: both roots. From a start that holds, down: where it first fails.
+    down = np.where(quadratic < 0, large, np.where(linear < 0, large, 1.0))
+    last = np.where(
+        at_end, 1.0, np.where(at_start, np.clip(down, 0.0, 1.0), np.where(peak, np.clip(large, 0.0, 1.0), -1.0))
+    )
+    first = np.where(at_start, 0.0, np.where(at_end | peak, np.clip(small, 0.0, 1.0), 2.0))
+    return first, last
 
 
 def _largest(linear: FloatArray, quadratic: FloatArray) -> FloatArray:
