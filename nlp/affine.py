@@ -251,9 +251,10 @@ class _Machine:
         low, high = c - (reach + ends), c + (reach + ends)
         if poisoned:
             lo, hi = np.where(good, lo, -np.inf), np.where(good, hi, np.inf)
-        if a.shape[0] < w.a.shape[1]:
-            w.a[to] = 0.0
+        # The operand's own memory may be the target: the coefficients are written first.
         w.a[to, span] = a
+        w.a[to, : span.start] = 0.0
+        w.a[to, span.stop :] = 0.0
         w.c[to], w.d[to], self.rad[to] = c, d, rad
         # fmax and fmin: an end that is NaN says nothing.
         w.lo[to], w.hi[to] = np.fmax(lo, low), np.fmin(hi, high)

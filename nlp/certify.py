@@ -34,6 +34,8 @@ GAP = 1e-4
 #: What every bound is moved outwards by in the end, in parts of itself: constants that CasADi folded when it built the
 #: graph are rounded doubles of their own.
 _FOLDED = 1e-12
+#: An incumbent below this part of the objective's scale counts as 0 when a gap is asked for as a part of it.
+_NEAR_ZERO = 1e-6
 #: A box all of whose sides are below this part of the whole box's and that has no finite bound holds, for every
 #: practical purpose, a point without a value.
 _SINGULAR_WIDTH = 2.0**-16
@@ -163,10 +165,8 @@ class _Search:
 
     def _allowed(self) -> tuple[float, bool]:
         """The absolute gap, and whether it is a part of the incumbent."""
-        scale, value = self.form.nlp.objective_scale, abs(self.incumbent.value)
-        if not math.isfinite(value):
-            return self.gap * scale, False
-        return (self.gap * value, True) if value > self.gap * scale else (self.gap * scale, False)
+        floor, value = _NEAR_ZERO * self.form.nlp.objective_scale, abs(self.incumbent.value)
+        return (self.gap * value, True) if floor < value < math.inf else (self.gap * floor, False)
 
     @property
     def bound(self) -> float:
