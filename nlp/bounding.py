@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.affine import TINY, ULP, Forms, enclose, evaluate, midpoints
+from screwsynth.nlp.enclosure import TINY, ULP, Forms, enclose, midpoints
 from screwsynth.nlp.standardform import StandardForm
 
 if TYPE_CHECKING:
@@ -76,11 +76,11 @@ class _Model:
     """The expressions over the boxes: R of them, the first J are functions."""
 
     value: Forms  # (R, ...)
-    middle: FloatArray  # (R, B)
-    error: FloatArray  # (R, B) of the middle
     b: FloatArray  # (R, n, B)
     A: FloatArray  # (R, n, n, B), coefficients of the gradient times r_i
-    w: FloatArray  # (R, n, B)
+    p: FloatArray  # (R, n, B), what the gradient has of second order, times r_i
+    q: FloatArray
+    s: FloatArray  # (R, n, B), its rounding errors times r_i
     slope_lo: FloatArray  # (R, n, B) interval gradients times r_i
     slope_hi: FloatArray
     gradient_lo: FloatArray  # (R, n, B)
@@ -88,10 +88,11 @@ class _Model:
 
     def expression(self, r: int, sign: float) -> _Quadratic:
         """The upper model of ``sign`` times one expression."""
-        low, high = self.slope_lo[r], self.slope_hi[r]
-        low, high = (low, high) if sign > 0 else (-high, -low)
-        middle = sign * self.middle[r] + self.error[r]
-        return _Quadratic.made(middle, sign * self.b[r], sign * self.A[r], self.w[r], low, high, np.abs(self.middle[r]))
+        low, high, p, q = self.slope_lo[r], self.slope_hi[r], self.p[r], self.q[r]
+        if sign < 0:
+            low, high, p, q = -high, -low, -q, -p
+        middle, size = sign * self.value.c[r] + self.value.s[r], np.abs(self.value.c[r])
+        return _Quadratic.made(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size)
 
 
 class NumpyEngine:
@@ -130,9 +131,11 @@ class NumpyEngine:
         model = self._model(lower, upper, centre, radius)
         # Ranges of the expressions: of their forms, and by the mean value theorem.
         steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
-        high = np.fmin(model.value.hi, model.middle + (model.error + steep) * (1 + ULP) + ULP * np.abs(model.middle))
-        low = np.fmax(model.value.lo, model.middle - (model.error + steep) * (1 + ULP) - ULP * np.abs(model.middle))
-        defined = (model.value.d[:J] < np.inf).all(axis=0)
+        middle, error = model.value.c, model.value.s
+        spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
+        high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
+        low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
+        defined = (error[:J] < np.inf).all(axis=0)
         verdict = np.zeros(lower.shape[1], dtype=np.int32)
         reason = np.zeros(lower.shape[1], dtype=np.int32)
         bound = high[:J].min(axis=0)
@@ -154,30 +157,32 @@ class NumpyEngine:
         cut_lower[:, ~defined] = cut_upper[:, ~defined] = -2
         closed = bound <= threshold
         verdict[closed], reason[closed] = Verdict.BOUNDED, 0
-        rows_hold = (model.middle[J:] + model.error[J:] <= 0).all(axis=0)
-        value = np.where(rows_hold, (model.middle[:J] - model.error[:J]).min(axis=0), -np.inf)
+        rows_hold = (middle[J:] + error[J:] <= 0).all(axis=0)
+        value = np.where(rows_hold, (middle[:J] - error[:J]).min(axis=0), -np.inf)
         return Examined(
             verdict, reason, bound, lo, hi, cut_lower, cut_upper, self._split(L, lower, upper, lo, hi), value, centre
         )
 
     def _model(self, lower: FloatArray, upper: FloatArray, centre: FloatArray, radius: FloatArray) -> _Model:
         n, R = self.form.n, len(self.equation)
-        box = enclose(self.form.full_tape, lower, upper)
-        point = evaluate(self.form.values_tape, centre)
+        box = enclose(self.form.tape, lower, upper)
         shape = (R, n, lower.shape[1])
         r = radius[None]
-        g_lo, g_hi = box.lo[R:].reshape(shape), box.hi[R:].reshape(shape)
+
+        def scaled(values: FloatArray) -> FloatArray:
+            return np.where(r > 0, values[R:].reshape(shape) * r, 0.0)
+
         return _Model(
-            value=Forms(box.c[:R], box.a[:R], box.d[:R], box.lo[:R], box.hi[:R]),
-            middle=point.c,
-            error=point.d,
-            b=box.c[R:].reshape(shape) * r,
+            value=Forms(*(each[:R] for each in vars(box).values())),
+            b=scaled(box.c),
             A=box.a[R:].reshape(R, n, n, lower.shape[1]) * radius[None, :, None],
-            w=np.where(r > 0, box.d[R:].reshape(shape) * r, 0.0),
-            slope_lo=np.where(r > 0, g_lo * r, 0.0),
-            slope_hi=np.where(r > 0, g_hi * r, 0.0),
-            gradient_lo=g_lo,
-            gradient_hi=g_hi,
+            p=scaled(box.p),
+            q=scaled(box.q),
+            s=scaled(box.s),
+            slope_lo=scaled(box.lo),
+            slope_hi=scaled(box.hi),
+            gradient_lo=box.lo[R:].reshape(shape),
+            gradient_hi=box.hi[R:].reshape(shape),
         )
 
     def _multipliers(self, model: _Model, high: FloatArray) -> FloatArray:
@@ -403,16 +408,19 @@ class _Quadratic:
         def total(values: FloatArray, by: FloatArray) -> FloatArray:
             return np.asarray(np.einsum("rb,r...b->...b", by, values))
 
-        middle = total(np.where(used, model.middle, 0.0), weights) + total(np.where(used, model.error, 0.0), size)
+        middle = total(np.where(used, model.value.c, 0.0), weights) + total(np.where(used, model.value.s, 0.0), size)
         b = total(np.where(keep, model.b, 0.0), weights)
         A = total(np.where(keep[:, None], model.A, 0.0), weights)
-        w = total(np.where(keep, model.w, 0.0), size)
+        s = total(np.where(keep, model.s, 0.0), size)
         positive = (weights > 0)[:, None]
-        low = np.where(positive, model.slope_lo, model.slope_hi)
-        high = np.where(positive, model.slope_hi, model.slope_lo)
-        lows, highs = total(np.where(keep, low, 0.0), weights), total(np.where(keep, high, 0.0), weights)
-        largest = total(np.where(used, np.abs(model.middle), 0.0), size)
-        return cls.made(middle, b, A, w, lows, highs, largest)
+
+        def ends(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+            least, most = np.where(positive, low, high), np.where(positive, high, low)
+            return total(np.where(keep, least, 0.0), weights), total(np.where(keep, most, 0.0), weights)
+
+        largest = total(np.where(used, np.abs(model.value.c), 0.0), size)
+        p, q = ends(model.p, model.q)
+        return cls.made(middle, b, A, p, q, s, *ends(model.slope_lo, model.slope_hi), largest)
 
     @classmethod
     def made(
@@ -420,26 +428,34 @@ class _Quadratic:
         middle: FloatArray,
         b: FloatArray,
         A: FloatArray,
-        w: FloatArray,
+        p: FloatArray,
+        q: FloatArray,
+        s: FloatArray,
         low: FloatArray,
         high: FloatArray,
         largest: FloatArray,
     ) -> _Quadratic:
-        reach = np.abs(A).sum(axis=1) + w
-        rounding = 64 * ULP * (largest + (np.abs(b) + 2 * reach).sum(axis=0)) + TINY
-        margin = 64 * ULP * (np.abs(b) + reach) + TINY
-        low, high = np.fmax(low, b - reach) - margin, np.fmin(high, b + reach) + margin
+        """The model from the parts of a gradient's form; ``low`` and ``high`` are the gradient's ends from elsewhere.
+
+        Along the ray to ``e`` what is of second order grows with ``t^2``, whose integral is 1/3.
+        """
+        across = np.abs(A).sum(axis=1)
+        rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
+        margin = 64 * ULP * (np.abs(b) + across + q - p + s) + TINY
+        low, high = np.fmax(low, b - across + p - s) - margin, np.fmin(high, b + across + q + s) + margin
+        b, w = b + (p + q) / 6, (q - p) / 6 + s
         return cls(middle, b, 0.5 * (A + np.swapaxes(A, 0, 1)), w, low, high, rounding)
 
 
 def _reaching_affine(forms: Forms, r: int, sign: float, level: float) -> tuple[FloatArray, FloatArray]:
     """As :meth:`_Quadratic.reaching`, for ``sign`` times an expression, from its affine form.
 
-    ``c + sum a_i e_i + d >= level`` bounds each ``a_i e_i`` by what the others leave.
+    ``c + sum a_i e_i + q + s >= level`` bounds each ``a_i e_i`` by what the others leave.
     """
     a = sign * forms.a[r]
     rad = np.abs(a).sum(axis=0)
-    slack = forms.d[r] + (np.abs(forms.c[r]) + rad + abs(level)) * (64 * ULP) + TINY
+    most = forms.q[r] if sign > 0 else -forms.p[r]
+    slack = most + forms.s[r] + (np.abs(forms.c[r]) + rad + most + abs(level)) * (64 * ULP) + TINY
     needed = (level - sign * forms.c[r] - slack - (rad - np.abs(a))) / a
     margin = np.abs(needed) * (8 * ULP)
     low = np.where((a > 0) & (needed > -1), needed - margin, -1.0)

@@ -84,12 +84,7 @@ class StandardForm:
         return [[bool(pattern.has_nz(r, i)) for i in range(self.n)] for r in range(self.expressions.numel())]
 
     @cached_property
-    def values_tape(self) -> Tape:
-        """Results: the R expressions."""
-        return lower(ca.Function("values", [self.x], [ca.cse(self.expressions)]))
-
-    @cached_property
-    def full_tape(self) -> Tape:
+    def tape(self) -> Tape:
         """Results: the R expressions, then the derivatives of the first by x, of the second, and so on."""
         return lower(ca.Function("full", [self.x], ca.cse([self.expressions, self.jacobian.T])))
 
