@@ -1,4 +1,4 @@
-/* The kernel of the search of a whole box: what affine.py and bounding.py do, over lists of boxes.
+/* The kernel of the search of a whole box: what enclosure.py and bounding.py do, over lists of boxes.
  *
  * The list of instructions is interpreted over LANES boxes at once, so that an instruction is fetched once for all of
  * them and its loops become vector instructions; what the enclosures say is then read off box by box. Every formula is
@@ -20,6 +20,7 @@
 #define WIDE
 #endif
 
+#define INLINE static inline __attribute__((always_inline))
 #define LANES 32
 #define EACH for (int l = 0; l < LANES; l++)
 #define ULP 0x1p-51
@@ -38,7 +39,7 @@ typedef double Lane[LANES];
 
 /* An enclosure over LANES boxes: form, interval, and the sum of |a|. The n coefficients follow it in memory. */
 typedef struct {
-    Lane c, d, lo, hi, rad;
+    Lane c, p, q, s, lo, hi, rad;
 } Value;
 
 typedef struct {
@@ -48,11 +49,11 @@ typedef struct {
 } Tape;
 
 typedef struct {
-    int n, functions, expressions;
+    int n, functions, expressions; /* R expressions, the functions first */
     const int *equation;      /* (R) */
     const int *depends;       /* (R, n) */
     const double *low, *high; /* (n) the whole box */
-    Tape full, values;
+    Tape tape;
 } Form;
 
 typedef struct {
@@ -65,63 +66,52 @@ static inline Lane *terms_of(Value *v) { return (Lane *)(v + 1); }
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
 
-/* ---- Rules for functions of one variable: slope, shift and error on [lo, hi], and the interval of the result. ---- */
+/* ---- Rules for functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, and the interval of the result. ---- */
 
 typedef struct {
-    double slope, shift, off, lo, hi;
+    double value, slope, least, most, error, lo, hi;
 } Rule;
 
-static Rule taylor(double lo, double hi, double value, double slope, double least_curved, double most_curved)
+#define OFF (LIBRARY * ULP)
+
+static Rule wave(double c, double lo, double hi, int shifted)
 {
     double middle = 0.5 * lo + 0.5 * hi, radius = larger(hi - middle, middle - lo) * (1 + ULP) + TINY;
-    double half = 0.5 * radius * radius;
-    double least = smaller(half * least_curved, 0.0), most = larger(half * most_curved, 0.0);
-    double size = fabs(value) + fabs(slope) * (fabs(middle) + radius) + (most - least);
-    Rule r = {slope, value - slope * middle + 0.5 * (least + most), 0.5 * (most - least) + 2 * LIBRARY * ULP * size, 0, 0};
+    double centred = shifted ? cos(middle) : sin(middle), steep = fabs(shifted ? sin(middle) : cos(middle));
+    double spread = steep * radius + 0.5 * radius * radius;
+    spread = spread + 2 * OFF * (1 + spread);
+    double least = larger(centred - spread, -1.0), most = smaller(centred + spread, 1.0);
+    double sine = sin(c), cosine = cos(c);
+    Rule r = {shifted ? cosine : sine, shifted ? -sine : cosine, -0.5 * most, -0.5 * least, 4 * OFF, least, most};
     return r;
 }
 
-static Rule wave(double lo, double hi, int shifted)
+static Rule rule_of(int op, double c, double lo, double hi)
 {
-    double middle = 0.5 * lo + 0.5 * hi, radius = larger(hi - middle, middle - lo) * (1 + ULP) + TINY;
-    double sine = sin(middle), cosine = cos(middle);
-    double value = shifted ? cosine : sine, slope = shifted ? -sine : cosine;
-    double spread = fabs(slope) * radius + 0.5 * radius * radius;
-    spread = spread + (2 * LIBRARY * ULP) * (1 + spread);
-    double least = larger(value - spread, -1.0), most = smaller(value + spread, 1.0);
-    Rule r = taylor(lo, hi, value, slope, -most, -least);
-    r.off = r.off + (2 * LIBRARY * ULP) * (1 + radius);
-    r.lo = least, r.hi = most;
-    return r;
-}
-
-static Rule rule_of(int op, double lo, double hi)
-{
-    double middle = 0.5 * lo + 0.5 * hi, ends = LIBRARY * ULP;
-    Rule r = {NAN, NAN, NAN, NAN, NAN};
+    Rule r = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    lo = smaller(lo, c), hi = larger(hi, c);
     if (op == SQRT) {
-        double low = sqrt(lo), high = sqrt(hi);
-        double slope = 1.0 / (low + high), least = low * high * slope, most = 0.25 * (low + high);
-        r.slope = slope, r.shift = 0.5 * (least + most);
-        r.off = larger(0.5 * (most - least), 0.0) + 16 * ULP * high;
+        double root = sqrt(c), low = sqrt(lo), high = sqrt(hi), slope = 0.5 / root;
+        r.value = root, r.slope = slope, r.error = OFF * root;
+        r.least = -slope / ((low + root) * (low + root)), r.most = -slope / ((high + root) * (high + root));
         r.lo = low - fabs(low) * ULP, r.hi = high + fabs(high) * ULP;
     } else if (op == SIN || op == COS) {
-        r = wave(lo, hi, op == COS);
+        r = wave(c, lo, hi, op == COS);
     } else if (op == EXP) {
-        double value = exp(middle);
-        double least = larger(exp(lo) * (1 - ends) - TINY, 0.0), most = exp(hi) * (1 + ends) + TINY;
-        r = taylor(lo, hi, value, value, least, most);
-        r.lo = least, r.hi = most;
+        r.value = r.slope = exp(c), r.error = 2 * OFF * r.value;
+        r.lo = larger(exp(lo) * (1 - OFF) - TINY, 0.0), r.hi = exp(hi) * (1 + OFF) + TINY;
+        r.least = 0.5 * r.lo, r.most = 0.5 * r.hi;
     } else if (op == LOG && lo > 0) {
-        double low = log(lo), high = log(hi), curved = 1 + ends;
-        r = taylor(lo, hi, log(middle), 1 / middle, -curved / (lo * lo), -1 / (curved * hi * hi));
-        r.lo = low - (fabs(low) * ends + TINY), r.hi = high + (fabs(high) * ends + TINY);
+        double low = log(lo), high = log(hi), grown = 1 + OFF;
+        r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * (fabs(r.value) + r.slope);
+        r.least = -0.5 * grown / (lo * lo), r.most = -0.5 / (grown * hi * hi);
+        r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
     } else if (op == ATAN) {
         double low = atan(lo), high = atan(hi);
-        double most = lo >= 0 ? 0.0 : smaller(0.65, -2 * lo * (1 + ULP));
-        double least = hi <= 0 ? 0.0 : larger(-0.65, -2 * hi * (1 + ULP));
-        r = taylor(lo, hi, atan(middle), 1 / (1 + middle * middle), least, most);
-        r.lo = low - (fabs(low) * ends + TINY), r.hi = high + (fabs(high) * ends + TINY);
+        r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = 2 * OFF * (fabs(r.value) + 1);
+        r.most = lo >= 0 ? 0.0 : smaller(0.325, -lo * (1 + ULP));
+        r.least = hi <= 0 ? 0.0 : larger(-0.325, -hi * (1 + ULP));
+        r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
     }
     return r;
 }
@@ -129,12 +119,16 @@ static Rule rule_of(int op, double lo, double hi)
 /* ---- The interpreter. ---- */
 
 typedef struct {
-    Lane c, d, lo, hi;
+    Lane c, p, q, s, lo, hi;
 } Result;
 
-static inline __attribute__((always_inline)) void interval_product(const double *lo, const double *hi,
-                                                                   const double *other_lo, const double *other_hi,
-                                                                   Result *out)
+/* A form without its error: centre, size of the linear part, least and largest of second order. */
+typedef struct {
+    const double *c, *rad, *p, *q;
+} Part;
+
+INLINE void interval_product(const double *lo, const double *hi, const double *other_lo, const double *other_hi,
+                             Result *restrict out)
 {
     EACH
     {
@@ -147,78 +141,99 @@ static inline __attribute__((always_inline)) void interval_product(const double 
     }
 }
 
-/* Write a value: poison what has no finite enclosure, intersect the interval with the form's range. */
-static inline __attribute__((always_inline)) void settle(Value *v, int n, int first, int last, double slack,
-                                                         const Result *from, Lane *restrict t)
+/* What is of second order in a product; the sums are those of a a', |a a'|, |a r' + a' r| and |a r' - a' r|. */
+INLINE void second_order(Part x, Part y, const double *balance, const double *sizes, const double *plus,
+                         const double *minus, Result *restrict out, double *restrict big, double *restrict other)
 {
-    Lane *a = terms_of(v);
-    Lane rad;
-    EACH rad[l] = 0.0;
-    for (int i = first; i < last; i++)
-        EACH rad[l] += fabs(t[i][l]);
-    if (first > 0)
-        memset(a, 0, (size_t)first * sizeof(Lane));
-    if (last < n)
-        memset(a + last, 0, (size_t)(n - last) * sizeof(Lane));
-    int all = 1;
     EACH
     {
-        double c = from->c[l], d = from->d[l] * (1 + slack);
-        double reach = (rad[l] + d) * (1 + slack);
-        double ends = ULP * fabs(c), low = c - (reach + ends), high = c + (reach + ends);
-        int good = (reach < INFINITY) & (fabs(c) < INFINITY);
-        all &= good;
-        v->c[l] = good ? c : 0.0;
-        v->d[l] = good ? d : INFINITY;
-        v->rad[l] = good ? rad[l] : 0.0;
-        double lo = from->lo[l] > low ? from->lo[l] : low, hi = from->hi[l] < high ? from->hi[l] : high;
-        v->lo[l] = good ? lo : -INFINITY;
-        v->hi[l] = good ? hi : INFINITY;
+        double cx = x.c[l], cy = y.c[l], rx = x.rad[l], ry = y.rad[l], px = x.p[l], qx = x.q[l], py = y.p[l], qy = y.q[l];
+        double both = rx * ry, cross = both - sizes[l];
+        double most = 0.5 * (sizes[l] + balance[l]) + cross, least = 0.5 * (sizes[l] - balance[l]) + cross;
+        double quarter = 0.25 / (both > 0 ? both : 1.0);
+        double more = plus[l] * plus[l] * quarter, less = minus[l] * minus[l] * quarter;
+        most = more < most ? more : most, least = less < least ? less : least;
+        double mx = larger(-px, qx), my = larger(-py, qy), mixed = rx * my + ry * mx + mx * my;
+        out->p[l] = smaller(cx * py, cx * qy) + smaller(cy * px, cy * qx) - (least + mixed);
+        out->q[l] = larger(cx * py, cx * qy) + larger(cy * px, cy * qx) + (most + mixed);
+        big[l] = fabs(cx) + rx + mx, other[l] = fabs(cy) + ry + my;
     }
-    memcpy(a + first, t + first, (size_t)(last > first ? last - first : 0) * sizeof(Lane));
+}
+
+/* Write a value: poison what has no finite enclosure, intersect the interval with the form's range. */
+INLINE void settle(Value *restrict v, int n, int first, int last, double slack, const Result *restrict from,
+                   Lane *restrict t)
+{
+    Lane *a = terms_of(v);
+    double grown = 1 + slack;
+    int all = 1;
+    EACH v->rad[l] = 0.0;
+    for (int i = first; i < last; i++)
+        EACH v->rad[l] += fabs(t[i][l]);
+    EACH
+    {
+        double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
+        double s = from->s[l] * grown, ends = ULP * fabs(c) + s, rad = v->rad[l];
+        double down = (rad - p + ends) * grown, up = (rad + q + ends) * grown;
+        int good = (down < INFINITY) & (up < INFINITY) & (fabs(c) < INFINITY);
+        double low = c - down, high = c + up;
+        low = low - ULP * fabs(low), high = high + ULP * fabs(high);
+        double lo = from->lo[l] > low ? from->lo[l] : low, hi = from->hi[l] < high ? from->hi[l] : high;
+        all &= good;
+        v->c[l] = good ? c : 0.0, v->rad[l] = good ? rad : 0.0;
+        v->p[l] = good ? p : 0.0, v->q[l] = good ? q : 0.0, v->s[l] = good ? s : INFINITY;
+        v->lo[l] = good ? lo : -INFINITY, v->hi[l] = good ? hi : INFINITY;
+    }
+    memset(a, 0, (size_t)first * sizeof(Lane));
+    memcpy(a + first, t + first, (size_t)(last - first) * sizeof(Lane));
+    memset(a + last, 0, (size_t)(n - last) * sizeof(Lane));
     if (!all)
         for (int i = first; i < last; i++)
-            EACH a[i][l] = v->d[l] < INFINITY ? a[i][l] : 0.0;
+            EACH a[i][l] = v->s[l] < INFINITY ? a[i][l] : 0.0;
 }
 
 WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centre, Lane *radius, Lane *lower,
-                     Lane *upper, Lane *t)
+                     Lane *upper, Lane *restrict t)
 {
     double slack = (n + 8) * ULP;
+    size_t whole = sizeof(Value) + (size_t)n * sizeof(Lane);
     for (int index = 0; index < tape->length; index++) {
         const int *code = tape->code + 6 * index;
-        int op = code[0], first = n ? code[4] : 0, last = n ? code[5] : 0;
+        int op = code[0], first = code[4], last = code[5];
         double k = tape->k[index];
         Value *v = value_of(op == OUTPUT ? out : work, code[1]);
-        Value *x = value_of(work, op == INPUT ? 0 : code[2]), *y = value_of(work, op == INPUT ? 0 : code[3]);
-        Lane *a = terms_of(v), *ax = terms_of(x), *ay = terms_of(y);
-        Result r;
-        switch (op) {
-        case OUTPUT:
-            memcpy(v, x, sizeof(Value) + (size_t)n * sizeof(Lane));
+        if (op == OUTPUT) {
+            memcpy(v, value_of(work, code[2]), whole);
             continue;
-        case INPUT:
-            memset(v, 0, sizeof(Value) + (size_t)n * sizeof(Lane));
+        }
+        if (op == INPUT) {
+            memset(v, 0, whole);
             memcpy(v->c, centre[code[2]], sizeof(Lane));
             memcpy(v->lo, lower[code[2]], sizeof(Lane));
             memcpy(v->hi, upper[code[2]], sizeof(Lane));
-            if (n) {
-                memcpy(a[code[2]], radius[code[2]], sizeof(Lane));
-                memcpy(v->rad, radius[code[2]], sizeof(Lane));
-            }
+            memcpy(v->rad, radius[code[2]], sizeof(Lane));
+            memcpy(terms_of(v)[code[2]], radius[code[2]], sizeof(Lane));
             continue;
-        case CONSTANT:
-            memset(v, 0, sizeof(Value) + (size_t)n * sizeof(Lane));
+        }
+        if (op == CONSTANT) {
+            memset(v, 0, whole);
             EACH v->c[l] = v->lo[l] = v->hi[l] = k;
             continue;
+        }
+        const Value *x = value_of(work, code[2]), *y = value_of(work, code[3]);
+        const Lane *ax = (const Lane *)(x + 1), *ay = (const Lane *)(y + 1);
+        Lane balance, sizes, plus, minus, big, other;
+        Result r;
+        switch (op) {
         case ADD:
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l] + ay[i][l];
             EACH
             {
                 double c = x->c[l] + y->c[l], lo = x->lo[l] + y->lo[l], hi = x->hi[l] + y->hi[l];
-                r.c[l] = c, r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-                r.d[l] = x->d[l] + y->d[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
+                r.c[l] = c, r.p[l] = x->p[l] + y->p[l], r.q[l] = x->q[l] + y->q[l];
+                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
             }
             break;
         case SUB:
@@ -227,8 +242,9 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
             EACH
             {
                 double c = x->c[l] - y->c[l], lo = x->lo[l] - y->hi[l], hi = x->hi[l] - y->lo[l];
-                r.c[l] = c, r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-                r.d[l] = x->d[l] + y->d[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
+                r.c[l] = c, r.p[l] = x->p[l] - y->q[l], r.q[l] = x->q[l] - y->p[l];
+                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
             }
             break;
         case SHIFT:
@@ -237,122 +253,126 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
             EACH
             {
                 double c = x->c[l] + k, lo = x->lo[l] + k, hi = x->hi[l] + k;
-                r.c[l] = c, r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-                r.d[l] = x->d[l] + slack * fabs(c);
+                r.c[l] = c, r.p[l] = x->p[l], r.q[l] = x->q[l], r.s[l] = x->s[l] + slack * fabs(c);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
             }
             break;
-        case SCALE:
+        case SCALE: {
+            double size = fabs(k);
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l] * k;
             EACH
             {
-                double c = x->c[l] * k, one = x->lo[l] * k, other = x->hi[l] * k, size = fabs(k);
-                double lo = k >= 0 ? one : other, hi = k >= 0 ? other : one;
-                double off = slack * (fabs(c) + size * x->rad[l]) + TINY;
-                int exact = size == 1;
-                r.c[l] = c, r.d[l] = exact ? x->d[l] : x->d[l] * size + off;
-                r.lo[l] = exact ? lo : lo - (fabs(lo) * ULP + TINY);
-                r.hi[l] = exact ? hi : hi + (fabs(hi) * ULP + TINY);
+                double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
+                double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down;
+                r.c[l] = c, r.p[l] = k >= 0 ? p : q, r.q[l] = k >= 0 ? q : p;
+                r.s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * (fabs(c) + size * x->rad[l]) + TINY);
+                r.lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
+                r.hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
             }
             break;
+        }
         case MUL: {
-            Lane sum, size;
-            EACH sum[l] = size[l] = 0.0;
+            EACH balance[l] = sizes[l] = plus[l] = minus[l] = 0.0;
             for (int i = first; i < last; i++)
                 EACH
                 {
-                    double product = ax[i][l] * ay[i][l];
-                    sum[l] += product, size[l] += fabs(product);
-                    t[i][l] = x->c[l] * ay[i][l] + y->c[l] * ax[i][l];
+                    double p = ax[i][l], q = ay[i][l], product = p * q, one = p * y->rad[l], two = q * x->rad[l];
+                    balance[l] += product, sizes[l] += fabs(product);
+                    plus[l] += fabs(one + two), minus[l] += fabs(one - two);
+                    t[i][l] = x->c[l] * q + y->c[l] * p;
                 }
+            Part one = {x->c, x->rad, x->p, x->q}, two = {y->c, y->rad, y->p, y->q};
+            second_order(one, two, balance, sizes, plus, minus, &r, big, other);
             EACH
             {
-                double px = fabs(x->c[l]), py = fabs(y->c[l]);
-                double rx = x->rad[l] + x->d[l], ry = y->rad[l] + y->d[l];
-                r.c[l] = x->c[l] * y->c[l] + 0.5 * sum[l];
-                double d = px * y->d[l] + py * x->d[l] + (rx * ry - 0.5 * size[l]);
-                r.d[l] = d + (slack * ((px + rx) * (py + ry)) + TINY);
+                r.c[l] = x->c[l] * y->c[l];
+                r.s[l] = (big[l] * y->s[l] + other[l] * x->s[l] + x->s[l] * y->s[l]) + (slack * (big[l] * other[l]) + TINY);
             }
             interval_product(x->lo, x->hi, y->lo, y->hi, &r);
             break;
         }
-        case SQUARE: {
-            Lane sum;
-            EACH sum[l] = 0.0;
+        case SQUARE:
             for (int i = first; i < last; i++)
-                EACH
-                {
-                    sum[l] += ax[i][l] * ax[i][l];
-                    t[i][l] = 2 * x->c[l] * ax[i][l];
-                }
+                EACH t[i][l] = 2 * x->c[l] * ax[i][l];
             EACH
             {
-                double half = 0.5 * sum[l], px = fabs(x->c[l]), rx = x->rad[l] + x->d[l];
-                r.c[l] = x->c[l] * x->c[l] + half;
-                r.d[l] = 2 * px * x->d[l] + (rx * rx - half) + (slack * ((px + rx) * (px + rx)) + TINY);
-                double one = fabs(x->lo[l]), other = fabs(x->hi[l]);
-                double small = one < other ? one : other, large = one < other ? other : one;
+                double c = x->c[l], rad = x->rad[l], p = x->p[l], q = x->q[l], s = x->s[l], m = larger(-p, q);
+                double mixed = 2 * rad * m + m * m, size = fabs(c) + rad + m;
+                r.c[l] = c * c;
+                r.p[l] = smaller(2 * c * p, 2 * c * q) - mixed;
+                r.q[l] = larger(2 * c * p, 2 * c * q) + (rad * rad + mixed);
+                r.s[l] = 2 * size * s + s * s + (slack * (size * size) + TINY);
+                double one = fabs(x->lo[l]), two = fabs(x->hi[l]);
+                double small = one < two ? one : two, large = one < two ? two : one;
                 small = (x->lo[l] <= 0) & (x->hi[l] >= 0) ? 0.0 : small;
                 double lo = small * small, hi = large * large;
                 lo = lo - (lo * ULP + TINY);
-                r.lo[l] = lo > 0.0 ? lo : 0.0;
-                r.hi[l] = hi + (hi * ULP + TINY);
+                r.lo[l] = lo > 0.0 ? lo : 0.0, r.hi[l] = hi + (hi * ULP + TINY);
             }
             break;
-        }
         case DIV: {
-            Lane ci, pi, ri, di, q, dn, rn, ra, size, sum, slope, low, high;
+            Lane zero, ratio, inverse, steep, pi, qi, ri, si, pn, qn, rn, sn, low, high;
             EACH
             {
-                double sign = y->lo[l] > 0 ? 1.0 : -1.0;
-                double near = y->lo[l] > 0 ? y->lo[l] : -y->hi[l], far = y->lo[l] > 0 ? y->hi[l] : -y->lo[l];
+                int positive = y->lo[l] > 0;
+                double c = y->c[l], near = positive ? y->lo[l] : -y->hi[l], far = positive ? y->hi[l] : -y->lo[l];
                 near = near > 0 ? near : NAN;
-                double product = near * far, most = 1.0 / near + 1.0 / far, least = 2.0 / sqrt(product);
-                slope[l] = -1.0 / product;
-                double steep = fabs(slope[l]), shift = 0.5 * (least + most), half = 0.5 * (most - least);
-                double off = (half > 0.0 ? half : 0.0) + 16 * ULP * most;
-                ci[l] = slope[l] * y->c[l] + sign * shift;
-                pi[l] = steep * fabs(y->c[l]) + shift, ri[l] = steep * y->rad[l];
-                di[l] = steep * y->d[l] + off + (slack * (pi[l] + ri[l]) + TINY);
-                q[l] = x->c[l] / y->c[l];
-                double whole = fabs(x->c[l]) + x->rad[l] + fabs(q[l]) * (fabs(y->c[l]) + y->rad[l]);
-                dn[l] = x->d[l] + fabs(q[l]) * y->d[l] + (slack * whole + TINY);
-                double one = sign / far, other = sign / near;
-                double least_inverse = one < other ? one : other, most_inverse = one < other ? other : one;
-                low[l] = least_inverse - (fabs(least_inverse) * ULP + TINY);
-                high[l] = most_inverse + (fabs(most_inverse) * ULP + TINY);
-                ra[l] = sum[l] = size[l] = 0.0;
+                double my = larger(-y->p[l], y->q[l]), moved = y->rad[l] + my;
+                inverse[l] = 1.0 / c, steep[l] = inverse[l] * inverse[l];
+                double curved = moved * moved * steep[l] / near, p = -steep[l] * y->q[l], q = -steep[l] * y->p[l];
+                pi[l] = positive ? p : p - curved, qi[l] = positive ? q + curved : q, ri[l] = steep[l] * y->rad[l];
+                double size = fabs(inverse[l]) + ri[l] + larger(-pi[l], qi[l]);
+                si[l] = y->s[l] * steep[l] * (1 + (2 * moved + y->s[l]) / near) + (slack * size + TINY);
+                double by = x->c[l] / c, steepness = fabs(by);
+                ratio[l] = by;
+                pn[l] = x->p[l] - (by >= 0 ? by * y->q[l] : by * y->p[l]);
+                qn[l] = x->q[l] - (by >= 0 ? by * y->p[l] : by * y->q[l]);
+                double all = fabs(x->c[l]) + x->rad[l] + steepness * (fabs(c) + y->rad[l]);
+                sn[l] = x->s[l] + steepness * y->s[l] + (slack * all + TINY);
+                double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / near;
+                double least = one < two ? one : two, most = one < two ? two : one;
+                low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
+                zero[l] = rn[l] = balance[l] = sizes[l] = plus[l] = minus[l] = 0.0;
             }
+            for (int i = first; i < last; i++)
+                EACH rn[l] += fabs(ax[i][l] - ratio[l] * ay[i][l]);
             for (int i = first; i < last; i++)
                 EACH
                 {
-                    double an = ax[i][l] - q[l] * ay[i][l], product = an * (slope[l] * ay[i][l]);
-                    ra[l] += fabs(an), sum[l] += product, size[l] += fabs(product);
-                    t[i][l] = ci[l] * an;
+                    double p = ax[i][l] - ratio[l] * ay[i][l], q = -steep[l] * ay[i][l], product = p * q;
+                    double one = p * ri[l], two = q * rn[l];
+                    balance[l] += product, sizes[l] += fabs(product);
+                    plus[l] += fabs(one + two), minus[l] += fabs(one - two);
+                    t[i][l] = inverse[l] * p;
                 }
+            Part one = {zero, rn, pn, qn}, two = {inverse, ri, pi, qi};
+            second_order(one, two, balance, sizes, plus, minus, &r, big, other);
             EACH
             {
-                rn[l] = ra[l] * (1 + slack) + dn[l], ri[l] = ri[l] * (1 + slack) + di[l];
-                r.c[l] = q[l] + 0.5 * sum[l];
-                double d = fabs(ci[l]) * dn[l] + (rn[l] * ri[l] - 0.5 * size[l]);
-                r.d[l] = d + (slack * (fabs(q[l]) + (fabs(ci[l]) + ri[l]) * rn[l]) + TINY);
+                r.c[l] = ratio[l];
+                r.s[l] = big[l] * si[l] + other[l] * sn[l] + sn[l] * si[l] +
+                         (slack * (fabs(ratio[l]) + big[l] * other[l]) + TINY);
             }
             interval_product(x->lo, x->hi, low, high, &r);
             break;
         }
         default: {
-            Lane slope;
+            Lane slopes;
             EACH
             {
-                Rule rule = rule_of(op, x->lo[l], x->hi[l]);
-                double steep = fabs(rule.slope);
-                double size = steep * (fabs(x->c[l]) + x->rad[l] + x->d[l]) + fabs(rule.shift) + rule.off;
-                slope[l] = rule.slope;
-                r.c[l] = rule.slope * x->c[l] + rule.shift, r.lo[l] = rule.lo, r.hi[l] = rule.hi;
-                r.d[l] = steep * x->d[l] + rule.off + (slack * size + TINY);
+                Rule rule = rule_of(op, x->c[l], x->lo[l], x->hi[l]);
+                double slope = rule.slope, moved = x->rad[l] + larger(-x->p[l], x->q[l]), square = moved * moved;
+                double down = slope * x->p[l], up = slope * x->q[l];
+                r.c[l] = rule.value, r.lo[l] = rule.lo, r.hi[l] = rule.hi, slopes[l] = slope;
+                r.p[l] = smaller(down, up) + smaller(rule.least * square, 0.0);
+                r.q[l] = larger(down, up) + larger(rule.most * square, 0.0);
+                double steep = fabs(slope) + 2 * larger(fabs(rule.least), fabs(rule.most)) * (moved + x->s[l]);
+                double size = fabs(slope) * moved + fabs(rule.value);
+                r.s[l] = steep * x->s[l] + rule.error * (1 + moved) + (slack * size + TINY);
             }
             for (int i = first; i < last; i++)
-                EACH t[i][l] = slope[l] * ax[i][l];
+                EACH t[i][l] = slopes[l] * ax[i][l];
         }
         }
         settle(v, n, first, last, slack, &r, t);
@@ -364,14 +384,13 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
 /* The expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a combination of them. */
 typedef struct {
     int n, J, R;
-    double *middle, *error;       /* (R) at the centre */
-    double *c, *d, *lo, *hi, *a;  /* (R), a: (R, n): forms of the expressions */
-    double *b, *A, *w;            /* (R, n), (R, n, n), (R, n): of their scaled gradients */
+    double *c, *p, *q, *s, *lo, *hi, *a;  /* (R), a: (R, n): forms of the expressions */
+    double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): of their scaled gradients */
     double *slope_lo, *slope_hi;  /* (R, n) scaled */
     double *grad_lo, *grad_hi;    /* (R, n) */
     double *weights, *size, *left, *high, *low; /* (R), (R), (n), (R), (R) */
     double *qb, *qw, *qlo, *qhi, *H;            /* the Lagrangian's model */
-    double *s, *fb, *fw, *fH, *diagonal, *t, *gradient; /* (n), fH: (n, n) */
+    double *sign, *fb, *fw, *fH, *diagonal, *t, *gradient; /* (n), fH: (n, n) */
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
@@ -384,18 +403,18 @@ static void choose_multipliers(Box *x, const int *equation)
         x->weights[r] = r == 0;
         x->size[r] = 0.0;
         for (int i = 0; i < n; i++) {
-            double along = x->b[r * n + i] - (r < J ? x->b[i] : 0.0);
+            double along = x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0);
             x->size[r] += along * along;
         }
     }
-    memcpy(x->left, x->b, (size_t)n * sizeof(double));
+    memcpy(x->left, x->gb, (size_t)n * sizeof(double));
     for (int round = 0; round < (R > 1 ? MULTIPLIER_ROUNDS : 0); round++)
         for (int r = 1; r < R; r++) {
             if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->high[r] >= 0)))
                 continue;
             double product = 0.0, weight = x->weights[r];
             for (int i = 0; i < n; i++)
-                product += (x->b[r * n + i] - (r < J ? x->b[i] : 0.0)) * x->left[i];
+                product += (x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0)) * x->left[i];
             double new = weight - product / x->size[r];
             if (r < J)
                 new = smaller(larger(new, 0.0), weight + x->weights[0]);
@@ -405,7 +424,7 @@ static void choose_multipliers(Box *x, const int *equation)
                 continue;
             double change = new - weight;
             for (int i = 0; i < n; i++)
-                x->left[i] += change * (x->b[r * n + i] - (r < J ? x->b[i] : 0.0));
+                x->left[i] += change * (x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0));
             x->weights[r] = new;
             if (r < J)
                 x->weights[0] = larger(x->weights[0] - change, 0.0);
@@ -419,42 +438,51 @@ static void choose_multipliers(Box *x, const int *equation)
             x->weights[r] = r == 0;
 }
 
+/* One variable's part of a model, from the parts of a gradient's form: what bounding.py's "made" does. */
+static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
+{
+    double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;
+    double least = *b - across + p - s, most = *b + across + q + s;
+    *low = (*low > least || isnan(least) ? *low : least) - margin;
+    *high = (*high < most || isnan(most) ? *high : most) + margin;
+    double lost = fabs(*b) + 2 * across + q - p + s;
+    *w = (q - p) / 6 + s, *b = *b + (p + q) / 6;
+    return lost;
+}
+
 static void combine(Box *x)
 {
     int n = x->n, R = x->R;
-    double largest = 0.0, sums = 0.0;
-    x->q_middle = 0.0;
+    double largest = 0.0, lost = 0.0, middle = 0.0, error = 0.0;
     for (int r = 0; r < R; r++)
         if (x->weights[r] != 0) {
             double size = fabs(x->weights[r]);
-            x->q_middle += x->middle[r] * x->weights[r] + x->error[r] * size;
-            largest += fabs(x->middle[r]) * size;
+            middle += x->c[r] * x->weights[r], error += x->s[r] * size;
+            largest += fabs(x->c[r]) * size;
         }
+    x->q_middle = middle + error;
     for (int i = 0; i < n; i++) {
-        double b = 0.0, w = 0.0, low = 0.0, high = 0.0, reach = 0.0;
+        double b = 0.0, s = 0.0, p = 0.0, q = 0.0, low = 0.0, high = 0.0, across = 0.0;
         double *H = x->H + i * n;
         memset(H, 0, (size_t)n * sizeof(double));
         for (int r = 0; r < R; r++) {
             double weight = x->weights[r];
+            int at = r * n + i, up = weight > 0;
             if (weight == 0)
                 continue;
-            int at = r * n + i;
-            b += x->b[at] * weight, w += x->w[at] * fabs(weight);
-            low += (weight > 0 ? x->slope_lo[at] : x->slope_hi[at]) * weight;
-            high += (weight > 0 ? x->slope_hi[at] : x->slope_lo[at]) * weight;
+            b += x->gb[at] * weight, s += x->gs[at] * fabs(weight);
+            p += (up ? x->gp[at] : x->gq[at]) * weight, q += (up ? x->gq[at] : x->gp[at]) * weight;
+            low += (up ? x->slope_lo[at] : x->slope_hi[at]) * weight;
+            high += (up ? x->slope_hi[at] : x->slope_lo[at]) * weight;
             for (int j = 0; j < n; j++)
-                H[j] += x->A[at * n + j] * weight;
+                H[j] += x->gA[at * n + j] * weight;
         }
         for (int j = 0; j < n; j++)
-            reach += fabs(H[j]);
-        reach += w;
-        double margin = 64 * ULP * (fabs(b) + reach) + TINY;
-        low = low > b - reach || isnan(b - reach) ? low : b - reach;
-        high = high < b + reach || isnan(b + reach) ? high : b + reach;
-        x->qb[i] = b, x->qw[i] = w, x->qlo[i] = low - margin, x->qhi[i] = high + margin;
-        sums += fabs(b) + 2 * reach;
+            across += fabs(H[j]);
+        x->qb[i] = b, x->qlo[i] = low, x->qhi[i] = high;
+        lost += finish_model(x->qb + i, x->qw + i, x->qlo + i, x->qhi + i, across, p, q, s);
     }
-    x->q_rounding = 64 * ULP * (largest + sums) + TINY;
+    x->q_rounding = 64 * ULP * (largest + lost) + TINY;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++)
             x->H[i * n + j] = x->H[j * n + i] = 0.5 * (x->H[i * n + j] + x->H[j * n + i]);
@@ -474,20 +502,20 @@ static double quadratic_bound(Box *x)
     double mean = x->q_middle, fixed = x->q_middle, separate = 0.0, shifts = 0.0, plane = 0.0;
     for (int i = 0; i < n; i++) {
         mean += larger(fabs(x->qlo[i]), fabs(x->qhi[i]));
-        x->s[i] = x->qlo[i] >= 0 ? 1.0 : x->qhi[i] <= 0 ? -1.0 : 0.0;
+        x->sign[i] = x->qlo[i] >= 0 ? 1.0 : x->qhi[i] <= 0 ? -1.0 : 0.0;
     }
     for (int i = 0; i < n; i++) {
         double Hs = 0.0;
         for (int j = 0; j < n; j++)
-            Hs += x->H[i * n + j] * x->s[j];
-        fixed += x->qb[i] * x->s[i] + 0.5 * (x->s[i] * Hs) + x->qw[i] * fabs(x->s[i]);
-        x->fb[i] = x->s[i] == 0 ? x->qb[i] + Hs : 0.0;
-        x->fw[i] = x->s[i] == 0 ? x->qw[i] : 0.0;
+            Hs += x->H[i * n + j] * x->sign[j];
+        fixed += x->qb[i] * x->sign[i] + 0.5 * (x->sign[i] * Hs) + x->qw[i] * fabs(x->sign[i]);
+        x->fb[i] = x->sign[i] == 0 ? x->qb[i] + Hs : 0.0;
+        x->fw[i] = x->sign[i] == 0 ? x->qw[i] : 0.0;
     }
     for (int i = 0; i < n; i++) {
         double others = 0.0;
         for (int j = 0; j < n; j++) {
-            x->fH[i * n + j] = x->s[i] == 0 && x->s[j] == 0 ? x->H[i * n + j] : 0.0;
+            x->fH[i * n + j] = x->sign[i] == 0 && x->sign[j] == 0 ? x->H[i * n + j] : 0.0;
             others += i == j ? 0.0 : fabs(x->fH[i * n + j]);
         }
         double diagonal = x->fH[i * n + i], shift = larger(diagonal + others, 0.0);
@@ -549,7 +577,7 @@ static void keep(Box *x, int i, double low, double high, int reason)
         x->e_hi[i] = high, x->why_hi[i] = reason;
 }
 
-/* Bounds on the e_i for which sign times a model reaches a level. H is (n, n); for an expression not yet symmetric. */
+/* Bounds on the e_i for which a model reaches a level; H is that of sign times the model, not yet symmetric. */
 static void reach_quadratic(Box *x, double sign, double middle, const double *b, const double *H, const double *w,
                             double rounding, double level, int reason)
 {
@@ -563,7 +591,7 @@ static void reach_quadratic(Box *x, double sign, double middle, const double *b,
     }
     total += crossed;
     for (int i = 0; i < n; i++) {
-        double diagonal = sign * H[i * n + i], linear = sign * b[i], need = level - (total - x->t[i]);
+        double diagonal = sign * H[i * n + i], linear = b[i], need = level - (total - x->t[i]);
         double size = fabs(need) + fabs(linear) + w[i] + fabs(diagonal) + fabs(total) + fabs(level);
         need = need - (ROOT_SLACK * size + TINY);
         if (!(isfinite(need) && isfinite(linear) && isfinite(w[i]) && isfinite(diagonal)))
@@ -582,10 +610,10 @@ static void reach_affine(Box *x, int r, double sign, double level)
 {
     int n = x->n;
     const double *a = x->a + r * n;
-    double rad = 0.0;
+    double rad = 0.0, most = sign > 0 ? x->q[r] : -x->p[r];
     for (int i = 0; i < n; i++)
         rad += fabs(a[i]);
-    double slack = x->d[r] + (fabs(x->c[r]) + rad + fabs(level)) * (64 * ULP) + TINY;
+    double slack = most + x->s[r] + (fabs(x->c[r]) + rad + most + fabs(level)) * (64 * ULP) + TINY;
     for (int i = 0; i < n; i++) {
         double along = sign * a[i], needed = (level - sign * x->c[r] - slack - (rad - fabs(along))) / along;
         double margin = fabs(needed) * (8 * ULP);
@@ -596,17 +624,19 @@ static void reach_affine(Box *x, int r, double sign, double level)
 static void reach_expression(Box *x, int r, double sign, double level)
 {
     int n = x->n;
-    const double *b = x->b + r * n, *A = x->A + r * n * n, *w = x->w + r * n;
-    double sums = 0.0;
+    const double *A = x->gA + r * n * n;
+    double lost = 0.0;
     reach_affine(x, r, sign, level);
     for (int i = 0; i < n; i++) {
-        double reach = w[i];
+        int at = r * n + i;
+        double p = sign > 0 ? x->gp[at] : -x->gq[at], q = sign > 0 ? x->gq[at] : -x->gp[at], across = 0.0;
+        double low = 0.0, high = 0.0; /* a model's slopes are not needed here */
         for (int j = 0; j < n; j++)
-            reach += fabs(A[i * n + j]);
-        sums += fabs(b[i]) + 2 * reach;
+            across += fabs(A[i * n + j]);
+        x->fb[i] = sign * x->gb[at];
+        lost += finish_model(x->fb + i, x->fw + i, &low, &high, across, p, q, x->gs[at]);
     }
-    reach_quadratic(x, sign, sign * x->middle[r] + x->error[r], b, A, w,
-                    64 * ULP * (fabs(x->middle[r]) + sums) + TINY, level, r);
+    reach_quadratic(x, sign, sign * x->c[r] + x->s[r], x->fb, A, x->fw, 64 * ULP * (fabs(x->c[r]) + lost) + TINY, level, r);
 }
 
 /* Where the results go, for B boxes; the ends and reasons of variable i are at i * B. */
@@ -624,22 +654,22 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
     Py_ssize_t B = report->B;
     double bound = INFINITY, value = INFINITY;
     for (int r = 0; r < R; r++) {
-        double steep = 0.0, middle = x->middle[r];
+        double steep = 0.0, middle = x->c[r], error = x->s[r];
         for (int i = 0; i < n; i++)
             steep += larger(fabs(x->slope_lo[r * n + i]), fabs(x->slope_hi[r * n + i]));
         steep = steep * (1 + 64 * ULP);
-        double spread = (x->error[r] + steep) * (1 + ULP), ends = ULP * fabs(middle);
-        double high = middle + spread + ends, low = middle - spread - ends;
+        double ends = ULP * fabs(middle), spread = (error + steep) * (1 + ULP) + ends;
+        double high = middle + (spread * (1 + ULP) + ends), low = middle - (spread * (1 + ULP) + ends);
         x->high[r] = high < x->hi[r] ? high : x->hi[r];
         x->low[r] = low > x->lo[r] ? low : x->lo[r];
         if (r < J) {
-            defined = defined && x->d[r] < INFINITY;
+            defined = defined && error < INFINITY;
             bound = smaller(bound, x->high[r]);
-            value = smaller(value, middle - x->error[r]);
+            value = smaller(value, middle - error);
         } else {
             if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] && x->high[r] < 0)))
                 impossible = r;
-            if (!(middle + x->error[r] <= 0))
+            if (!(middle + error <= 0))
                 value = -INFINITY;
         }
     }
@@ -717,13 +747,13 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         double left = report->left_upper[end] - report->left_lower[end];
         for (int j = 0; j < n; j++)
             sum += fabs(x->H[j * n + i]);
-        x->s[i] = (LINEAR * fabs(x->qb[i]) + sum) * (left / (width > 0 ? width : 1.0));
-        finite = finite && isfinite(x->s[i]);
-        flat = flat && !(x->s[i] > 0);
+        x->left[i] = (LINEAR * fabs(x->qb[i]) + sum) * (left / (width > 0 ? width : 1.0));
+        finite = finite && isfinite(x->left[i]);
+        flat = flat && !(x->left[i] > 0);
     }
     for (int i = 0; i < n; i++) {
         double left = report->left_upper[i * B + at] - report->left_lower[i * B + at];
-        double score = finite && !flat ? x->s[i] : left / (form->high[i] - form->low[i]);
+        double score = finite && !flat ? x->left[i] : left / (form->high[i] - form->low[i]);
         score = left > 0 ? score : -1.0;
         if (score > best)
             best = score, split = i;
@@ -744,61 +774,58 @@ static double *carve(double **rest, size_t count)
 static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py_ssize_t finish, double threshold,
                           double *memory)
 {
-    size_t n = (size_t)form->n, R = (size_t)form->expressions, head = sizeof(Value) / sizeof(double);
-    Store work = {0}, out = {0}, point = {0};
-    work.stride = out.stride = head + n * LANES, point.stride = head;
+    size_t n = (size_t)form->n, R = (size_t)form->expressions;
+    Store work = {memory, sizeof(Value) / sizeof(double) + n * LANES}, out = work;
     double *rest = memory;
-    work.memory = carve(&rest, (size_t)form->full.registers * work.stride);
-    out.memory = carve(&rest, (size_t)form->full.outputs * out.stride);
-    Store point_work = {carve(&rest, (size_t)form->values.registers * head), head};
-    point.memory = carve(&rest, R * head);
-    Lane *centre = (Lane *)carve(&rest, n * LANES), *radius = (Lane *)carve(&rest, n * LANES);
-    Lane *lower = (Lane *)carve(&rest, n * LANES), *upper = (Lane *)carve(&rest, n * LANES);
-    Lane *t = (Lane *)carve(&rest, n * LANES);
+    carve(&rest, (size_t)form->tape.registers * work.stride);
+    out.memory = carve(&rest, (size_t)form->tape.outputs * out.stride);
+    Lane *lanes[5];
+    for (int i = 0; i < 5; i++)
+        lanes[i] = (Lane *)carve(&rest, n * LANES);
+    Lane *centre = lanes[0], *radius = lanes[1], *lower = lanes[2], *upper = lanes[3];
     Box x = {.n = form->n, .J = form->functions, .R = form->expressions};
-    double **singles[] = {&x.middle, &x.error, &x.c, &x.d, &x.lo, &x.hi, &x.weights, &x.size, &x.high, &x.low};
+    double **singles[] = {&x.c, &x.p, &x.q, &x.s, &x.lo, &x.hi, &x.weights, &x.size, &x.high, &x.low};
     for (size_t i = 0; i < sizeof singles / sizeof *singles; i++)
         *singles[i] = carve(&rest, R);
-    double **rows[] = {&x.a, &x.b, &x.w, &x.slope_lo, &x.slope_hi, &x.grad_lo, &x.grad_hi};
+    double **rows[] = {&x.a, &x.gb, &x.gp, &x.gq, &x.gs, &x.slope_lo, &x.slope_hi, &x.grad_lo, &x.grad_hi};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         *rows[i] = carve(&rest, R * n);
-    double **vectors[] = {&x.left, &x.qb, &x.qw, &x.qlo, &x.qhi, &x.s, &x.fb, &x.fw, &x.diagonal, &x.t, &x.gradient, &x.e_lo, &x.e_hi};
+    double *c, *r, **vectors[] = {&x.left, &x.qb, &x.qw, &x.qlo, &x.qhi, &x.sign, &x.fb, &x.fw, &x.diagonal, &x.t,
+                                  &x.gradient, &x.e_lo, &x.e_hi, &c, &r};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
         *vectors[i] = carve(&rest, n);
-    x.A = carve(&rest, R * n * n), x.H = carve(&rest, n * n), x.fH = carve(&rest, n * n);
+    x.gA = carve(&rest, R * n * n), x.H = carve(&rest, n * n), x.fH = carve(&rest, n * n);
     x.why_lo = (int *)carve(&rest, n), x.why_hi = (int *)carve(&rest, n);
-    double *c = carve(&rest, n), *r = carve(&rest, n);
     for (Py_ssize_t start = begin; start < finish; start += LANES) {
         EACH
         {
             Py_ssize_t at = start + l < finish ? start + l : finish - 1;
-            for (size_t i = 0; i < n; i++) {
-                double lo = report->lower[(Py_ssize_t)i * report->B + at], hi = report->upper[(Py_ssize_t)i * report->B + at];
-                double middle = smaller(larger(0.5 * lo + 0.5 * hi, lo), hi), half = larger(hi - middle, middle - lo);
+            for (size_t i = 0; i < n; i++, at += report->B) {
+                double lo = report->lower[at], hi = report->upper[at], middle = 0.5 * lo + 0.5 * hi;
+                middle = smaller(larger(middle, lo), hi);
+                double half = larger(hi - middle, middle - lo);
                 lower[i][l] = lo, upper[i][l] = hi, centre[i][l] = middle;
                 radius[i][l] = half > 0 ? half * (1 + ULP) + TINY : 0.0;
             }
         }
-        run(&form->full, form->n, work, out, centre, radius, lower, upper, t);
-        run(&form->values, 0, point_work, point, centre, radius, centre, centre, t);
+        run(&form->tape, form->n, work, out, centre, radius, lower, upper, lanes[4]);
         for (int l = 0; l < LANES && start + l < finish; l++) {
             for (size_t i = 0; i < n; i++)
                 c[i] = centre[i][l], r[i] = radius[i][l];
             for (size_t k = 0; k < R; k++) {
-                Value *v = value_of(out, (int)k), *p = value_of(point, (int)k);
-                x.middle[k] = p->c[l], x.error[k] = p->d[l];
-                x.c[k] = v->c[l], x.d[k] = v->d[l], x.lo[k] = v->lo[l], x.hi[k] = v->hi[l];
-                for (size_t i = 0; i < n; i++) {
-                    Value *g = value_of(out, (int)(R + k * n + i));
-                    size_t at = k * n + i;
+                Value *v = value_of(out, (int)k);
+                x.c[k] = v->c[l], x.p[k] = v->p[l], x.q[k] = v->q[l], x.s[k] = v->s[l];
+                x.lo[k] = v->lo[l], x.hi[k] = v->hi[l];
+                for (size_t i = 0, at = k * n; i < n; i++, at++) {
+                    Value *g = value_of(out, (int)(R + at));
                     int wide = r[i] > 0;
                     x.a[at] = terms_of(v)[i][l];
-                    x.b[at] = g->c[l] * r[i];
-                    x.w[at] = wide ? g->d[l] * r[i] : 0.0;
+                    x.gb[at] = wide ? g->c[l] * r[i] : 0.0, x.gs[at] = wide ? g->s[l] * r[i] : 0.0;
+                    x.gp[at] = wide ? g->p[l] * r[i] : 0.0, x.gq[at] = wide ? g->q[l] * r[i] : 0.0;
                     x.grad_lo[at] = g->lo[l], x.grad_hi[at] = g->hi[l];
                     x.slope_lo[at] = wide ? g->lo[l] * r[i] : 0.0, x.slope_hi[at] = wide ? g->hi[l] * r[i] : 0.0;
                     for (size_t j = 0; j < n; j++)
-                        x.A[at * n + j] = terms_of(g)[j][l] * r[i];
+                        x.gA[at * n + j] = terms_of(g)[j][l] * r[i];
                 }
             }
             judge(form, &x, c, r, report, start + l, threshold);
@@ -808,10 +835,9 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
 
 static size_t memory_needed(const Form *form)
 {
-    size_t n = (size_t)form->n, R = (size_t)form->expressions, head = sizeof(Value) / sizeof(double);
-    size_t values = (size_t)(form->full.registers + form->full.outputs) * (head + n * LANES);
-    values += ((size_t)form->values.registers + R) * head + 5 * n * LANES;
-    return values + 10 * R + 7 * R * n + 17 * n + (R + 2) * n * n + 64;
+    size_t n = (size_t)form->n, R = (size_t)form->expressions, stride = sizeof(Value) / sizeof(double) + n * LANES;
+    size_t values = (size_t)(form->tape.registers + form->tape.outputs) * stride + 5 * n * LANES;
+    return values + 10 * R + 9 * R * n + 17 * n + (R + 2) * n * n;
 }
 
 /* ---- Python. ---- */
@@ -847,20 +873,20 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *full, *values, *equation, *depends, *low, *high, *arrays[12];
+    PyObject *tape, *equation, *depends, *low, *high, *arrays[12];
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOO!O!)(OOOOOOOOOOOO)nnnd", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &PyTuple_Type, &full, &PyTuple_Type, &values, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "(iiOOOOO!)(OOOOOOOOOOOO)nnnd", &form.n, &form.functions, &equation, &depends, &low,
+                          &high, &PyTuple_Type, &tape, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
                           &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold))
         return NULL;
-    int good = read_tape(&all, full, &form.full) == 0 && read_tape(&all, values, &form.values) == 0;
-    form.expressions = form.values.outputs;
+    int good = form.n > 0 && form.functions > 0 && read_tape(&all, tape, &form.tape) == 0;
+    form.expressions = good ? form.tape.outputs / (form.n + 1) : 0;
     Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
     good = good && (form.equation = borrow(&all, equation, R, I, 0)) && (form.depends = borrow(&all, depends, R * n, I, 0));
     good = good && (form.low = borrow(&all, low, n, D, 0)) && (form.high = borrow(&all, high, n, D, 0));
@@ -874,7 +900,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && (report.split = borrow(&all, arrays[9], B, I, 1)) && (report.value = borrow(&all, arrays[10], B, D, 1));
     good = good && (report.centre = borrow(&all, arrays[11], n * B, D, 1));
     double *memory = NULL;
-    if (good && (n < 1 || form.functions < 1 || form.full.outputs != R * (n + 1) || begin < 0 || finish > B)) {
+    if (good && (form.functions > R || form.tape.outputs != R * (n + 1) || begin < 0 || finish > B)) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
     }
@@ -895,7 +921,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, full, values), arrays, B, begin, finish, threshold)\n\n"
+     "examine((n, functions, equation, depends, low, high, tape), arrays, B, begin, finish, threshold)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results)."},
     {NULL, NULL, 0, NULL},
 };

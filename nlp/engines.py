@@ -67,8 +67,7 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            _packed(form.full_tape),
-            _packed(form.values_tape),
+            _packed(form.tape),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
