@@ -160,7 +160,8 @@ class _Search:
     def threshold(self) -> float:
         """Boxes are closed when their bound is at most this."""
         if self.above is not None:
-            return float(np.nextafter(-self.above, -math.inf))
+            # Strictly below, and by more than the bound is moved outwards in the end.
+            return float(np.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf))
         return self.incumbent.value + self._allowed()[0] if self.incumbent.x is not None else -math.inf
 
     def _allowed(self) -> tuple[float, bool]:

@@ -1,0 +1,411 @@
+"""Checking a proof without trusting who made it.
+
+The tree of boxes is unfolded from the program's own bounds, so that its leaves cover them by construction; every leaf
+and every face is then a *claim* about one box, and each claim is shown anew with the interval slopes of
+:mod:`screwsynth.nlp.slopes`, halving the box where that is too coarse. Nothing of the search is used, neither its
+arithmetic nor its multipliers; what both share is the case's expressions and CasADi's derivatives of them.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint
+from screwsynth.nlp.slopes import Slope, SlopeArithmetic
+from screwsynth.nlp.standardform import StandardForm, standard_form
+
+#: Boxes that are evaluated at once.
+_BLOCK = 512
+#: A claim may be shown on so many pieces of its box, and no piece is halved more often than that.
+_MOST_PIECES, _MOST_HALVINGS = 20_000, 60
+#: What a sum of a few hundred rounded terms may be off by, in parts of their sizes.
+_SUMS = 1e-13
+#: Called with the number of boxes checked and how many are waiting.
+CheckProgress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A proof that holds.
+
+    Attributes:
+        leaves: claims about boxes in the tree.
+        pieces: boxes that were evaluated to show them.
+        bound: no feasible point of the root has a value above it; -inf when there is none.
+    """
+
+    leaves: int
+    pieces: int
+    bound: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Claim:
+    """What a node says about its box."""
+
+    kind: Node
+    index: int
+    lower: FloatArray
+    upper: FloatArray
+
+
+def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -> Checked:
+    """Show every claim of a proof again.
+
+    Args:
+        proof: the proof.
+        nlp: the program that it is about, built from the case.
+        progress: called now and then.
+
+    Raises:
+        ProofError: the proof is for another program, its tree is not whole, or a claim could not be shown.
+    """
+    if fingerprint(nlp) != proof.graph:
+        raise ProofError("the proof is for other expressions or bounds than this case's")
+    form = standard_form(nlp)
+    bound = -np.inf if proof.bound is None else proof.bound
+    claims = _unfolded(proof.tree, form)
+    checker = _Checker(form, bound)
+    pieces = 0
+    waiting: dict[tuple[Node, int], list[_Claim]] = {}
+    for claim in claims:
+        waiting.setdefault((claim.kind, claim.index), []).append(claim)
+    done = 0
+    for (kind, index), group in waiting.items():
+        for start in range(0, len(group), 4 * _BLOCK):
+            part = group[start : start + 4 * _BLOCK]
+            pieces += checker.show(kind, index, part)
+            done += len(part)
+            if progress is not None:
+                progress(done, len(claims) - done)
+    return Checked(len(claims), pieces, bound)
+
+
+def _unfolded(tree: bytes, form: StandardForm) -> list[_Claim]:
+    """The claims of a tree, whose boxes cover the form's."""
+    n, rows = form.n, range(len(form.functions), len(form.functions) + len(form.rows))
+    claims: list[_Claim] = []
+    waiting = [(np.array(form.lower), np.array(form.upper))]
+    at = 0
+
+    def taken(count: int) -> bytes:
+        nonlocal at
+        at += count
+        if at > len(tree):
+            raise ProofError("the tree ends before every box is closed")
+        return tree[at - count : at]
+
+    def one_of(allowed: Sequence[int] | range, what: str) -> int:
+        (number,) = taken(1)
+        if number not in allowed:
+            raise ProofError(f"the tree names {what} {number}, which does not exist")
+        return int(number)
+
+    def leaf(kind: int, lower: FloatArray, upper: FloatArray) -> None:
+        if kind == Node.BOUNDED:
+            claims.append(_Claim(Node.BOUNDED, 0, lower, upper))
+        elif kind == Node.INFEASIBLE:
+            claims.append(_Claim(Node.INFEASIBLE, one_of(rows, "row"), lower, upper))
+        elif kind == Node.MONOTONE:
+            claims.append(_Claim(Node.MONOTONE, one_of(range(n), "variable"), lower, upper))
+        else:
+            raise ProofError(f"the tree holds {kind} where a reason must stand")
+
+    while waiting:
+        lower, upper = waiting.pop()
+        (kind,) = taken(1)
+        if kind not in (Node.HALF, Node.ABOVE, Node.BELOW, Node.FACE_UPPER, Node.FACE_LOWER):
+            leaf(kind, lower, upper)
+            continue
+        i = one_of(range(n), "variable")
+        if kind == Node.HALF:
+            middle = 0.5 * lower[i] + 0.5 * upper[i]
+            low, high = upper.copy(), lower.copy()
+            low[i] = high[i] = middle
+            waiting += [(high, upper), (lower, low)]
+        elif kind in (Node.FACE_UPPER, Node.FACE_LOWER):
+            claims.append(_Claim(Node(kind), i, lower, upper))
+            face = (lower if kind == Node.FACE_UPPER else upper).copy()
+            face[i] = (upper if kind == Node.FACE_UPPER else lower)[i]
+            waiting.append((face, upper) if kind == Node.FACE_UPPER else (lower, face))
+        else:
+            (value,) = struct.unpack("<d", taken(8))
+            if not np.isfinite(value):
+                raise ProofError("the tree cuts at a number that is not finite")
+            (reason,) = taken(1)
+            inner, outer = (lower.copy(), upper.copy()) if kind == Node.BELOW else (upper.copy(), lower.copy())
+            cut = min(max(value, lower[i]), upper[i])
+            inner[i] = outer[i] = cut
+            if kind == Node.BELOW:
+                leaf(reason, lower, outer)
+                rest = (inner, upper) if value <= upper[i] else None
+            else:
+                leaf(reason, outer, upper)
+                rest = (lower, inner) if value >= lower[i] else None
+            if rest is not None:
+                waiting.append(rest)
+    if at != len(tree):
+        raise ProofError("the tree goes on after every box is closed")
+    return claims
+
+
+class _Checker:
+    """Shows claims about boxes of one form."""
+
+    def __init__(self, form: StandardForm, bound: float) -> None:
+        self._form, self._bound = form, bound
+        self._functions, self._count = len(form.functions), len(form.functions) + len(form.rows)
+        self._equation = [False] * self._functions + [row.is_equation for row in form.rows]
+        outputs = ca.cse([form.expressions, form.jacobian.T])
+        self._arithmetic = SlopeArithmetic(ca.Function("claims", [form.x], outputs))
+
+    def show(self, kind: Node, index: int, claims: list[_Claim]) -> int:
+        """Show claims of one kind, halving boxes until they hold; returns the boxes that it took.
+
+        Raises:
+            ProofError: one could not be shown.
+        """
+        if kind in (Node.FACE_UPPER, Node.FACE_LOWER):
+            self._on_the_root(kind, index, claims)
+        lower = np.stack([claim.lower for claim in claims], axis=1)
+        upper = np.stack([claim.upper for claim in claims], axis=1)
+        owner = np.arange(len(claims))
+        depth = np.zeros(len(claims), dtype=int)
+        used = np.zeros(len(claims), dtype=int)
+        total = 0
+        while owner.size:
+            size = min(_BLOCK, owner.size)
+            part = slice(owner.size - size, owner.size)
+            a, b, of, deep = lower[:, part], upper[:, part], owner[part], depth[part]
+            np.add.at(used, of, 1)
+            total += size
+            held, along = self._holds(kind, index, a, b)
+            left = ~held
+            if left.any() and (used[of[left]].max() > _MOST_PIECES or deep[left].max() >= _MOST_HALVINGS):
+                claim = claims[int(of[left][np.argmax(used[of[left]])])]
+                ends = ", ".join(
+                    f"{name} in [{x:.6g}, {y:.6g}]"
+                    for name, x, y in zip(self._form.names, claim.lower, claim.upper, strict=True)
+                )
+                raise ProofError(f"the reason '{kind.name.lower()} {index}' could not be shown for the box {ends}")
+            a, b, of, deep, along = a[:, left], b[:, left], of[left], deep[left] + 1, along[left]
+            columns = np.arange(of.size)
+            middle = 0.5 * a[along, columns] + 0.5 * b[along, columns]
+            low, high = b.copy(), a.copy()
+            low[along, columns] = high[along, columns] = middle
+            lower = np.concatenate([lower[:, : part.start], a, high], axis=1)
+            upper = np.concatenate([upper[:, : part.start], low, b], axis=1)
+            owner = np.concatenate([owner[: part.start], of, of])
+            depth = np.concatenate([depth[: part.start], deep, deep])
+        return total
+
+    def _on_the_root(self, kind: Node, i: int, claims: list[_Claim]) -> None:
+        for claim in claims:
+            end, whole = (claim.upper, self._form.upper) if kind == Node.FACE_UPPER else (claim.lower, self._form.lower)
+            if end[i] != whole[i]:
+                raise ProofError(f"a box is collapsed on a face of {self._form.names[i]} that is not the case's")
+
+    def _holds(self, kind: Node, index: int, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Whether a claim is shown on boxes (n, N), and the variable to halve where it is not."""
+        values = self._arithmetic(lower, upper)
+        expressions, derivatives = values[: self._count], values[self._count :]
+        n = self._form.n
+        gradients = [derivatives[r * n : (r + 1) * n] for r in range(self._count)]
+        radius = 0.5 * (upper - lower)
+        with np.errstate(all="ignore"):
+            if kind == Node.BOUNDED:
+                held = self._bounded(expressions, gradients, lower, upper)
+                shown = 0
+            elif kind == Node.INFEASIBLE:
+                sign = 1.0 if not self._equation[index] else None
+                held = self._impossible(expressions[index], gradients[index], lower, upper, sign)
+                shown = index
+            else:
+                held, shown = self._rises(kind, index, expressions, gradients, lower, upper), 0
+            if kind in (Node.BOUNDED, Node.INFEASIBLE):
+                # What a slope leaves open, with its own slopes: the curvature counts more than the slope itself.
+                weight = np.array(
+                    [
+                        sum(np.fmax(np.abs(g.S[0][i]), np.abs(g.S[1][i])) * radius[k] for k, g in enumerate(gradients[shown]))
+                        + 0.3 * np.fmax(np.abs(gradients[shown][i].V[0]), np.abs(gradients[shown][i].V[1]))
+                        for i in range(n)
+                    ]
+                )
+            else:
+                slopes = [gradients[r][index].S for r in range(self._functions)]
+                weight = np.max([np.fmax(np.abs(low), np.abs(high)) for low, high in slopes], axis=0)
+            score = weight * radius
+            relative = radius / (self._form.upper - self._form.lower)[:, None]
+            score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
+        return held, np.asarray(score.argmax(axis=0))
+
+    def _bounded(
+        self, expressions: list[Slope], gradients: list[list[Slope]], lower: FloatArray, upper: FloatArray
+    ) -> FloatArray:
+        """Some function is at most the bound, or a weighted sum with the rows is."""
+        J = self._functions
+        least = np.min([expression.V[1] for expression in expressions[:J]], axis=0)
+        held = least <= self._bound
+        if not held.all():
+            weights = self._multipliers(expressions, gradients, upper - lower)
+            held |= self._quadratic(weights, expressions, gradients, lower, upper) <= self._bound
+        # A function without a value has no bound, whatever a sum says.
+        return held & np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0)
+
+    def _impossible(
+        self, row: Slope, gradient: list[Slope], lower: FloatArray, upper: FloatArray, sign: float | None
+    ) -> FloatArray:
+        """The row is positive all over the box; or, for an equation, negative."""
+        held = (row.V[0] > 0) | ((row.V[1] < 0) if sign is None else False)
+        for direction in (-1.0,) if sign is not None else (-1.0, 1.0):
+            weights = np.full((1, lower.shape[1]), direction)
+            held |= self._quadratic(weights, [row], [gradient], lower, upper) < 0
+        return np.asarray(held)
+
+    def _rises(
+        self,
+        kind: Node,
+        i: int,
+        expressions: list[Slope],
+        gradients: list[list[Slope]],
+        lower: FloatArray,
+        upper: FloatArray,
+    ) -> FloatArray:
+        """Every function rises along a variable, in a direction in which no row stops a point, and no face does."""
+        form, J = self._form, self._functions
+        held = np.zeros(lower.shape[1], dtype=bool)
+        sides = {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(kind, (1, -1))
+        for side in sides:
+            rises = np.ones_like(held)
+            for r in range(self._count):
+                low, high = gradients[r][i].V
+                if r < J:
+                    rises &= (low > 0) if side > 0 else (high < 0)
+                elif form.dependence[r][i]:
+                    free = expressions[r].V[1] < 0
+                    if not self._equation[r]:
+                        free |= (high < 0) if side > 0 else (low > 0)
+                    rises &= free
+            if kind == Node.MONOTONE:
+                rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
+            held |= rises
+        return held
+
+    def _multipliers(
+        self, expressions: list[Slope], gradients: list[list[Slope]], width: FloatArray
+    ) -> FloatArray:
+        """(R, N) weights: of functions, not negative with sum 1; of rows, not positive on inequalities.
+
+        Any will do. These make the gradient at the centre small, by projected gradient descent.
+        """
+        J, R = self._functions, self._count
+        G = np.array([[0.5 * (g.C[0] + g.C[1]) for g in row] for row in gradients]) * width
+        G = np.where(np.isfinite(G), G, 0.0)
+        weights = np.zeros((R, width.shape[1]))
+        weights[:J] = 1.0 / J
+        for r in range(J, R):
+            if not self._equation[r]:
+                # A row that is far from binding gets no weight.
+                G[r] = np.where(expressions[r].V[1] < 0, 0.0, G[r])
+        if R == 1:
+            return weights
+        lipschitz = np.maximum((G * G).sum(axis=(0, 1)), 1e-300)
+        for _ in range(200):
+            left = np.einsum("rb,rib->ib", weights, G)
+            step = np.einsum("rib,ib->rb", G, left) / lipschitz
+            weights -= step
+            weights[:J] = _on_simplex(weights[:J])
+            for r in range(J, R):
+                if not self._equation[r]:
+                    weights[r] = np.minimum(weights[r], 0.0)
+        return weights
+
+    def _quadratic(
+        self,
+        weights: FloatArray,
+        expressions: list[Slope],
+        gradients: list[list[Slope]],
+        lower: FloatArray,
+        upper: FloatArray,
+    ) -> FloatArray:
+        """Upper bound over boxes of a weighted sum of expressions, from the slopes of its gradient.
+
+        ``L(c + h) in L(c) + g h + 1/2 h'S h``, with ``g`` and ``S`` in intervals.
+        """
+        n, N = lower.shape
+        r = 0.5 * (upper - lower) * (1 + 1e-14) + np.abs(lower) * 1e-15
+        total, b_low, b_high = np.zeros(N), np.zeros((n, N)), np.zeros((n, N))
+        slope_low, slope_high = np.zeros((n, N)), np.zeros((n, N))
+        S_low, S_high = np.zeros((n, n, N)), np.zeros((n, n, N))
+        sizes = np.zeros(N)
+        for weight, expression, gradient in zip(weights, expressions, gradients, strict=True):
+            used, positive = weight != 0, weight >= 0
+            ends = (expression.C[0], expression.C[1])
+            total += np.where(used, weight * np.where(positive, ends[1], ends[0]), 0.0)
+            sizes += np.where(used, np.abs(weight * ends[0]), 0.0)
+            for i, g in enumerate(gradient):
+                for low, high, source in ((b_low, b_high, g.C), (slope_low, slope_high, g.V), (S_low, S_high, g.S)):
+                    one, other = np.where(positive, source[0], source[1]), np.where(positive, source[1], source[0])
+                    low[i] += np.where(used, weight * one, 0.0)
+                    high[i] += np.where(used, weight * other, 0.0)
+        S_low, S_high = S_low * r[:, None] * r[None], S_high * r[:, None] * r[None]
+        S_low, S_high = 0.5 * (S_low + S_low.swapaxes(0, 1)), 0.5 * (S_high + S_high.swapaxes(0, 1))
+        H, loose = 0.5 * (S_low + S_high), 0.5 * (S_high - S_low).sum(axis=(0, 1))
+        b = 0.5 * (b_low + b_high) * r
+        spread = (0.5 * (b_high - b_low) * r).sum(axis=0)
+        sizes = sizes + np.abs(b).sum(axis=0) + np.abs(S_low).sum(axis=(0, 1)) + np.abs(S_high).sum(axis=(0, 1))
+        fixed = total + 0.5 * loose + spread + _SUMS * sizes
+        across = np.maximum(np.abs(slope_low), np.abs(slope_high)) * r
+        mean = total + across.sum(axis=0) * (1 + _SUMS) + _SUMS * np.abs(total)
+        margin = _SUMS * np.maximum(np.abs(slope_low), np.abs(slope_high))
+        # Where the sum rises along a variable all over the box, it is largest on that face.
+        s = np.where(slope_low - margin > 0, 1.0, np.where(slope_high + margin < 0, -1.0, 0.0))
+        return np.fmin(mean, fixed + _largest(b, H, s))
+
+
+def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
+    """Upper bound of ``b e + 1/2 e'He`` for e in [-1, 1]^n, e_i = s_i where that is not 0.
+
+    Free variables one by one, with what couples them taken absolutely; or by a tangent plane to the concave part that
+    Gershgorin's circles leave, whichever is less.
+    """
+    Hs = np.einsum("ijb,jb->ib", H, s)
+    base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)
+    free = s == 0
+    b, H = np.where(free, b + Hs, 0.0), np.where(free[:, None] & free[None], H, 0.0)
+    diagonal = np.einsum("iib->ib", H)
+    others = np.abs(H).sum(axis=1) - np.abs(diagonal)
+    peak = (diagonal < 0) & (np.abs(b) < -diagonal)
+    alone = np.where(peak, b * b / np.where(peak, -2 * diagonal, 1.0), np.abs(b) + 0.5 * diagonal)
+    separate = (alone + 0.5 * others).sum(axis=0)
+    shift = np.maximum(diagonal + others, 0.0)
+    C = H.copy()
+    for i in range(len(b)):
+        C[i, i] -= shift[i]
+    e = np.zeros_like(b)
+    for _ in range(3):
+        for i in range(len(b)):
+            rest = b[i] + np.einsum("jb,jb->b", C[i], e) - C[i, i] * e[i]
+            step = np.where(C[i, i] < 0, rest / np.where(C[i, i] < 0, -C[i, i], 1.0), np.sign(rest))
+            e[i] = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
+    Ce = np.einsum("ijb,jb->ib", C, e)
+    plane = np.abs(b + Ce).sum(axis=0) - 0.5 * (e * Ce).sum(axis=0) + 0.5 * shift.sum(axis=0)
+    return base + np.fmin(separate, plane)
+
+
+def _on_simplex(weights: FloatArray) -> FloatArray:
+    """The nearest columns that are not negative and sum to 1."""
+    ordered = -np.sort(-weights, axis=0)
+    sums = np.cumsum(ordered, axis=0) - 1
+    counts = np.arange(1, len(weights) + 1)[:, None]
+    last = np.maximum((ordered - sums / counts > 0).sum(axis=0), 1)
+    level = sums[last - 1, np.arange(weights.shape[1])] / last
+    positive = np.maximum(weights - level, 0.0)
+    return positive / positive.sum(axis=0)

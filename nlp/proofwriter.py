@@ -1,0 +1,84 @@
+"""Taking down a search as a proof: see :mod:`screwsynth.nlp.proof` for what is written."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from screwsynth.nlp.bounding import Examined, Verdict
+from screwsynth.nlp.openboxes import Boxes
+from screwsynth.nlp.proof import Node, ProofError
+
+if TYPE_CHECKING:
+    from screwsynth.models import FloatArray
+
+
+class ProofWriter:
+    """Takes down a search; :class:`screwsynth.nlp.certify.Recorder`.
+
+    Args:
+        functions: how many functions the least of which is maximised.
+    """
+
+    def __init__(self, functions: int) -> None:
+        self._functions = functions
+        self._nodes: dict[int, tuple[bytes, int]] = {}
+
+    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: FloatArray) -> None:
+        """A block of examined boxes: the bytes of each, up to where its children's follow."""
+        for k, place in enumerate(boxes.place.tolist()):
+            text = self._written(found, k, float(cut[k]), boxes.upper[:, k])
+            if text is not None:
+                self._nodes[place] = (text, int(first_child[k]))
+
+    def tree(self) -> bytes:
+        """The whole tree.
+
+        Raises:
+            ProofError: a box was not closed.
+        """
+        parts: list[bytes] = []
+        waiting = [0]
+        while waiting:
+            place = waiting.pop()
+            if place not in self._nodes:
+                raise ProofError("the search did not close every box, so there is no proof to write")
+            text, child = self._nodes[place]
+            parts.append(text)
+            if child >= 0:
+                waiting += [child + 1, child]
+        return b"".join(parts)
+
+    def _written(self, found: Examined, k: int, cut: float, upper: FloatArray) -> bytes | None:
+        """The bytes of one box, or None where it was not closed. Each contraction closes what it takes off."""
+        verdict, reason = int(found.verdict[k]), int(found.reason[k])
+        if verdict == Verdict.BOUNDED:
+            return bytes([Node.BOUNDED])
+        if verdict == Verdict.INFEASIBLE:
+            return bytes([Node.INFEASIBLE, reason])
+        if verdict == Verdict.MONOTONE:
+            return bytes([Node.MONOTONE, reason])
+        if verdict == Verdict.OPEN and not np.isfinite(cut):
+            return None
+        parts = []
+        for i in [reason] if verdict == Verdict.EMPTIED else range(len(upper)):
+            below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
+            lower_end, upper_end = float(found.lower[i, k]), float(found.upper[i, k])
+            if -1 in (below, above):
+                parts.append(bytes([Node.FACE_UPPER if below == -1 else Node.FACE_LOWER, i]))
+                continue
+            if below >= 0:
+                parts.append(bytes([Node.BELOW, i]) + struct.pack("<d", lower_end) + self._leaf(below))
+                if lower_end > upper[i]:
+                    break
+            if above >= 0:
+                parts.append(bytes([Node.ABOVE, i]) + struct.pack("<d", upper_end) + self._leaf(above))
+        if verdict == Verdict.OPEN:
+            parts.append(bytes([Node.HALF, int(found.split[k])]))
+        return b"".join(parts)
+
+    def _leaf(self, why: int) -> bytes:
+        """The reason of a cut, by the number of the expression that decided it."""
+        return bytes([Node.BOUNDED]) if why < self._functions else bytes([Node.INFEASIBLE, why])
