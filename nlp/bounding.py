@@ -1,14 +1,15 @@
 """What enclosures say about boxes: bounds, conditions that cannot hold, monotone directions, contraction, where to cut.
 
 For each box: an upper bound of what is maximised over the feasible part of the box. With ``h = r e``, ``|e_i| <= 1``,
-the affine forms of a gradient, ``grad L in G + A e +- delta``, integrated along the ray from the centre, give
+the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the ray from the centre, give
 
     L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
-    b_i = r_i G_i,   H = sym(r_i A_ij),   w_i = r_i delta_i,
+    b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
 
-a quadratic model with a remainder of third order, without second derivatives. ``L = sum_j mu_j phi_j - sum_k lambda_k
-h_k`` with ``mu`` on the simplex and ``lambda_k >= 0`` on inequalities is at least ``min phi`` wherever the rows hold, so
-that its bound holds there, whatever the multipliers are. They are chosen to make the gradient small at the centre.
+a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
+``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
+rows hold, so that its bound holds there, whatever the multipliers are. They are chosen to make the gradient small at
+the centre.
 
 This is the reference; ``_bounds.c`` does the same. Every formula is explained in ``docs/certificate.md``.
 """
@@ -19,8 +20,10 @@ import enum
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import casadi as ca
 import numpy as np
 
+from screwsynth.nlp import instructions
 from screwsynth.nlp.enclosure import TINY, ULP, Forms, enclose, midpoints
 from screwsynth.nlp.standardform import StandardForm
 
@@ -95,6 +98,15 @@ class _Model:
         return _Quadratic.made(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size)
 
 
+def search_tape(form: StandardForm) -> instructions.Tape:
+    """The instructions of a form's R expressions and then of their derivatives, row by row.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+    return instructions.lower(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+
+
 class NumpyEngine:
     """The reference engine: everything on arrays with the boxes last.
 
@@ -108,6 +120,7 @@ class NumpyEngine:
 
     def __init__(self, form: StandardForm) -> None:
         self.form = form
+        self._tape = search_tape(form)
         self.functions = len(form.functions)
         self.equation = np.array([False] * self.functions + [row.is_equation for row in form.rows])
         self.depends = np.array(form.dependence, dtype=bool)
@@ -119,7 +132,8 @@ class NumpyEngine:
         """Examine boxes against a value that their bounds must not exceed.
 
         Args:
-            lower, upper: (n, B) ends.
+            lower: (n, B) ends.
+            upper: (n, B) ends.
             threshold: boxes whose bound is at most this are closed.
         """
         with np.errstate(all="ignore"):
@@ -128,7 +142,7 @@ class NumpyEngine:
     def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
         J = self.functions
         centre, radius = midpoints(lower, upper)
-        model = self._model(lower, upper, centre, radius)
+        model = self._model(lower, upper, radius)
         # Ranges of the expressions: of their forms, and by the mean value theorem.
         steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
         middle, error = model.value.c, model.value.s
@@ -163,9 +177,9 @@ class NumpyEngine:
             verdict, reason, bound, lo, hi, cut_lower, cut_upper, self._split(L, lower, upper, lo, hi), value, centre
         )
 
-    def _model(self, lower: FloatArray, upper: FloatArray, centre: FloatArray, radius: FloatArray) -> _Model:
+    def _model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> _Model:
         n, R = self.form.n, len(self.equation)
-        box = enclose(self.form.tape, lower, upper)
+        box = enclose(self._tape, lower, upper)
         shape = (R, n, lower.shape[1])
         r = radius[None]
 
@@ -259,7 +273,7 @@ class NumpyEngine:
         # The plane at t: b t + 1/2 t'Ct + gradient (e - t), where gradient = b + C t.
         Ct = np.einsum("ijb,jb->ib", H, t) + (diagonal - np.einsum("iib->ib", H)) * t
         gradient = b + Ct
-        return -0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0)
+        return np.asarray(-0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0))
 
     def _monotone(
         self,
@@ -357,7 +371,7 @@ class NumpyEngine:
         # Where nothing changes, the longest side.
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(hi > lo)] = -1.0
-        return score.argmax(axis=0).astype(np.int32)
+        return np.asarray(score.argmax(axis=0), dtype=np.int32)
 
 
 #: What the linear part of the Lagrangian counts for beside the curved part when a box is cut.

@@ -90,7 +90,7 @@ class Certificate:
             return f"proved: F is above {self.above:.10g} on the whole box within the limits{best}, {SCOPE}"
         if not math.isfinite(self.bound):
             return f"nothing is proved: {self.reason}{best}"
-        what = f"no point of the box within the limits has F {word} than {self.bound:.10g}{best}{beaten}"
+        what = f"no point of the box within the limits has F {word} than {self.bound + 0.0:.10g}{best}{beaten}"
         if self.status is CertificateStatus.PROVED:
             return f"proved: {what}, {SCOPE}"
         return f"incomplete ({self.reason}), but proved: {what}, {SCOPE}"

@@ -14,7 +14,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,11 +23,15 @@ from screwsynth.nlp.bounding import Examined, Verdict
 from screwsynth.nlp.case import Sense
 from screwsynth.nlp.certificate import Certificate, CertificateStatus
 from screwsynth.nlp.engines import Engine, engine_for
+from screwsynth.nlp.evaluation import ZERO_F
 from screwsynth.nlp.incumbent import Incumbent, IncumbentError
 from screwsynth.nlp.kkt import FEASIBLE, linearise
 from screwsynth.nlp.openboxes import Boxes, OpenBoxes
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.standardform import StandardForm, standard_form
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: The gap that is asked for when none is given: a ten-thousandth.
 GAP = 1e-4
@@ -52,7 +56,7 @@ CertifyProgress = Callable[[float, float, float, int, int], None]
 class Recorder(Protocol):
     """Takes down what became of every box: see :mod:`screwsynth.nlp.proof`."""
 
-    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: FloatArray) -> None:
+    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
         """A block of examined boxes.
 
         Args:
@@ -125,7 +129,7 @@ def _fixed(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
         status = CertificateStatus.INFEASIBLE
     elif not math.isfinite(F):
         status, reason = CertificateStatus.INCOMPLETE, "F has no finite value at the one point there is"
-    elif above is not None and F <= above:
+    elif above is not None and above >= F:
         status, reason = CertificateStatus.REFUSED, f"F is {F:.10g} at the one point there is, not above {above:.10g}"
     known = F if math.isfinite(F) else math.nan
     return Certificate(
@@ -161,8 +165,14 @@ class _Search:
         """Boxes are closed when their bound is at most this."""
         if self.above is not None:
             # Strictly below, and by more than the bound is moved outwards in the end.
-            return float(np.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf))
+            return math.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf)
         return self.incumbent.value + self._allowed()[0] if self.incumbent.x is not None else -math.inf
+
+    def _refuted(self) -> bool:
+        """Whether a point is known where F is not above the value; an F that is rounding error counts as 0."""
+        if self.above is None or self.incumbent.x is None:
+            return False
+        return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_scale
 
     def _allowed(self) -> tuple[float, bool]:
         """The absolute gap, and whether it is a part of the incumbent."""
@@ -172,9 +182,9 @@ class _Search:
     @property
     def bound(self) -> float:
         """Upper bound of the maximum as it stands."""
-        waiting = [boxes.bound.max() for boxes in self.aside]
+        waiting = [float(boxes.bound.max()) for boxes in self.aside]
         if self.taken is not None:
-            waiting.append(self.taken.bound.max())
+            waiting.append(float(self.taken.bound.max()))
         known = max(self.proved, self.opened.bound, *waiting, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
@@ -183,7 +193,7 @@ class _Search:
         reported = -math.inf
         turn = 0
         while self.opened.count:
-            if self.above is not None and self.incumbent.x is not None and self.incumbent.value >= -self.above:
+            if self._refuted():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began
             if time_limit is not None and seconds >= time_limit:
@@ -278,11 +288,10 @@ class _Search:
         left = self.opened.count + sum(boxes.count for boxes in self.aside)
         left += 0 if self.taken is None else self.taken.count
         known = self.incumbent.x is not None
-        if self.above is not None and known and self.incumbent.value >= -self.above:
+        if self._refuted():
             status = CertificateStatus.REFUSED
             at = ", ".join(
-                f"{name} = {value:.6g}"
-                for name, value in zip(self.form.names, self.incumbent.x, strict=True)  # type: ignore[arg-type]
+                f"{name} = {value:.6g}" for name, value in zip(self.form.names, self.incumbent.full(), strict=False)
             )
             reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
         elif left:

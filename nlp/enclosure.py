@@ -77,7 +77,8 @@ def enclose(tape: Tape, lower: FloatArray, upper: FloatArray) -> Forms:
 
     Args:
         tape: the instructions.
-        lower, upper: (n, B) ends of the boxes.
+        lower: (n, B) ends of the boxes.
+        upper: (n, B) ends of the boxes.
     """
     centre, radius = midpoints(lower, upper)
     with np.errstate(all="ignore"):
@@ -129,7 +130,7 @@ class _Machine:
                 self._settle(to, self._step(op, a, b, k, span), span)
         return out
 
-    def _step(self, op: int, x: int, y: int, k: float, span: slice) -> _Result:
+    def _step(self, op: int, x: int, y: int, k: float, span: slice) -> _Result:  # noqa: PLR0911 - one for each rule
         if op in (Op.ADD, Op.SUB):
             return self._sum(op, x, y, span)
         if op == Op.MUL:
@@ -249,9 +250,7 @@ class _Machine:
         sn = w.s[x] + steepness * w.s[y] + (self.slack * whole + TINY)
         rn = np.abs(an).sum(axis=0)
         nothing = np.zeros_like(k)
-        p, q, big, other = self._second_order(
-            (nothing, an, rn, pn, qn), (inverse, -steep * w.a[y, span], ri, pi, qi)
-        )
+        p, q, big, other = self._second_order((nothing, an, rn, pn, qn), (inverse, -steep * w.a[y, span], ri, pi, qi))
         s = big * si + other * sn + sn * si + (self.slack * (np.abs(k) + big * other) + TINY)
         one, two = sign / far, sign / near
         ends = _widened(np.minimum(one, two), np.maximum(one, two), TINY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from screwsynth.nlp.bounding import Examined, NumpyEngine
+from screwsynth.nlp.bounding import Examined, NumpyEngine, search_tape
 from screwsynth.nlp.instructions import Tape
 from screwsynth.nlp.standardform import StandardForm
 
@@ -67,7 +68,7 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            _packed(form.tape),
+            _packed(search_tape(form)),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
@@ -88,7 +89,7 @@ class KernelEngine:
         if pieces == 1 or self._pool is None:
             part(0, count)
         else:
-            for each in [self._pool.submit(part, *edge) for edge in zip(edges, edges[1:], strict=False)]:
+            for each in [self._pool.submit(part, *edge) for edge in itertools.pairwise(edges)]:
                 each.result()
         return Examined(*found)
 

@@ -1,8 +1,8 @@
 """A function's expression graph as a flat list of instructions, which any arithmetic can run.
 
-CasADi lists the operations of an ``SX`` function one by one. :func:`lower` writes that list in a dozen operations, with
-exact identities of real numbers for the others (``tan = sin / cos``, ``2 x = x * 2``, a whole power as products), so that
-an arithmetic needs rules for these only. What the list cannot say is refused by name.
+CasADi lists the operations of an ``SX`` function one by one. :func:`lower` writes that list in a dozen operations,
+with exact identities of real numbers for the others (``tan = sin / cos``, ``2 x = x * 2``, a whole power as products),
+so that an arithmetic needs rules for these only. What the list cannot say is refused by name.
 """
 
 from __future__ import annotations
@@ -143,8 +143,9 @@ class _Writer:
         columns = list(zip(*self.rows, strict=True))
         whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 2, 3, 5, 6)]
         constants = np.array(columns[4], dtype=np.float64)
-        for column in (*whole, constants):
+        for column in whole:
             column.setflags(write=False)
+        constants.setflags(write=False)
         op, to, a, b, first, last = whole
         return Tape(op, to, a, b, constants, first, last, self.inputs, outputs, self.spare)
 

@@ -9,7 +9,7 @@ arithmetic nor its multipliers; what both share is the case's expressions and Ca
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -89,71 +89,87 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
 
 
 def _unfolded(tree: bytes, form: StandardForm) -> list[_Claim]:
-    """The claims of a tree, whose boxes cover the form's."""
-    n, rows = form.n, range(len(form.functions), len(form.functions) + len(form.rows))
-    claims: list[_Claim] = []
+    """The claims of a tree, whose boxes cover the form's.
+
+    Raises:
+        ProofError: it is not whole.
+    """
+    reader = _Reader(tree, form)
     waiting = [(np.array(form.lower), np.array(form.upper))]
-    at = 0
+    while waiting:
+        waiting += reader.node(*waiting.pop())
+    if reader.at != len(tree):
+        raise ProofError("the tree goes on after every box is closed")
+    return reader.claims
 
-    def taken(count: int) -> bytes:
-        nonlocal at
-        at += count
-        if at > len(tree):
+
+class _Reader:
+    """Reads nodes from a tree's bytes, and collects what they claim."""
+
+    def __init__(self, tree: bytes, form: StandardForm) -> None:
+        self._tree, self._form = tree, form
+        self._rows = range(len(form.functions), len(form.functions) + len(form.rows))
+        self.at = 0
+        self.claims: list[_Claim] = []
+
+    def _taken(self, count: int) -> bytes:
+        self.at += count
+        if self.at > len(self._tree):
             raise ProofError("the tree ends before every box is closed")
-        return tree[at - count : at]
+        return self._tree[self.at - count : self.at]
 
-    def one_of(allowed: Sequence[int] | range, what: str) -> int:
-        (number,) = taken(1)
+    def _one_of(self, allowed: range, what: str) -> int:
+        (number,) = self._taken(1)
         if number not in allowed:
             raise ProofError(f"the tree names {what} {number}, which does not exist")
         return int(number)
 
-    def leaf(kind: int, lower: FloatArray, upper: FloatArray) -> None:
-        if kind == Node.BOUNDED:
-            claims.append(_Claim(Node.BOUNDED, 0, lower, upper))
-        elif kind == Node.INFEASIBLE:
-            claims.append(_Claim(Node.INFEASIBLE, one_of(rows, "row"), lower, upper))
-        elif kind == Node.MONOTONE:
-            claims.append(_Claim(Node.MONOTONE, one_of(range(n), "variable"), lower, upper))
-        else:
-            raise ProofError(f"the tree holds {kind} where a reason must stand")
-
-    while waiting:
-        lower, upper = waiting.pop()
-        (kind,) = taken(1)
+    def node(self, lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Read the node of a box; returns the boxes of the nodes that follow, the next one last."""
+        (kind,) = self._taken(1)
         if kind not in (Node.HALF, Node.ABOVE, Node.BELOW, Node.FACE_UPPER, Node.FACE_LOWER):
-            leaf(kind, lower, upper)
-            continue
-        i = one_of(range(n), "variable")
+            self._leaf(kind, lower, upper)
+            return []
+        i = self._one_of(range(self._form.n), "variable")
         if kind == Node.HALF:
             middle = 0.5 * lower[i] + 0.5 * upper[i]
-            low, high = upper.copy(), lower.copy()
-            low[i] = high[i] = middle
-            waiting += [(high, upper), (lower, low)]
-        elif kind in (Node.FACE_UPPER, Node.FACE_LOWER):
-            claims.append(_Claim(Node(kind), i, lower, upper))
-            face = (lower if kind == Node.FACE_UPPER else upper).copy()
-            face[i] = (upper if kind == Node.FACE_UPPER else lower)[i]
-            waiting.append((face, upper) if kind == Node.FACE_UPPER else (lower, face))
-        else:
-            (value,) = struct.unpack("<d", taken(8))
-            if not np.isfinite(value):
-                raise ProofError("the tree cuts at a number that is not finite")
-            (reason,) = taken(1)
-            inner, outer = (lower.copy(), upper.copy()) if kind == Node.BELOW else (upper.copy(), lower.copy())
-            cut = min(max(value, lower[i]), upper[i])
-            inner[i] = outer[i] = cut
-            if kind == Node.BELOW:
-                leaf(reason, lower, outer)
-                rest = (inner, upper) if value <= upper[i] else None
-            else:
-                leaf(reason, outer, upper)
-                rest = (lower, inner) if value >= lower[i] else None
-            if rest is not None:
-                waiting.append(rest)
-    if at != len(tree):
-        raise ProofError("the tree goes on after every box is closed")
-    return claims
+            return [(_with(lower, i, middle), upper), (lower, _with(upper, i, middle))]
+        if kind == Node.FACE_UPPER:
+            self.claims.append(_Claim(Node.FACE_UPPER, i, lower, upper))
+            return [(_with(lower, i, upper[i]), upper)]
+        if kind == Node.FACE_LOWER:
+            self.claims.append(_Claim(Node.FACE_LOWER, i, lower, upper))
+            return [(lower, _with(upper, i, lower[i]))]
+        return self._cut(kind, i, lower, upper)
+
+    def _cut(self, kind: int, i: int, lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """A part is closed; what is left follows, unless nothing is."""
+        (value,) = struct.unpack("<d", self._taken(8))
+        if not np.isfinite(value):
+            raise ProofError("the tree cuts at a number that is not finite")
+        (reason,) = self._taken(1)
+        cut = min(max(value, lower[i]), upper[i])
+        if kind == Node.BELOW:
+            self._leaf(reason, lower, _with(upper, i, cut))
+            return [(_with(lower, i, cut), upper)] if value <= upper[i] else []
+        self._leaf(reason, _with(lower, i, cut), upper)
+        return [(lower, _with(upper, i, cut))] if value >= lower[i] else []
+
+    def _leaf(self, kind: int, lower: FloatArray, upper: FloatArray) -> None:
+        index = 0
+        if kind == Node.INFEASIBLE:
+            index = self._one_of(self._rows, "row")
+        elif kind == Node.MONOTONE:
+            index = self._one_of(range(self._form.n), "variable")
+        elif kind != Node.BOUNDED:
+            raise ProofError(f"the tree holds {kind} where a reason must stand")
+        self.claims.append(_Claim(Node(kind), index, lower, upper))
+
+
+def _with(ends: FloatArray, i: int, value: float) -> FloatArray:
+    changed = ends.copy()
+    changed[i] = value
+    return changed
 
 
 class _Checker:
@@ -187,7 +203,7 @@ class _Checker:
             np.add.at(used, of, 1)
             total += size
             held, along = self._holds(kind, index, a, b)
-            left = ~held
+            left = np.logical_not(held)
             if left.any() and (used[of[left]].max() > _MOST_PIECES or deep[left].max() >= _MOST_HALVINGS):
                 claim = claims[int(of[left][np.argmax(used[of[left]])])]
                 ends = ", ".join(
@@ -233,7 +249,10 @@ class _Checker:
                 # What a slope leaves open, with its own slopes: the curvature counts more than the slope itself.
                 weight = np.array(
                     [
-                        sum(np.fmax(np.abs(g.S[0][i]), np.abs(g.S[1][i])) * radius[k] for k, g in enumerate(gradients[shown]))
+                        sum(
+                            np.fmax(np.abs(g.S[0][i]), np.abs(g.S[1][i])) * radius[k]
+                            for k, g in enumerate(gradients[shown])
+                        )
                         + 0.3 * np.fmax(np.abs(gradients[shown][i].V[0]), np.abs(gradients[shown][i].V[1]))
                         for i in range(n)
                     ]
@@ -257,7 +276,7 @@ class _Checker:
             weights = self._multipliers(expressions, gradients, upper - lower)
             held |= self._quadratic(weights, expressions, gradients, lower, upper) <= self._bound
         # A function without a value has no bound, whatever a sum says.
-        return held & np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0)
+        return np.asarray(held & np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0))
 
     def _impossible(
         self, row: Slope, gradient: list[Slope], lower: FloatArray, upper: FloatArray, sign: float | None
@@ -298,9 +317,7 @@ class _Checker:
             held |= rises
         return held
 
-    def _multipliers(
-        self, expressions: list[Slope], gradients: list[list[Slope]], width: FloatArray
-    ) -> FloatArray:
+    def _multipliers(self, expressions: list[Slope], gradients: list[list[Slope]], width: FloatArray) -> FloatArray:
         """(R, N) weights: of functions, not negative with sum 1; of rows, not positive on inequalities.
 
         Any will do. These make the gradient at the centre small, by projected gradient descent.
@@ -367,7 +384,7 @@ class _Checker:
         margin = _SUMS * np.maximum(np.abs(slope_low), np.abs(slope_high))
         # Where the sum rises along a variable all over the box, it is largest on that face.
         s = np.where(slope_low - margin > 0, 1.0, np.where(slope_high + margin < 0, -1.0, 0.0))
-        return np.fmin(mean, fixed + _largest(b, H, s))
+        return np.asarray(np.fmin(mean, fixed + _largest(b, H, s)))
 
 
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
@@ -397,7 +414,7 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
             e[i] = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
     Ce = np.einsum("ijb,jb->ib", C, e)
     plane = np.abs(b + Ce).sum(axis=0) - 0.5 * (e * Ce).sum(axis=0) + 0.5 * shift.sum(axis=0)
-    return base + np.fmin(separate, plane)
+    return np.asarray(base + np.fmin(separate, plane))
 
 
 def _on_simplex(weights: FloatArray) -> FloatArray:
@@ -408,4 +425,4 @@ def _on_simplex(weights: FloatArray) -> FloatArray:
     last = np.maximum((ordered - sums / counts > 0).sum(axis=0), 1)
     level = sums[last - 1, np.arange(weights.shape[1])] / last
     positive = np.maximum(weights - level, 0.0)
-    return positive / positive.sum(axis=0)
+    return np.asarray(positive / positive.sum(axis=0))

@@ -12,6 +12,8 @@ from screwsynth.nlp.openboxes import Boxes
 from screwsynth.nlp.proof import Node, ProofError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from screwsynth.models import FloatArray
 
 
@@ -26,7 +28,7 @@ class ProofWriter:
         self._functions = functions
         self._nodes: dict[int, tuple[bytes, int]] = {}
 
-    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: FloatArray) -> None:
+    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
         """A block of examined boxes: the bytes of each, up to where its children's follow."""
         for k, place in enumerate(boxes.place.tolist()):
             text = self._written(found, k, float(cut[k]), boxes.upper[:, k])
@@ -62,22 +64,25 @@ class ProofWriter:
             return bytes([Node.MONOTONE, reason])
         if verdict == Verdict.OPEN and not np.isfinite(cut):
             return None
-        parts = []
-        for i in [reason] if verdict == Verdict.EMPTIED else range(len(upper)):
-            below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
-            lower_end, upper_end = float(found.lower[i, k]), float(found.upper[i, k])
-            if -1 in (below, above):
-                parts.append(bytes([Node.FACE_UPPER if below == -1 else Node.FACE_LOWER, i]))
-                continue
-            if below >= 0:
-                parts.append(bytes([Node.BELOW, i]) + struct.pack("<d", lower_end) + self._leaf(below))
-                if lower_end > upper[i]:
-                    break
-            if above >= 0:
-                parts.append(bytes([Node.ABOVE, i]) + struct.pack("<d", upper_end) + self._leaf(above))
+        only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
+        parts = [part for i in only for part in self._moved(found, k, i, float(upper[i]))]
         if verdict == Verdict.OPEN:
             parts.append(bytes([Node.HALF, int(found.split[k])]))
         return b"".join(parts)
+
+    def _moved(self, found: Examined, k: int, i: int, upper: float) -> list[bytes]:
+        """What became of the ends of one variable."""
+        below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
+        if -1 in (below, above):
+            return [bytes([Node.FACE_UPPER if below == -1 else Node.FACE_LOWER, i])]
+        parts = []
+        if below >= 0:
+            parts.append(bytes([Node.BELOW, i]) + struct.pack("<d", float(found.lower[i, k])) + self._leaf(below))
+            if found.lower[i, k] > upper:
+                return parts
+        if above >= 0:
+            parts.append(bytes([Node.ABOVE, i]) + struct.pack("<d", float(found.upper[i, k])) + self._leaf(above))
+        return parts
 
     def _leaf(self, why: int) -> bytes:
         """The reason of a cut, by the number of the expression that decided it."""

@@ -143,7 +143,7 @@ class SlopeArithmetic:
                     work[target[0]] = boxes.constant(constant)
                 else:
                     operands = [work[each] for each in source]
-                    work[target[0]] = (_UNARY[op] if op in _UNARY else _BINARY[op])(boxes, *operands)  # type: ignore[operator, arg-type]
+                    work[target[0]] = (_UNARY[op] if op in _UNARY else _BINARY[op])(boxes, *operands)  # type: ignore[arg-type]
         return [each for each in results if each is not None]
 
 
@@ -188,14 +188,14 @@ class _Boxes:
         return self.made(_mul(u.V, inverse), ratio, _mul(_sub(u.S, _mul(ratio, v.S)), inverse))
 
     def scale(self, u: Slope, by: float) -> Slope:
-        factor = (np.float64(by), np.float64(by))
+        factor = (np.array(by), np.array(by))
         return Slope(_mul(u.V, factor), _mul(u.C, factor), _mul(u.S, factor))
 
     def square(self, u: Slope) -> Slope:
         return self.made(_square(u.V), _square(u.C), _mul(_add(u.V, u.C), u.S))
 
     def sqrt(self, u: Slope) -> Slope:
-        """``sqrt(u) - sqrt(c) = (u - c) / (sqrt(u) + sqrt(c))``."""
+        """By ``sqrt(u) - sqrt(c) = (u - c) / (sqrt(u) + sqrt(c))``."""
         V, C = _sqrt(u.V), _sqrt(u.C)
         return self.made(V, C, _mul(u.S, _inverse(_add(V, C))))
 
@@ -208,7 +208,7 @@ class _Boxes:
         return self.constant(1.0)
 
     def atan(self, u: Slope) -> Slope:
-        return self.smooth(u, _ATAN, lambda x: _inverse(_add(_square(x), (np.float64(1.0), np.float64(1.0)))))
+        return self.smooth(u, _ATAN, lambda x: _inverse(_add(_square(x), (np.array(1.0), np.array(1.0)))))
 
     def power(self, u: Slope, exponent: Slope) -> Slope:
         """A constant whole or half power."""

@@ -18,7 +18,6 @@ import numpy as np
 from casadi import SX
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.instructions import Tape, lower
 from screwsynth.nlp.program import Nlp
 
 #: The variable and the constraints' names of :func:`screwsynth.nlp.formulation.formulate_worst`.
@@ -83,11 +82,6 @@ class StandardForm:
         pattern = ca.jacobian(self.expressions, self.x).sparsity()
         return [[bool(pattern.has_nz(r, i)) for i in range(self.n)] for r in range(self.expressions.numel())]
 
-    @cached_property
-    def tape(self) -> Tape:
-        """Results: the R expressions, then the derivatives of the first by x, of the second, and so on."""
-        return lower(ca.Function("full", [self.x], ca.cse([self.expressions, self.jacobian.T])))
-
     def level_of(self, x: FloatArray) -> float:
         """The value that is maximised at a point (n,), as computed."""
         values = np.array(self._compiled(x)).ravel()
@@ -106,11 +100,7 @@ class StandardForm:
 
 
 def standard_form(nlp: Nlp) -> StandardForm:
-    """The standard form of a program with at least one variable.
-
-    Raises:
-        UncoveredError: when a tape is asked for that holds an operation without a rule.
-    """
+    """The standard form of a program with at least one variable."""
     program = nlp.program
     names = [variable.name for variable in program.variables]
     x = SX.sym("x", nlp.n)
@@ -148,12 +138,12 @@ def _own_function(expression: SX, level: SX, sign: float) -> SX:
 
 def _rows(constraints: Sequence[tuple[str, SX, float, float]]) -> list[Row]:
     rows = []
-    for name, expression, lower, upper in constraints:
-        if lower == upper:
-            rows.append(Row(name, expression - lower, is_equation=True))
+    for name, expression, low, high in constraints:
+        if low == high:
+            rows.append(Row(name, expression - low, is_equation=True))
             continue
-        if np.isfinite(upper):
-            rows.append(Row(name, expression - upper, is_equation=False))
-        if np.isfinite(lower):
-            rows.append(Row(name, lower - expression, is_equation=False))
+        if np.isfinite(high):
+            rows.append(Row(name, expression - high, is_equation=False))
+        if np.isfinite(low):
+            rows.append(Row(name, low - expression, is_equation=False))
     return rows
