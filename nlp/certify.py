@@ -166,7 +166,10 @@ class _Search:
         if self.above is not None:
             # Strictly below, and by more than the bound is moved outwards in the end.
             return math.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf)
-        return self.incumbent.value + self._allowed()[0] if self.incumbent.x is not None else -math.inf
+        if self.incumbent.x is None:
+            return -math.inf
+        # Less what the bound is moved outwards by in the end, so that the gap holds with it.
+        return self.incumbent.value + self._allowed()[0] - 2 * _FOLDED * abs(self.incumbent.value)
 
     def _refuted(self) -> bool:
         """Whether a point is known where F is not above the value; an F that is rounding error counts as 0."""

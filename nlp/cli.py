@@ -126,8 +126,8 @@ def certify(
     from screwsynth.nlp.files import write_text
     from screwsynth.nlp.result import certified_of
 
-    if not 1e-12 <= gap < 1:
-        raise InputError(f"--gap {gap:g}: must be at least 1e-12 and below 1")
+    if not 1e-10 <= gap < 1:
+        raise InputError(f"--gap {gap:g}: must be at least 1e-10 and below 1")
     if time is not None and not time > 0:
         raise InputError(f"--time {time:g}: must be positive")
     if above is not None and not abs(above) < float("inf"):

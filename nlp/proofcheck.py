@@ -24,7 +24,7 @@ from screwsynth.nlp.standardform import StandardForm, standard_form
 #: Boxes that are evaluated at once.
 _BLOCK = 512
 #: A claim may be shown on so many pieces of its box, and no piece is halved more often than that.
-_MOST_PIECES, _MOST_HALVINGS = 20_000, 60
+_MOST_PIECES, _MOST_HALVINGS = 5_000, 60
 #: What a sum of a few hundred rounded terms may be off by, in parts of their sizes.
 _SUMS = 1e-13
 #: Called with the number of boxes checked and how many are waiting.
@@ -202,10 +202,11 @@ class _Checker:
             a, b, of, deep = lower[:, part], upper[:, part], owner[part], depth[part]
             np.add.at(used, of, 1)
             total += size
-            held, along = self._holds(kind, index, a, b)
+            held, wrong, along = self._holds(kind, index, a, b)
             left = np.logical_not(held)
-            if left.any() and (used[of[left]].max() > _MOST_PIECES or deep[left].max() >= _MOST_HALVINGS):
-                claim = claims[int(of[left][np.argmax(used[of[left]])])]
+            hopeless = left & (wrong | (used[of] > _MOST_PIECES) | (deep >= _MOST_HALVINGS))
+            if hopeless.any():
+                claim = claims[int(of[hopeless.argmax()])]
                 ends = ", ".join(
                     f"{name} in [{x:.6g}, {y:.6g}]"
                     for name, x, y in zip(self._form.names, claim.lower, claim.upper, strict=True)
@@ -228,8 +229,10 @@ class _Checker:
             if end[i] != whole[i]:
                 raise ProofError(f"a box is collapsed on a face of {self._form.names[i]} that is not the case's")
 
-    def _holds(self, kind: Node, index: int, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whether a claim is shown on boxes (n, N), and the variable to halve where it is not."""
+    def _holds(
+        self, kind: Node, index: int, lower: FloatArray, upper: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Whether a claim is shown on boxes (n, N), whether their centres show it to be wrong, and what to halve."""
         values = self._arithmetic(lower, upper)
         expressions, derivatives = values[: self._count], values[self._count :]
         n = self._form.n
@@ -263,15 +266,29 @@ class _Checker:
             score = weight * radius
             relative = radius / (self._form.upper - self._form.lower)[:, None]
             score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
-        return held, np.asarray(score.argmax(axis=0))
+        return held, self._disproved(kind, index, expressions), np.asarray(score.argmax(axis=0))
+
+    def _disproved(self, kind: Node, index: int, expressions: list[Slope]) -> FloatArray:
+        """Whether the centre of a box is a point that a claim says does not exist."""
+        J = self._functions
+        if kind == Node.INFEASIBLE:
+            return np.asarray((expressions[index].C[1] <= 0) & (not self._equation[index]))
+        if kind != Node.BOUNDED or any(self._equation):
+            return np.zeros(len(expressions[0].C[0]), dtype=bool)
+        feasible = np.all([expression.C[1] <= 0 for expression in expressions[J:]], axis=0)
+        return np.asarray(
+            feasible & (np.min([expression.C[0] for expression in expressions[:J]], axis=0) > self._bound)
+        )
 
     def _bounded(
         self, expressions: list[Slope], gradients: list[list[Slope]], lower: FloatArray, upper: FloatArray
     ) -> FloatArray:
-        """Some function is at most the bound, or a weighted sum with the rows is."""
+        """Some function is at most the bound, or a row cannot hold, or a weighted sum with the rows is at most that."""
         J = self._functions
         least = np.min([expression.V[1] for expression in expressions[:J]], axis=0)
         held = least <= self._bound
+        for expression, is_equation in zip(expressions[J:], self._equation[J:], strict=True):
+            held |= (expression.V[0] > 0) | (is_equation & (expression.V[1] < 0))
         if not held.all():
             weights = self._multipliers(expressions, gradients, upper - lower)
             held |= self._quadratic(weights, expressions, gradients, lower, upper) <= self._bound

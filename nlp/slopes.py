@@ -195,7 +195,7 @@ class _Boxes:
         return self.made(_square(u.V), _square(u.C), _mul(_add(u.V, u.C), u.S))
 
     def sqrt(self, u: Slope) -> Slope:
-        """By ``sqrt(u) - sqrt(c) = (u - c) / (sqrt(u) + sqrt(c))``."""
+        """The difference of two roots is that of the numbers over the sum of the roots."""
         V, C = _sqrt(u.V), _sqrt(u.C)
         return self.made(V, C, _mul(u.S, _inverse(_add(V, C))))
 
