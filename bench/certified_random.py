@@ -15,8 +15,8 @@ import numpy as np
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
+from screwsynth.nlp.branchandbound import certify
 from screwsynth.nlp.case import Search
-from screwsynth.nlp.certify import certify
 from screwsynth.nlp.solver import solve_nlp
 
 
@@ -79,7 +79,8 @@ def main() -> None:
         seconds = sorted(float(row["seconds"]) for row in rows if row["n"] == n)
         boxes = sorted(int(row["boxes"]) for row in rows if row["n"] == n)
         print(
-            f"n = {n}: {len(seconds)} problems, CPU s median {statistics.median(seconds):.3f}, worst {seconds[-1]:.2f}; "
+            f"n = {n}: {len(seconds)} problems, CPU s median {statistics.median(seconds):.3f}, worst "
+            f"{seconds[-1]:.2f}; "
             f"boxes median {statistics.median(boxes):.0f}, worst {boxes[-1]}"
         )
     every = [float(row["seconds"]) for row in rows]

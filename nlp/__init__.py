@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
+    from screwsynth.nlp.branchandbound import certify
     from screwsynth.nlp.case import Case, Expectation, Free, Method, Published, Rotation, Search, Sense, Task
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
-    from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
+    from screwsynth.nlp.certificate import Certificate, CertificateStatus
+    from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
     from screwsynth.nlp.ipopt import Start, StartStatus
@@ -26,6 +28,8 @@ __all__ = [
     "ActiveSide",
     "Case",
     "CaseError",
+    "Certificate",
+    "CertificateStatus",
     "Compromise",
     "EvaluationError",
     "Evidence",
@@ -50,10 +54,12 @@ __all__ = [
     "Task",
     "TaskAnalysis",
     "TaskOutcome",
+    "UncoveredError",
     "Units",
     "analyse_tasks",
     "build_model",
     "case_from_tables",
+    "certify",
     "evaluate",
     "examine",
     "formulate",
@@ -67,8 +73,10 @@ __all__ = [
 _HOMES = {
     "case": ("Case", "Expectation", "Free", "Method", "Published", "Rotation", "Search", "Sense", "Task"),
     "robots": ("build_model",),
+    "certificate": ("Certificate", "CertificateStatus"),
+    "branchandbound": ("certify",),
     "casefile": ("case_from_tables", "load_case", "shipped_cases"),
-    "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
+    "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError", "UncoveredError"),
     "evaluation": ("RobotState", "evaluate"),
     "formulation": ("formulate",),
     "optimality": ("ActiveSide", "Evidence", "Kind", "examine"),

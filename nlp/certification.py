@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from screwsynth.nlp.bounding import search_tape
+from screwsynth.nlp.branchandbound import GAP, CertifyProgress, certify
 from screwsynth.nlp.case import Case, Method, Search, Sense
 from screwsynth.nlp.certificate import Certificate, CertificateStatus
-from screwsynth.nlp.certify import GAP, CertifyProgress, certify
 from screwsynth.nlp.errors import InputError
 from screwsynth.nlp.formulation import formulate, formulate_each, formulate_weighted, formulate_worst
 from screwsynth.nlp.program import Nlp

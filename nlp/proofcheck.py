@@ -204,7 +204,8 @@ class _Checker:
             total += size
             held, wrong, along = self._holds(kind, index, a, b)
             left = np.logical_not(held)
-            hopeless = left & (wrong | (used[of] > _MOST_PIECES) | (deep >= _MOST_HALVINGS))
+            tired = (used[of] > _MOST_PIECES) | (deep >= _MOST_HALVINGS)
+            hopeless = np.logical_and(left, np.logical_or(wrong, tired))
             if hopeless.any():
                 claim = claims[int(of[hopeless.argmax()])]
                 ends = ", ".join(

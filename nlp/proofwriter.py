@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ProofWriter:
-    """Takes down a search; :class:`screwsynth.nlp.certify.Recorder`.
+    """Takes down a search; :class:`screwsynth.nlp.branchandbound.Recorder`.
 
     Args:
         functions: how many functions the least of which is maximised.

@@ -3,10 +3,11 @@
 import flint
 import numpy as np
 
+from screwsynth.nlp.enclosure import Forms
 from screwsynth.nlp.instructions import Op, Tape
 
 
-def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:
+def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - one branch for each operation
     """Results of a tape at a point (n,) of doubles; a ball without an end is undefined."""
     work: list[flint.arb] = [flint.arb(0)] * tape.registers
     out: list[flint.arb] = [flint.arb(0)] * tape.outputs
@@ -41,8 +42,8 @@ def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:
 
 
 def violations(
-    tape: Tape, forms, box: int, centre: np.ndarray, radius: np.ndarray, point: np.ndarray
-) -> tuple[int, int]:  # noqa: ANN001
+    tape: Tape, forms: Forms, box: int, centre: np.ndarray, radius: np.ndarray, point: np.ndarray
+) -> tuple[int, int]:
     """How many results lie surely outside of their interval, or of their form at a point of box number ``box``.
 
     Returns:

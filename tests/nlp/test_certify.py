@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, bounding, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.bounding import Examined, NumpyEngine, Verdict, search_tape
+from screwsynth.nlp.branchandbound import certify
 from screwsynth.nlp.casefile import find_case
 from screwsynth.nlp.certificate import CertificateStatus
-from screwsynth.nlp.certify import certify
 from screwsynth.nlp.engines import engine_for, kernel
 from screwsynth.nlp.formulation import formulate_worst
 from screwsynth.nlp.program import Nlp
