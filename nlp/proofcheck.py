@@ -8,7 +8,6 @@ arithmetic nor its multipliers; what both share is the case's expressions and Ca
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +17,8 @@ import numpy as np
 from screwsynth.models import FloatArray
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint
+from screwsynth.nlp.prooftree import Claim, unfolded
+from screwsynth.nlp.slopebounds import quadratic_bound
 from screwsynth.nlp.slopes import Slope, SlopeArithmetic
 from screwsynth.nlp.standardform import StandardForm, standard_form
 
@@ -25,8 +26,6 @@ from screwsynth.nlp.standardform import StandardForm, standard_form
 _BLOCK = 512
 #: A claim may be shown on so many pieces of its box, and no piece is halved more often than that.
 _MOST_PIECES, _MOST_HALVINGS = 5_000, 60
-#: What a sum of a few hundred rounded terms may be off by, in parts of their sizes.
-_SUMS = 1e-13
 #: Called with the number of boxes checked and how many are waiting.
 CheckProgress = Callable[[int, int], None]
 
@@ -46,16 +45,6 @@ class Checked:
     bound: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Claim:
-    """What a node says about its box."""
-
-    kind: Node
-    index: int
-    lower: FloatArray
-    upper: FloatArray
-
-
 def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -> Checked:
     """Show every claim of a proof again.
 
@@ -71,10 +60,10 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     bound = -np.inf if proof.bound is None else proof.bound
-    claims = _unfolded(proof.tree, form)
+    claims = unfolded(proof.tree, form)
     checker = _Checker(form, bound)
     pieces = 0
-    waiting: dict[tuple[Node, int], list[_Claim]] = {}
+    waiting: dict[tuple[Node, int], list[Claim]] = {}
     for claim in claims:
         waiting.setdefault((claim.kind, claim.index), []).append(claim)
     done = 0
@@ -88,90 +77,6 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     return Checked(len(claims), pieces, bound)
 
 
-def _unfolded(tree: bytes, form: StandardForm) -> list[_Claim]:
-    """The claims of a tree, whose boxes cover the form's.
-
-    Raises:
-        ProofError: it is not whole.
-    """
-    reader = _Reader(tree, form)
-    waiting = [(np.array(form.lower), np.array(form.upper))]
-    while waiting:
-        waiting += reader.node(*waiting.pop())
-    if reader.at != len(tree):
-        raise ProofError("the tree goes on after every box is closed")
-    return reader.claims
-
-
-class _Reader:
-    """Reads nodes from a tree's bytes, and collects what they claim."""
-
-    def __init__(self, tree: bytes, form: StandardForm) -> None:
-        self._tree, self._form = tree, form
-        self._rows = range(len(form.functions), len(form.functions) + len(form.rows))
-        self.at = 0
-        self.claims: list[_Claim] = []
-
-    def _taken(self, count: int) -> bytes:
-        self.at += count
-        if self.at > len(self._tree):
-            raise ProofError("the tree ends before every box is closed")
-        return self._tree[self.at - count : self.at]
-
-    def _one_of(self, allowed: range, what: str) -> int:
-        (number,) = self._taken(1)
-        if number not in allowed:
-            raise ProofError(f"the tree names {what} {number}, which does not exist")
-        return int(number)
-
-    def node(self, lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """Read the node of a box; returns the boxes of the nodes that follow, the next one last."""
-        (kind,) = self._taken(1)
-        if kind not in (Node.HALF, Node.ABOVE, Node.BELOW, Node.FACE_UPPER, Node.FACE_LOWER):
-            self._leaf(kind, lower, upper)
-            return []
-        i = self._one_of(range(self._form.n), "variable")
-        if kind == Node.HALF:
-            middle = 0.5 * lower[i] + 0.5 * upper[i]
-            return [(_with(lower, i, middle), upper), (lower, _with(upper, i, middle))]
-        if kind == Node.FACE_UPPER:
-            self.claims.append(_Claim(Node.FACE_UPPER, i, lower, upper))
-            return [(_with(lower, i, upper[i]), upper)]
-        if kind == Node.FACE_LOWER:
-            self.claims.append(_Claim(Node.FACE_LOWER, i, lower, upper))
-            return [(lower, _with(upper, i, lower[i]))]
-        return self._cut(kind, i, lower, upper)
-
-    def _cut(self, kind: int, i: int, lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """A part is closed; what is left follows, unless nothing is."""
-        (value,) = struct.unpack("<d", self._taken(8))
-        if not np.isfinite(value):
-            raise ProofError("the tree cuts at a number that is not finite")
-        (reason,) = self._taken(1)
-        cut = min(max(value, lower[i]), upper[i])
-        if kind == Node.BELOW:
-            self._leaf(reason, lower, _with(upper, i, cut))
-            return [(_with(lower, i, cut), upper)] if value <= upper[i] else []
-        self._leaf(reason, _with(lower, i, cut), upper)
-        return [(lower, _with(upper, i, cut))] if value >= lower[i] else []
-
-    def _leaf(self, kind: int, lower: FloatArray, upper: FloatArray) -> None:
-        index = 0
-        if kind == Node.INFEASIBLE:
-            index = self._one_of(self._rows, "row")
-        elif kind == Node.MONOTONE:
-            index = self._one_of(range(self._form.n), "variable")
-        elif kind != Node.BOUNDED:
-            raise ProofError(f"the tree holds {kind} where a reason must stand")
-        self.claims.append(_Claim(Node(kind), index, lower, upper))
-
-
-def _with(ends: FloatArray, i: int, value: float) -> FloatArray:
-    changed = ends.copy()
-    changed[i] = value
-    return changed
-
-
 class _Checker:
     """Shows claims about boxes of one form."""
 
@@ -182,7 +87,7 @@ class _Checker:
         outputs = ca.cse([form.expressions, form.jacobian.T])
         self._arithmetic = SlopeArithmetic(ca.Function("claims", [form.x], outputs))
 
-    def show(self, kind: Node, index: int, claims: list[_Claim]) -> int:
+    def show(self, kind: Node, index: int, claims: list[Claim]) -> int:
         """Show claims of one kind, halving boxes until they hold; returns the boxes that it took.
 
         Raises:
@@ -224,7 +129,7 @@ class _Checker:
             depth = np.concatenate([depth[: part.start], deep, deep])
         return total
 
-    def _on_the_root(self, kind: Node, i: int, claims: list[_Claim]) -> None:
+    def _on_the_root(self, kind: Node, i: int, claims: list[Claim]) -> None:
         for claim in claims:
             end, whole = (claim.upper, self._form.upper) if kind == Node.FACE_UPPER else (claim.lower, self._form.lower)
             if end[i] != whole[i]:
@@ -292,7 +197,7 @@ class _Checker:
             held |= (expression.V[0] > 0) | (is_equation & (expression.V[1] < 0))
         if not held.all():
             weights = self._multipliers(expressions, gradients, upper - lower)
-            held |= self._quadratic(weights, expressions, gradients, lower, upper) <= self._bound
+            held |= quadratic_bound(weights, expressions, gradients, lower, upper) <= self._bound
         # A function without a value has no bound, whatever a sum says.
         return np.asarray(held & np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0))
 
@@ -303,7 +208,7 @@ class _Checker:
         held = (row.V[0] > 0) | ((row.V[1] < 0) if sign is None else False)
         for direction in (-1.0,) if sign is not None else (-1.0, 1.0):
             weights = np.full((1, lower.shape[1]), direction)
-            held |= self._quadratic(weights, [row], [gradient], lower, upper) < 0
+            held |= quadratic_bound(weights, [row], [gradient], lower, upper) < 0
         return np.asarray(held)
 
     def _rises(
@@ -361,78 +266,6 @@ class _Checker:
                 if not self._equation[r]:
                     weights[r] = np.minimum(weights[r], 0.0)
         return weights
-
-    def _quadratic(
-        self,
-        weights: FloatArray,
-        expressions: list[Slope],
-        gradients: list[list[Slope]],
-        lower: FloatArray,
-        upper: FloatArray,
-    ) -> FloatArray:
-        """Upper bound over boxes of a weighted sum of expressions, from the slopes of its gradient.
-
-        ``L(c + h) in L(c) + g h + 1/2 h'S h``, with ``g`` and ``S`` in intervals.
-        """
-        n, N = lower.shape
-        r = 0.5 * (upper - lower) * (1 + 1e-14) + np.abs(lower) * 1e-15
-        total, b_low, b_high = np.zeros(N), np.zeros((n, N)), np.zeros((n, N))
-        slope_low, slope_high = np.zeros((n, N)), np.zeros((n, N))
-        S_low, S_high = np.zeros((n, n, N)), np.zeros((n, n, N))
-        sizes = np.zeros(N)
-        for weight, expression, gradient in zip(weights, expressions, gradients, strict=True):
-            used, positive = weight != 0, weight >= 0
-            ends = (expression.C[0], expression.C[1])
-            total += np.where(used, weight * np.where(positive, ends[1], ends[0]), 0.0)
-            sizes += np.where(used, np.abs(weight * ends[0]), 0.0)
-            for i, g in enumerate(gradient):
-                for low, high, source in ((b_low, b_high, g.C), (slope_low, slope_high, g.V), (S_low, S_high, g.S)):
-                    one, other = np.where(positive, source[0], source[1]), np.where(positive, source[1], source[0])
-                    low[i] += np.where(used, weight * one, 0.0)
-                    high[i] += np.where(used, weight * other, 0.0)
-        S_low, S_high = S_low * r[:, None] * r[None], S_high * r[:, None] * r[None]
-        S_low, S_high = 0.5 * (S_low + S_low.swapaxes(0, 1)), 0.5 * (S_high + S_high.swapaxes(0, 1))
-        H, loose = 0.5 * (S_low + S_high), 0.5 * (S_high - S_low).sum(axis=(0, 1))
-        b = 0.5 * (b_low + b_high) * r
-        spread = (0.5 * (b_high - b_low) * r).sum(axis=0)
-        sizes = sizes + np.abs(b).sum(axis=0) + np.abs(S_low).sum(axis=(0, 1)) + np.abs(S_high).sum(axis=(0, 1))
-        fixed = total + 0.5 * loose + spread + _SUMS * sizes
-        across = np.maximum(np.abs(slope_low), np.abs(slope_high)) * r
-        mean = total + across.sum(axis=0) * (1 + _SUMS) + _SUMS * np.abs(total)
-        margin = _SUMS * np.maximum(np.abs(slope_low), np.abs(slope_high))
-        # Where the sum rises along a variable all over the box, it is largest on that face.
-        s = np.where(slope_low - margin > 0, 1.0, np.where(slope_high + margin < 0, -1.0, 0.0))
-        return np.asarray(np.fmin(mean, fixed + _largest(b, H, s)))
-
-
-def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
-    """Upper bound of ``b e + 1/2 e'He`` for e in [-1, 1]^n, e_i = s_i where that is not 0.
-
-    Free variables one by one, with what couples them taken absolutely; or by a tangent plane to the concave part that
-    Gershgorin's circles leave, whichever is less.
-    """
-    Hs = np.einsum("ijb,jb->ib", H, s)
-    base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)
-    free = s == 0
-    b, H = np.where(free, b + Hs, 0.0), np.where(free[:, None] & free[None], H, 0.0)
-    diagonal = np.einsum("iib->ib", H)
-    others = np.abs(H).sum(axis=1) - np.abs(diagonal)
-    peak = (diagonal < 0) & (np.abs(b) < -diagonal)
-    alone = np.where(peak, b * b / np.where(peak, -2 * diagonal, 1.0), np.abs(b) + 0.5 * diagonal)
-    separate = (alone + 0.5 * others).sum(axis=0)
-    shift = np.maximum(diagonal + others, 0.0)
-    C = H.copy()
-    for i in range(len(b)):
-        C[i, i] -= shift[i]
-    e = np.zeros_like(b)
-    for _ in range(3):
-        for i in range(len(b)):
-            rest = b[i] + np.einsum("jb,jb->b", C[i], e) - C[i, i] * e[i]
-            step = np.where(C[i, i] < 0, rest / np.where(C[i, i] < 0, -C[i, i], 1.0), np.sign(rest))
-            e[i] = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
-    Ce = np.einsum("ijb,jb->ib", C, e)
-    plane = np.abs(b + Ce).sum(axis=0) - 0.5 * (e * Ce).sum(axis=0) + 0.5 * shift.sum(axis=0)
-    return np.asarray(base + np.fmin(separate, plane))
 
 
 def _on_simplex(weights: FloatArray) -> FloatArray:

@@ -12,7 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import Case, Free, Rotation, Task, bounding, case_from_tables, formulate, load_case, solve
+from screwsynth.nlp import (
+    Case,
+    Free,
+    Rotation,
+    Task,
+    bounding,
+    case_from_tables,
+    formulate,
+    load_case,
+    quadratic,
+    solve,
+)
 from screwsynth.nlp.bounding import Examined, NumpyEngine, Verdict, search_tape
 from screwsynth.nlp.branchandbound import certify
 from screwsynth.nlp.casefile import find_case
@@ -338,7 +349,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
     numbers: dict[str, float] = {
         "WORTH": bounding._WORTH,
         "LINEAR": bounding._LINEAR,
-        "ROOT_SLACK": bounding._ROOT_SLACK,
+        "ROOT_SLACK": quadratic._ROOT_SLACK,
         "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": bounding._TANGENT_ROUNDS,
     }
@@ -364,3 +375,15 @@ def test_the_tape_is_the_function(monkeypatch: pytest.MonkeyPatch) -> None:
     found = engine(x[:, None], x[:, None], math.inf)
     assert found.bound[0] == pytest.approx(form.level_of(x), rel=1e-11)
     assert len(search_tape(form)) > 100
+
+
+def test_the_kernel_is_built_without_what_would_break_it() -> None:
+    """Trap: -ffast-math drops tests for NaN, and fused operations make the engines differ."""
+    path = find_case("paper-4.1-helical").parents[1] / "pyproject.toml"
+    if not path.exists():
+        pytest.skip("an installed package has no build settings")
+    (extension,) = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["setuptools"]["ext-modules"]
+    flags = extension["extra-compile-args"]
+    assert "-ffp-contract=off" in flags
+    assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
+    assert extension["optional"] is True

@@ -16,7 +16,8 @@ from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.casefile import find_case
 from screwsynth.nlp.certification import Wanted, certify_case, program_of, proof_of
 from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint, read_proof
-from screwsynth.nlp.proofcheck import _Reader, _unfolded, check_proof
+from screwsynth.nlp.proofcheck import check_proof
+from screwsynth.nlp.prooftree import Reader, unfolded
 from screwsynth.nlp.standardform import standard_form
 
 Run = Callable[..., tuple[int, str, str]]
@@ -61,12 +62,12 @@ def test_a_proof_holds_and_survives_writing_and_reading(proof: Proof) -> None:
 
 def test_a_proof_with_rows_holds(ball: Proof) -> None:
     nlp = program_of(ball_case(), ball.statement)
-    claims = _unfolded(ball.tree, standard_form(nlp))
+    claims = unfolded(ball.tree, standard_form(nlp))
     assert {claim.kind for claim in claims} >= {Node.BOUNDED, Node.INFEASIBLE}
     check_proof(ball, nlp)
 
 
-class Places(_Reader):
+class Places(Reader):
     """Notes where in the tree each closing reason stands, and how long it is."""
 
     def _leaf(self, kind: int, lower: np.ndarray, upper: np.ndarray) -> None:
@@ -252,3 +253,27 @@ def test_above_on_the_command_line(cli: Run) -> None:
     assert code == 1
     assert "not above 300" in out
     assert load_case(NAME).tasks[0].sense.value == "max"
+
+
+@pytest.mark.parametrize("method", ["weighted-sum", "worst-case"])
+def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, method: str) -> None:
+    text = find_case(NAME).read_text(encoding="utf-8").split("[expect]")[0]
+    text += '[[task]]\nname = "other"\nsense = "max"\naxis = [0, 1, 1]\npoint = [1, 0, 3]\npitch = 2\n'
+    text += f'[combine]\nmethod = "{method}"\n'
+    case, target = tmp_path / "two.toml", tmp_path / "proof.json"
+    case.write_text(text, encoding="utf-8")
+    code, out, err = cli("certify", str(case), "--gap", "1e-3", "--proof", str(target), "--json", "-")
+    assert code == 0, err
+    result = json.loads(out)
+    assert result["certificate"]["status"] == "proved"
+    assert len(result["tasks"]) == 2
+    code, out, err = cli("verify-proof", str(target))
+    assert code == 0, err
+    bound = result["certificate"]["bound"]
+    assert f"{bound:.10g}" in out
+    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["combined"]["certificate"]["bound"] >= json.loads(out)["combined"]["value"]
+    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4")
+    assert code == 0
+    assert out.count("proved:") == 3
