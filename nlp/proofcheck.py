@@ -172,19 +172,30 @@ class _Checker:
             score = weight * radius
             relative = radius / (self._form.upper - self._form.lower)[:, None]
             score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
-        return held, self._disproved(kind, index, expressions), np.asarray(score.argmax(axis=0))
+        return held, self._disproved(kind, index, expressions, gradients), np.asarray(score.argmax(axis=0))
 
-    def _disproved(self, kind: Node, index: int, expressions: list[Slope]) -> FloatArray:
+    def _disproved(self, kind: Node, index: int, expressions: list[Slope], gradients: list[list[Slope]]) -> FloatArray:
         """Whether the centre of a box is a point that a claim says does not exist."""
         J = self._functions
         if kind == Node.INFEASIBLE:
             return np.asarray((expressions[index].C[1] <= 0) & (not self._equation[index]))
-        if kind != Node.BOUNDED or any(self._equation):
-            return np.zeros(len(expressions[0].C[0]), dtype=bool)
-        feasible = np.all([expression.C[1] <= 0 for expression in expressions[J:]], axis=0)
-        return np.asarray(
-            feasible & (np.min([expression.C[0] for expression in expressions[:J]], axis=0) > self._bound)
-        )
+        if kind == Node.BOUNDED:
+            feasible = np.all([expression.C[1] <= 0 for expression in expressions[J:]], axis=0)
+            above = np.min([expression.C[0] for expression in expressions[:J]], axis=0) > self._bound
+            return np.asarray(feasible & above & (not any(self._equation)))
+        # A function that falls there, or a row that is not kept strictly and grows, forbids a direction.
+        forbidden = []
+        for side in {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(kind, (1, -1)):
+            stopped = np.zeros(len(expressions[0].C[0]), dtype=bool)
+            for r, (expression, gradient) in enumerate(zip(expressions, gradients, strict=True)):
+                low, high = gradient[index].C
+                falls, grows = (high <= 0, low >= 0) if side > 0 else (low >= 0, high <= 0)
+                if r < J:
+                    stopped |= falls
+                elif self._form.dependence[r][index]:
+                    stopped |= (expression.C[0] >= 0) & grows
+            forbidden.append(stopped)
+        return np.asarray(np.all(forbidden, axis=0))
 
     def _bounded(
         self, expressions: list[Slope], gradients: list[list[Slope]], lower: FloatArray, upper: FloatArray
