@@ -59,16 +59,18 @@ def scip(free_angle: bool, seconds: float) -> None:
     functions = (scip_.sin, scip_.cos) if free_angle else (math.sin, math.cos)
     terms = []
     for k, (d, b) in enumerate(legs(p, q, q0, x[6] if free_angle else math.radians(8), functions)):
-        parts = [model.addVar(f"d{k}{i}", lb=-100, ub=100) for i in range(3)]
-        for part, expression in zip(parts, d, strict=True):
-            model.addCons(part == expression)
-        square = model.addVar(f"w{k}", lb=1, ub=3e4)
-        model.addCons(square == parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2])
-        work, term = model.addVar(f"s{k}", lb=-1e4, ub=1e4), model.addVar(f"t{k}", lb=0, ub=1e4)
-        model.addCons(work == rate(parts, b))
-        model.addCons(term * square <= work * work)
-        terms.append(term)
-    model.setObjective(sum(terms[1:], terms[0]), "maximize")
+        # Unit directions bound each term by a ball, which the solver likes better than quotients.
+        unit = [model.addVar(f"u{k}{i}", lb=-1, ub=1) for i in range(3)]
+        length = model.addVar(f"l{k}", lb=1, ub=150)
+        model.addCons(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] == 1)
+        for part, expression in zip(unit, d, strict=True):
+            model.addCons(length * part == expression)
+        work = model.addVar(f"s{k}", lb=-100, ub=100)
+        model.addCons(work == rate(unit, b))
+        terms.append(work * work)
+    F = model.addVar("F", lb=0, ub=None)
+    model.addCons(F <= sum(terms[1:], terms[0]))
+    model.setObjective(F, "maximize")
     model.setParam("limits/time", seconds)
     model.setParam("limits/gap", 1e-4)
     model.optimize()
