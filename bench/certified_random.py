@@ -60,13 +60,7 @@ def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def main() -> None:
-    problems, starts, gap, limit = (
-        float(text) for text in [*sys.argv[1:], *("500", "256", "1e-4", "60")[len(sys.argv) - 1 :]]
-    )
-    jobs = [(seed, int(starts), gap, limit) for seed in range(int(problems))]
-    with get_context("spawn").Pool(2) as pool:
-        rows = list(pool.imap_unordered(measured, jobs, chunksize=4))
+def summary(rows: list[dict[str, object]], starts: float, gap: float, limit: float) -> None:
     print(f"{len(rows)} problems, {int(starts)} starts each, gap {gap:g}, limit {limit:g} s")
     print(f"bounds below the best start: {sum(bool(row['violated']) for row in rows)}")
     print(f"ball active at the optimum: {sum(bool(row['active']) for row in rows)}")
@@ -75,16 +69,27 @@ def main() -> None:
         print(f"{status}: {sum(row['status'] == status for row in rows)}")
     left = [row for row in rows if row["status"] != "proved"]
     print("not proved:", [(row["seed"], row["n"], row["relative"]) for row in left])
-    for n in sorted({int(row["n"]) for row in rows}):
-        seconds = sorted(float(row["seconds"]) for row in rows if row["n"] == n)
-        boxes = sorted(int(row["boxes"]) for row in rows if row["n"] == n)
+    for n in sorted({int(str(row["n"])) for row in rows}):
+        seconds = sorted(float(str(row["seconds"])) for row in rows if row["n"] == n)
+        boxes = sorted(int(str(row["boxes"])) for row in rows if row["n"] == n)
         print(
             f"n = {n}: {len(seconds)} problems, CPU s median {statistics.median(seconds):.3f}, worst "
-            f"{seconds[-1]:.2f}; "
-            f"boxes median {statistics.median(boxes):.0f}, worst {boxes[-1]}"
+            f"{seconds[-1]:.2f}; boxes median {statistics.median(boxes):.0f}, worst {boxes[-1]}"
         )
-    every = [float(row["seconds"]) for row in rows]
-    print(f"all: CPU s median {statistics.median(every):.3f}, worst {max(every):.2f}")
+    every = [float(str(row["seconds"])) for row in rows]
+    print(f"all: CPU s median {statistics.median(every):.3f}, worst {max(every):.2f}", flush=True)
+
+
+def main() -> None:
+    given = [*sys.argv[1:], *("500", "256", "1e-4", "60")[len(sys.argv) - 1 :]]
+    problems, starts, gap, limit = (float(text) for text in given)
+    jobs = [(seed, int(starts), gap, limit) for seed in range(int(problems))]
+    rows: list[dict[str, object]] = []
+    with get_context("spawn").Pool(2) as pool:
+        for row in pool.imap_unordered(measured, jobs):
+            rows.append(row)
+            if len(rows) % 50 == 0 or len(rows) == len(jobs):
+                summary(rows, starts, gap, limit)
 
 
 if __name__ == "__main__":

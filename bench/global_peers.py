@@ -69,7 +69,7 @@ def scip(free_angle: bool, seconds: float) -> None:
         model.addCons(work == rate(unit, b))
         terms.append(work * work)
     F = model.addVar("F", lb=0, ub=None)
-    model.addCons(F <= sum(terms[1:], terms[0]))
+    model.addCons(sum(terms[1:], terms[0]) >= F)
     model.setObjective(F, "maximize")
     model.setParam("limits/time", seconds)
     model.setParam("limits/gap", 1e-4)
