@@ -133,7 +133,7 @@ def _own_function(expression: SX, level: SX, sign: float) -> SX:
     slope = ca.jacobian(expression, level)
     without = ca.substitute(expression, level, 0)
     # Maximum: level <= -without / slope, slope < 0. Minimum: level >= -without / slope, slope > 0; negated.
-    return ca.simplify(-without / slope if sign < 0 else without / slope)
+    return -without / slope if sign < 0 else without / slope
 
 
 def _rows(constraints: Sequence[tuple[str, SX, float, float]]) -> list[Row]:
