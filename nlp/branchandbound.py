@@ -63,7 +63,8 @@ class Recorder(Protocol):
             boxes: as they were.
             found: what became of them.
             cut: (B,) where ``found.split`` was cut in two; NaN where it was not.
-            first_child: (B,) place of the lower half; the upper half's is the next.
+            first_child: (B,) place of the lower half, of which the upper half's is the next; without a cut, of what is
+                left of the box; -1 where nothing follows.
         """
 
 
@@ -241,16 +242,20 @@ class _Search:
         width = ((upper - lower) / whole).max(axis=0)
         least = np.where(np.isfinite(bound), _LEAST_WIDTH, _SINGULAR_WIDTH)
         is_open = found.verdict == Verdict.OPEN
-        done = is_open & ((width < least) | ~((low < middle) & (middle < high)))
-        cut = np.flatnonzero(is_open & ~done)
+        small = is_open & ((width < least) | ~((low < middle) & (middle < high)))
+        # A box that collapsed to less than can be cut, such as a corner, was not examined as what it is now.
+        again = small & ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
+        once, done, cut = (np.flatnonzero(which) for which in (again, small & ~again, is_open & ~small))
         first_child = np.full(boxes.count, -1, dtype=np.int64)
         first_child[cut] = self.places + 2 * np.arange(cut.size)
-        self.places += 2 * cut.size
+        first_child[once] = self.places + 2 * cut.size + np.arange(once.size)
+        self.places += 2 * cut.size + once.size
         if self.recorder is not None:
-            self.recorder.record(boxes, found, np.where(first_child >= 0, middle, np.nan), first_child)
-        if done.any():
-            which = np.flatnonzero(done)
-            self.aside.append(Boxes(lower[:, which], upper[:, which], bound[which], boxes.place[which]))
+            is_cut = is_open & ~small
+            self.recorder.record(boxes, found, np.where(is_cut, middle, np.nan), first_child)
+        if done.size:
+            self.aside.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[done]))
+        self.opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_child[once]))
         left, right = upper[:, cut].copy(), lower[:, cut].copy()
         columns = np.arange(cut.size)
         left[split[cut], columns] = right[split[cut], columns] = middle[cut]

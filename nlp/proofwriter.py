@@ -26,14 +26,16 @@ class ProofWriter:
 
     def __init__(self, functions: int) -> None:
         self._functions = functions
-        self._nodes: dict[int, tuple[bytes, int]] = {}
+        self._nodes: dict[int, tuple[bytes, list[int]]] = {}
 
     def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
         """A block of examined boxes: the bytes of each, up to where its children's follow."""
         for k, place in enumerate(boxes.place.tolist()):
-            text = self._written(found, k, float(cut[k]), boxes.upper[:, k])
-            if text is not None:
-                self._nodes[place] = (text, int(first_child[k]))
+            child, is_cut = int(first_child[k]), bool(np.isfinite(cut[k]))
+            if found.verdict[k] == Verdict.OPEN and child < 0:
+                continue
+            following = [] if child < 0 else [child + 1, child] if is_cut else [child]
+            self._nodes[place] = (self._written(found, k, is_cut, boxes.upper[:, k]), following)
 
     def tree(self) -> bytes:
         """The whole tree.
@@ -47,14 +49,13 @@ class ProofWriter:
             place = waiting.pop()
             if place not in self._nodes:
                 raise ProofError("the search did not close every box, so there is no proof to write")
-            text, child = self._nodes[place]
+            text, following = self._nodes[place]
             parts.append(text)
-            if child >= 0:
-                waiting += [child + 1, child]
+            waiting += following
         return b"".join(parts)
 
-    def _written(self, found: Examined, k: int, cut: float, upper: FloatArray) -> bytes | None:
-        """The bytes of one box, or None where it was not closed. Each contraction closes what it takes off."""
+    def _written(self, found: Examined, k: int, is_cut: bool, upper: FloatArray) -> bytes:
+        """The bytes of one box, up to where its children's follow. Each contraction closes what it takes off."""
         verdict, reason = int(found.verdict[k]), int(found.reason[k])
         if verdict == Verdict.BOUNDED:
             return bytes([Node.BOUNDED])
@@ -62,11 +63,9 @@ class ProofWriter:
             return bytes([Node.INFEASIBLE, reason])
         if verdict == Verdict.MONOTONE:
             return bytes([Node.MONOTONE, reason])
-        if verdict == Verdict.OPEN and not np.isfinite(cut):
-            return None
         only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
         parts = [part for i in only for part in self._moved(found, k, i, float(upper[i]))]
-        if verdict == Verdict.OPEN:
+        if is_cut:
             parts.append(bytes([Node.HALF, int(found.split[k])]))
         return b"".join(parts)
 

@@ -387,3 +387,21 @@ def test_the_kernel_is_built_without_what_would_break_it() -> None:
     assert "-ffp-contract=off" in flags
     assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
     assert extension["optional"] is True
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_box_that_collapses_to_a_corner_is_examined_there(engine: str) -> None:
+    """Trap: a corner cannot be cut, and was not examined as a corner yet; it must not be left over."""
+    solution = solve(corner_case(), starts=8)
+    assert solution.evidence is not None
+    assert len(solution.evidence.active) == solution.nlp.n
+    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine, gap=1e-6)
+    assert proved.status is CertificateStatus.PROVED
+
+
+def corner_case() -> Case:
+    """Positions only, with an optimum in a corner of the box."""
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8"))
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": -13}
+    del tables["expect"], tables["published"]
+    return case_from_tables(tables, name="corner", source="corner")
