@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
+    from screwsynth.nlp.branchandbound import certify
     from screwsynth.nlp.case import Case
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
-    from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError
+    from screwsynth.nlp.certificate import Certificate, CertificateStatus
+    from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
     from screwsynth.nlp.ipopt import Start, StartStatus
@@ -44,6 +46,8 @@ __all__ = [
     "Actuator",
     "Case",
     "CaseError",
+    "Certificate",
+    "CertificateStatus",
     "Compromise",
     "Cone",
     "EvaluationError",
@@ -80,11 +84,13 @@ __all__ = [
     "TaskAnalysis",
     "TaskOutcome",
     "ToleranceLoss",
+    "UncoveredError",
     "Units",
     "along_screw",
     "analyse_tasks",
     "build_model",
     "case_from_tables",
+    "certify",
     "evaluate",
     "examine",
     "formulate",
@@ -114,8 +120,10 @@ _HOMES = {
         "Task",
     ),
     "robots": ("build_model",),
+    "certificate": ("Certificate", "CertificateStatus"),
+    "branchandbound": ("certify",),
     "casefile": ("case_from_tables", "load_case", "shipped_cases"),
-    "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError"),
+    "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError", "UncoveredError"),
     "evaluation": ("RobotState", "evaluate"),
     "formulation": ("formulate",),
     "limits": ("Actuator", "Cone", "Footprint", "Home", "Homogenised", "Interval", "Limits"),

@@ -20,9 +20,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
     from screwsynth.nlp.case import Case
+    from screwsynth.nlp.certification import Certified, Wanted
     from screwsynth.nlp.solver import Solution
     from screwsynth.nlp.tasks import Compromise
 
@@ -69,6 +72,9 @@ def solve(
         bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
     ] = False,
     json_file: JsonFile = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
+    ] = False,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from screwsynth.nlp.casefile import load_case
@@ -81,15 +87,113 @@ def solve(
     if json_file != "-":
         # The library of tables loads while Ipopt works outside of the interpreter.
         Thread(target=import_module, args=("screwsynth.nlp.tables",), daemon=True).start()
-    solution = _solve(loaded, jobs)
-    result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
+    proved = True
+    if certify:
+        from screwsynth.nlp.certification import Wanted
+
+        certified = _certify(loaded, Wanted(jobs=jobs), with_proof=False)
+        solution, proved = certified.solution, certified.is_proved
+        if isinstance(solution, Compromise):
+            result = compromise_of(solution, certified.tasks, certified.combined)
+        else:
+            result = result_of(solution, certificate=certified.tasks[0])
+    else:
+        solution = _solve(loaded, jobs)
+        result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
     if json_file is not None:
         _write_json(json_file, result)
     if json_file != "-":
         from screwsynth.nlp.tables import print_compromise, print_solution
 
         (print_compromise if isinstance(solution, Compromise) else print_solution)(_console(), loaded, result)
-    raise typer.Exit(0 if solution.status.is_answer else 1)
+    raise typer.Exit(0 if solution.status.is_answer and proved else 1)
+
+
+@app.command()
+def certify(
+    case: CaseName,
+    gap: Annotated[float, typer.Option(help="Part of the best F that the bound may be off by.")] = 1e-4,
+    time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Stop then, with the bound reached.")] = None,
+    above: Annotated[
+        float | None, typer.Option(metavar="F", help="Prove that F is above this value on the whole box.")
+    ] = None,
+    proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Starting points for the incumbent instead of the case's.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Prove a bound of the global optimum over the whole box."""
+    from screwsynth.nlp.casefile import find_case, load_case
+    from screwsynth.nlp.certification import Wanted, proof_of
+    from screwsynth.nlp.errors import InputError
+    from screwsynth.nlp.files import write_text
+    from screwsynth.nlp.result import certified_of
+
+    if not 1e-10 <= gap < 1:
+        raise InputError(f"--gap {gap:g}: must be at least 1e-10 and below 1")
+    if time is not None and not time > 0:
+        raise InputError(f"--time {time:g}: must be positive")
+    if above is not None and not abs(above) < float("inf"):
+        raise InputError(f"--above {above:g}: must be finite")
+    if proof == "-" and json_file == "-":
+        raise InputError("standard output can take one of --json - and --proof - only")
+    loaded = load_case(case)
+    loaded = replace(loaded, search=loaded.search.but(starts, None))
+    for target in (json_file, proof):
+        _check_target(target)
+    wanted = Wanted(gap, above, time, jobs)
+    certified = _certify(loaded, wanted, with_proof=proof is not None)
+    result = certified_of(certified)
+    if proof is not None and certified.tree is not None:
+        write_text(proof, proof_of(certified, find_case(case).read_text(encoding="utf-8")).as_text())
+    if json_file is not None:
+        _write_json(json_file, result)
+    if "-" not in (json_file, proof):
+        from screwsynth.nlp.tables import print_certified
+
+        print_certified(_console(), loaded, result)
+    raise typer.Exit(0 if certified.is_proved else 1)
+
+
+@app.command()
+def verify_proof(
+    proof: Annotated[str, typer.Argument(metavar="PROOF", help="A proof that certify --proof wrote.")],
+    case: Annotated[
+        str | None, typer.Argument(metavar="[CASE]", help="The case that it must be for; else the one it carries.")
+    ] = None,
+) -> None:
+    """Check a proof anew, with nothing of what made it."""
+    import tomllib
+
+    from screwsynth.nlp.casefile import case_from_tables, load_case
+    from screwsynth.nlp.certification import program_of
+    from screwsynth.nlp.files import read_text
+    from screwsynth.nlp.proof import ProofError, read_proof
+    from screwsynth.nlp.proofcheck import check_proof
+
+    given = read_proof(read_text(proof), proof)
+    if case is not None:
+        loaded = load_case(case)
+    else:
+        try:
+            tables = tomllib.loads(given.case)
+        except tomllib.TOMLDecodeError as error:
+            raise ProofError(f"{proof}: the case that it carries is no TOML: {error}") from None
+        loaded = case_from_tables(tables, name=given.name, source=proof)
+    gc.enable()
+    try:
+        checked = check_proof(given, program_of(loaded, given.statement))
+    except ProofError as error:
+        typer.echo(f"rejected: {error}", err=True)
+        raise typer.Exit(1) from None
+    nlp = program_of(loaded, given.statement)
+    what = "there is no feasible point"
+    if given.bound is not None:
+        what = f"F is at most {given.bound:.10g}" if nlp.sign < 0 else f"F is at least {-given.bound:.10g}"
+    typer.echo(f"holds: {what} within the limits of {loaded.name}")
+    typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 
 @app.command()
@@ -302,6 +406,30 @@ def _solve(case: Case, jobs: int | None) -> Solution | Compromise:
         if several:
             return solve_tasks(case, jobs=jobs, progress=show)
         return solve_case(case, jobs=jobs, progress=partial(show, "starts"))
+
+
+def _certify(case: Case, wanted: Wanted, *, with_proof: bool) -> Certified:
+    from screwsynth.nlp.certification import certify_case
+
+    gc.enable()
+    if not sys.stderr.isatty():
+        return certify_case(case, wanted, case.search, with_proof=with_proof)
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    columns = SpinnerColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("solving for an incumbent", total=None)
+
+        def shown(name: str) -> Callable[[float, float, float, int, int], None]:
+            def show(seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
+                text = f"{escape(name)}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+                bar.update(line, description=f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
+
+            return show
+
+        return certify_case(case, wanted, case.search, with_proof=with_proof, progress=shown)
 
 
 def _setting(text: str) -> tuple[str, float | list[float]]:

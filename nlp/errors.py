@@ -5,7 +5,8 @@ The tree::
     ScrewsynthError
     ├── InputError          what the user gave is wrong; the command line exits with status 2
     │   └── CaseError       ... in a case: carries the file, the dotted key, the value and what is allowed
-    └── EvaluationError     the robot does not exist at a point: a limb of zero length, a joint out of reach
+    ├── EvaluationError     the robot does not exist at a point: a limb of zero length, a joint out of reach
+    └── UncoveredError      a proof would need bounds of an operation that there is no rule for
 
 A search that fails is no exception: its outcome is the status of the solution.
 """
@@ -29,6 +30,13 @@ class InputError(ScrewsynthError):
 
 class EvaluationError(ScrewsynthError):
     """The robot's equations give no finite number at a point."""
+
+
+class UncoveredError(ScrewsynthError):
+    """The expression graph holds something that a proof has no rule for; it is named."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"no bound can be proved: the robot's expressions hold {what}, which has no rule")
 
 
 class CaseError(InputError):

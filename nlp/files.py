@@ -1,4 +1,4 @@
-"""Output files, written whole or not at all."""
+"""Files: written whole or not at all, and read with one sentence for what goes wrong."""
 
 from __future__ import annotations
 
@@ -91,3 +91,18 @@ def _fault(path: Path) -> str:
     if not path.parent.is_dir():
         return f"{path.parent} is no folder"
     return "" if os.access(path.parent, os.W_OK) else f"no permission in {path.parent}"
+
+
+def read_text(source: str) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return Path(source).read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: is no text") from None
+    except (OSError, ValueError) as error:
+        fault = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(f"{source}: cannot be read: {fault}") from None

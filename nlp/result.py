@@ -19,6 +19,7 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
+from screwsynth.nlp.certificate import Certificate
 from screwsynth.nlp.designresult import NO_MARGINS, margins_in, relaxation_in, sensitivity_in
 from screwsynth.nlp.evaluation import RobotState, StatedPose, evaluate, stated_poses
 from screwsynth.nlp.ipopt import StartStatus
@@ -32,15 +33,18 @@ from screwsynth.nlp.units import Units
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from screwsynth.nlp.certification import Certified
+
 SCHEMA = 1
 
 
-def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
+def result_of(solution: Solution, task: int = 0, certificate: Certificate | None = None) -> dict[str, Any]:
     """The whole result of a solve, ready for JSON.
 
     Args:
         solution: of one task.
         task: index of that task in the case.
+        certificate: what is proved of it.
     """
     case = solution.nlp.case
     answer = solution.status.is_answer
@@ -59,15 +63,23 @@ def result_of(solution: Solution, task: int = 0) -> dict[str, Any]:
         **(margins_in(solution.nlp, solution.x, optimal=answer) if state is not None else NO_MARGINS),
         **(sensitivity_in(solution) if answer and state is not None else {}),
         "starts": _starts(solution),
-        "certificate": None,
+        "certificate": None if certificate is None else certificate.as_data(),
         "seed": solution.seed,
         "versions": versions(),
         "seconds": solution.seconds,
     }
 
 
-def compromise_of(compromise: Compromise) -> dict[str, Any]:
-    """The whole result of bringing several tasks together, ready for JSON."""
+def compromise_of(
+    compromise: Compromise, certificates: Sequence[Certificate] = (), combined_certificate: Certificate | None = None
+) -> dict[str, Any]:
+    """The whole result of bringing several tasks together, ready for JSON.
+
+    Args:
+        compromise: the tasks brought together.
+        certificates: what is proved of each task by itself, where that was asked for.
+        combined_certificate: what is proved of the combined program.
+    """
     case, outcomes = compromise.case, compromise.outcomes
     state, combined = outcomes[0].state, compromise.combined
     robot = {} if state is None else state_of(case, state)
@@ -83,7 +95,9 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
     return {
         **_head(case),
         "status": compromise.status.value,
-        "tasks": [result_of(outcome.own, j) for j, outcome in enumerate(outcomes)],
+        "tasks": [
+            result_of(outcome.own, j, certificates[j] if certificates else None) for j, outcome in enumerate(outcomes)
+        ],
         "combined": {
             "method": compromise.method.value,
             "value": compromise.value,
@@ -95,10 +109,36 @@ def compromise_of(compromise: Compromise) -> dict[str, Any]:
             if combined is None or combined.evidence is None
             else _optimality(combined.nlp, combined.evidence),
             "starts": None if combined is None else _starts(combined),
+            "certificate": None if combined_certificate is None else combined_certificate.as_data(),
         },
         "versions": versions(),
         "seconds": compromise.seconds,
     }
+
+
+def certified_of(certified: Certified) -> dict[str, Any]:
+    """What is proved of a case, ready for JSON: of every task, and of the combined program where there is one."""
+    certificate = certified.certificate
+    case = certified.tasks[0].nlp.case
+    return {
+        **_head(case),
+        "certificate": None if certificate is None else certificate.as_data(),
+        "point": None if certificate is None else _point(certificate),
+        "tasks": [
+            {"name": task.name, "sense": each.nlp.sense.value, "certificate": each.as_data(), "point": _point(each)}
+            for task, each in zip(case.tasks, certified.tasks, strict=True)
+        ],
+        "versions": versions(),
+    }
+
+
+def _point(certificate: Certificate) -> dict[str, float] | None:
+    """The best point known, by the names of the program's variables, in the case's units."""
+    nlp = certificate.nlp
+    if certificate.x is None:
+        return None
+    variables = zip(nlp.program.variables, certificate.x, strict=True)
+    return {each.name: nlp.case.units.shown(float(value), each.dimension) for each, value in variables}
 
 
 def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotState]) -> dict[str, Any]:

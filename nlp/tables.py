@@ -37,9 +37,25 @@ def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None
         console.print(_tolerance(case, result))
     for line in _verdict(case, result):
         console.print(line)
+    for line in _certificate(result["certificate"]):
+        console.print(line)
 
 
-def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> None:
+def print_certified(console: Console, case: Case, result: dict[str, Any]) -> None:
+    """What is proved of a case, as :func:`screwsynth.nlp.result.certified_of` gives it."""
+    console.print(_title(case))
+    for task in result["tasks"]:
+        if len(result["tasks"]) > 1:
+            console.print(_labelled("task", f"{task['name']}, {task['sense']} F"))
+        for line in _certificate(task["certificate"]):
+            console.print(line)
+    if len(result["tasks"]) > 1 and result["certificate"] is not None:
+        console.print(_labelled("combined by", case.method.value))
+        for line in _certificate(result["certificate"]):
+            console.print(line)
+
+
+def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> None:  # noqa: C901 - line by line
     """Several tasks brought together, as :func:`screwsynth.nlp.result.compromise_of` gives it."""
     combined = result["combined"]
     console.print(_title(case))
@@ -63,6 +79,12 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
     if combined["value"] is not None:
         console.print(_labelled(combined["method"], _number(combined["value"])))
         console.print(_labelled("verdict", combined["optimality"]["kind"]))
+    for task in result["tasks"]:
+        for line in _certificate(task["certificate"]):
+            console.print(_labelled("task", task["task"]["name"]) if "task" in task else Text())
+            console.print(line)
+    for line in _certificate(combined["certificate"]):
+        console.print(line)
     for notice in combined["notices"]:
         console.print(_labelled("note", notice))
     if "rank" in combined:
@@ -326,6 +348,22 @@ def _beside(value: float, limit: float) -> str:
 def _place(name: str) -> str:
     """Where a limit is, from its name: everything behind what it limits."""
     return name.partition(" ")[2]
+
+
+def _certificate(certificate: dict[str, Any] | None) -> Iterable[Text]:
+    """What is proved, and what it took."""
+    if certificate is None:
+        return
+    style = "bold green" if certificate["status"] == "proved" else "bold red"
+    yield Text.assemble(("certificate  ", "dim"), (certificate["statement"], style))
+    gap = certificate["gap"]
+    if gap is not None:
+        relative = certificate["relative_gap"]
+        part = "" if relative is None else f" ({relative:.2e} of it)"
+        yield _labelled("gap", f"{gap:.3g}{part}")
+    left = f", {certificate['open']:,} left" if certificate["open"] else ""
+    boxes = f"{certificate['boxes']:,} boxes{left} in {certificate['seconds']:.2f} s"
+    yield _labelled("search", f"{boxes}, engine {certificate['engine']}")
 
 
 def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:

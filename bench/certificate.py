@@ -1,0 +1,70 @@
+"""Boxes and CPU seconds of certificates: by case and engine, by number of free variables, and by gap.
+
+    python -P bench/certificate.py
+
+CPU time of this process on one thread, best of three where it is short, because the machine may be shared.
+"""
+
+import time
+from collections.abc import Iterable
+
+from screwsynth.models import stewart_gough
+from screwsynth.nlp import Case, Free, Rotation, Task, load_case, solve
+from screwsynth.nlp.branchandbound import certify
+from screwsynth.nlp.certificate import Certificate
+from screwsynth.nlp.engines import kernel
+from screwsynth.nlp.solver import Solution
+
+LIMIT = 60.0
+
+
+def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+    best = float("inf")
+    for _ in range(3):
+        began = time.process_time()
+        found = certify(solution.nlp, solution.x, gap=gap, engine=engine, jobs=1, time_limit=LIMIT)
+        best = min(best, time.process_time() - began)
+        if best > 3:
+            break
+    return found, best
+
+
+def row(name: str, solution: Solution, gap: float, engine: str) -> None:
+    found, seconds = measured(solution, gap, engine)
+    relative = "" if found.relative_gap is None else f"{found.relative_gap:.1e}"
+    print(
+        f"{name:34} {engine:6} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
+        flush=True,
+    )
+
+
+def scaled(free: int) -> Case:
+    """The paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
+    ranges = {
+        "p_x": Free(-10.0, 10.0), "p_y": Free(-10.0, 10.0), "p_z": Free(20.0, 50.0), "x4": Free(0.0, 0.5235),
+        "x2": Free(6.0, 10.0), "x3": Free(0.1, 0.5),
+    }  # fmt: skip
+    rotation = Rotation() if free < 5 else Rotation(axis=None, angle=Free(-0.5235987755982988, 0.5235987755982988))
+    names = list(ranges)[: free if free < 5 else free - 3]
+    p = [ranges["p_x"], ranges["p_y"], ranges["p_z"] if "p_z" in names else 35.0]
+    held = {"x1": 12.0, "x2": 8.0, "x3": 0.5235, "x4": 0.14}
+    parameters = {name: ranges[name] if name in names else value for name, value in held.items()}
+    task = Task(load_case("paper-4.1-helical").tasks[0].twist)
+    return Case(stewart_gough(), parameters, p, [task], rotation=rotation)
+
+
+def main(engines: Iterable[str]) -> None:
+    print(f"{'case':34} {'engine':6} {'asked':>7} {'status':10} {'boxes':>9} {'CPU s':>9} gap")
+    for name in ("paper-4.1-helical", "paper-4.1-rotation", "paper-4.2-rotation", "paper-4.2-translation", "paper-4.3"):
+        solution = solve(load_case(name), starts=8)
+        for engine in engines:
+            row(name, solution, 1e-4, engine)
+    for gap in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
+        row("paper-4.1-helical", solve(load_case("paper-4.1-helical"), starts=8), gap, next(iter(engines)))
+    for free in range(2, 10):
+        solution = solve(scaled(free), starts=16)
+        row(f"{solution.nlp.n} free variables", solution, 1e-4, next(iter(engines)))
+
+
+if __name__ == "__main__":
+    main(["numpy"] if kernel() is None else ["c", "numpy"])

@@ -1,0 +1,138 @@
+"""The two engines that examine boxes: the C kernel where it was built, and NumPy, which is always there."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from screwsynth.nlp.bounding import Examined, NumpyEngine, search_tape
+from screwsynth.nlp.instructions import Tape
+from screwsynth.nlp.standardform import StandardForm
+
+if TYPE_CHECKING:
+    from screwsynth.models import FloatArray
+
+
+class Engine(Protocol):
+    """Examines blocks of boxes."""
+
+    @property
+    def name(self) -> str:
+        """``c`` or ``numpy``."""
+
+    @property
+    def block(self) -> int:
+        """How many boxes it takes at once."""
+
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
+        """As :meth:`screwsynth.nlp.bounding.NumpyEngine.examine`."""
+
+    def close(self) -> None:
+        """Let its threads go."""
+
+
+#: Boxes of the kernel's block for each thread: enough that what Python does between blocks does not show.
+_BOXES_PER_JOB = 2048
+
+
+class KernelEngine:
+    """The C kernel, on several threads. What becomes of a box does not depend on their number.
+
+    Args:
+        form: what is searched.
+        module: the kernel.
+        jobs: threads; one for each processor when left out.
+    """
+
+    name = "c"
+
+    def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None) -> None:
+        self._module = module
+        self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
+        # The size of a block decides the order of the search, so that it must not depend on the number of threads.
+        self.block = 2 * _BOXES_PER_JOB
+        self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
+        functions = len(form.functions)
+        equation = np.array([0] * functions + [row.is_equation for row in form.rows], dtype=np.int32)
+        depends = np.array(form.dependence, dtype=np.int32)
+        self._form = (
+            form.n,
+            functions,
+            equation,
+            depends,
+            form.lower,
+            form.upper,
+            _packed(search_tape(form)),
+        )
+
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
+        """As :meth:`screwsynth.nlp.bounding.NumpyEngine.examine`."""
+        n, count = lower.shape
+        verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
+        cut_lower, cut_upper = np.empty((n, count), dtype=np.int32), np.empty((n, count), dtype=np.int32)
+        bound, value = np.empty(count), np.empty(count)
+        left_lower, left_upper, centre = np.empty((n, count)), np.empty((n, count)), np.empty((n, count))
+        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
+
+        def part(begin: int, finish: int) -> None:
+            self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold)
+
+        pieces = self._jobs if count >= _WORTH_A_THREAD * self._jobs else 1
+        edges = [count * k // pieces for k in range(pieces + 1)]
+        if pieces == 1 or self._pool is None:
+            part(0, count)
+        else:
+            for each in [self._pool.submit(part, *edge) for edge in itertools.pairwise(edges)]:
+                each.result()
+        return Examined(*found)
+
+    def close(self) -> None:
+        """Let the threads go."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+
+#: Fewer boxes than this are not worth a thread's start.
+_WORTH_A_THREAD = 64
+
+
+def _packed(tape: Tape) -> tuple[Any, ...]:
+    code = np.stack([tape.op, tape.to, tape.a, tape.b, tape.first, tape.last], axis=1).astype(np.int32)
+    return np.ascontiguousarray(code), tape.k, len(tape), tape.registers, tape.outputs
+
+
+def kernel() -> ModuleType | None:
+    """The C kernel, or None where it was not built."""
+    try:
+        return import_module("screwsynth.nlp._bounds")
+    except ImportError:
+        return None
+
+
+def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
+    """An engine for a form.
+
+    Args:
+        form: what is searched.
+        name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
+        jobs: threads of the C kernel.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+        ValueError: there is no engine of that name here.
+    """
+    if name not in (None, "c", "numpy"):
+        raise ValueError(f"there is no engine {name!r}: c or numpy")
+    module = None if name == "numpy" else kernel()
+    if module is None:
+        if name == "c":
+            raise ValueError("the C kernel was not built: numpy is there")
+        return NumpyEngine(form)
+    return KernelEngine(form, module, jobs)

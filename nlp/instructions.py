@@ -1,0 +1,295 @@
+"""A function's expression graph as a flat list of instructions, which any arithmetic can run.
+
+CasADi lists the operations of an ``SX`` function one by one. :func:`lower` writes that list in a dozen operations,
+with exact identities of real numbers for the others (``tan = sin / cos``, ``2 x = x * 2``, a whole power as products),
+so that an arithmetic needs rules for these only. What the list cannot say is refused by name.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from screwsynth.nlp.errors import UncoveredError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from screwsynth.models import FloatArray
+
+
+class Op(enum.IntEnum):
+    """Operations on registers ``r``: ``r[to] = ...`` from ``r[a]``, ``r[b]`` and the constant ``k``.
+
+    The numbers are those of ``_bounds.c``.
+    """
+
+    CONSTANT = 0  # k
+    INPUT = 1  # variable a
+    OUTPUT = 2  # result ``to`` is r[a]
+    ADD = 3  # r[a] + r[b]
+    SUB = 4  # r[a] - r[b]
+    MUL = 5  # r[a] * r[b]
+    DIV = 6  # r[a] / r[b]
+    SHIFT = 7  # r[a] + k
+    SCALE = 8  # r[a] * k
+    SQUARE = 9  # r[a]^2
+    SQRT = 10
+    SIN = 11
+    COS = 12
+    EXP = 13
+    LOG = 14
+    ATAN = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Tape:
+    """A list of instructions.
+
+    Attributes:
+        op: (N,) :class:`Op` of each instruction.
+        to: (N,) register written, or the index of the result for an output.
+        a, b: (N,) registers read, or the index of the variable for an input; 0 where there is none.
+        k: (N,) constants.
+        first, last: (N,) the written value depends on no variable outside of ``first <= i < last``.
+        inputs: number of variables.
+        outputs: number of results.
+        registers: number of registers.
+    """
+
+    op: NDArray[np.int32]
+    to: NDArray[np.int32]
+    a: NDArray[np.int32]
+    b: NDArray[np.int32]
+    k: FloatArray
+    first: NDArray[np.int32]
+    last: NDArray[np.int32]
+    inputs: int
+    outputs: int
+    registers: int
+
+    def __len__(self) -> int:
+        return len(self.op)
+
+
+_SAME = {ca.OP_ADD: Op.ADD, ca.OP_SUB: Op.SUB, ca.OP_MUL: Op.MUL, ca.OP_DIV: Op.DIV}
+_UNARY = {
+    ca.OP_SQ: Op.SQUARE,
+    ca.OP_SQRT: Op.SQRT,
+    ca.OP_SIN: Op.SIN,
+    ca.OP_COS: Op.COS,
+    ca.OP_EXP: Op.EXP,
+    ca.OP_LOG: Op.LOG,
+    ca.OP_ATAN: Op.ATAN,
+}
+_NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
+#: The largest whole power that is written as products.
+_LARGEST_POWER = 64
+
+
+class _Writer:
+    """Collects instructions; knows which registers hold constants, so that these are folded into the instructions."""
+
+    def __init__(self, inputs: int, registers: int) -> None:
+        self.rows: list[tuple[int, int, int, int, float, int, int]] = []
+        self.inputs, self.registers, self.spare = inputs, registers, registers
+        self.constant: dict[int, float] = {}
+        self.written: set[int] = set()
+        self.range: dict[int, tuple[int, int]] = {}
+
+    def temporary(self) -> int:
+        """A register that CasADi does not know."""
+        self.spare += 1
+        return self.spare - 1
+
+    def read(self, register: int) -> int:
+        """The register, once its constant is written in it where it holds one."""
+        if register in self.constant and register not in self.written:
+            self._append(Op.CONSTANT, register, 0, 0, self.constant[register], (0, 0))
+            self.written.add(register)
+        return register
+
+    def hold(self, register: int, value: float) -> None:
+        """A constant, which is written only when an instruction reads it."""
+        self.constant[register] = value
+        self.written.discard(register)
+
+    def write(self, op: Op, to: int, a: int, b: int | None = None, k: float = 0.0) -> None:
+        """An instruction on registers."""
+        a = self.read(a)
+        b = a if b is None else self.read(b)
+        one, other = self.range[a], self.range[b]
+        reach = (min(one[0], other[0]), max(one[1], other[1])) if one[1] and other[1] else max(one, other, key=_size)
+        self._append(op, to, a, b, k, reach)
+
+    def input(self, to: int, index: int) -> None:
+        """A variable."""
+        self._append(Op.INPUT, to, index, 0, 0.0, (index, index + 1))
+
+    def _append(self, op: Op, to: int, a: int, b: int, k: float, reach: tuple[int, int]) -> None:
+        self.rows.append((int(op), to, a, b, k, *reach))
+        if op is not Op.OUTPUT:
+            self.range[to] = reach
+            if op is not Op.CONSTANT:
+                self.constant.pop(to, None)
+
+    def tape(self, outputs: int) -> Tape:
+        """What was written."""
+        columns = list(zip(*self.rows, strict=True))
+        whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 2, 3, 5, 6)]
+        constants = np.array(columns[4], dtype=np.float64)
+        for column in whole:
+            column.setflags(write=False)
+        constants.setflags(write=False)
+        op, to, a, b, first, last = whole
+        return Tape(op, to, a, b, constants, first, last, self.inputs, outputs, self.spare)
+
+
+def _size(reach: tuple[int, int]) -> int:
+    return reach[1] - reach[0]
+
+
+def lower(function: ca.Function) -> Tape:
+    """The instructions of a function of one vector.
+
+    Args:
+        function: made of ``SX``, with one dense input (n, 1) and any number of dense outputs; their elements, column by
+            column, are the results in order.
+
+    Raises:
+        UncoveredError: it holds an operation without a rule, or a constant that is not finite.
+    """
+    writer = _Writer(function.numel_in(0), function.sz_w())
+    sizes = [function.numel_out(i) for i in range(function.n_out())]
+    offset = np.concatenate([[0], np.cumsum(sizes)])
+    for index in range(function.n_instructions()):
+        op = function.instruction_id(index)
+        source, target = function.instruction_input(index), function.instruction_output(index)
+        if op == ca.OP_CONST:
+            value = function.instruction_constant(index)
+            if not math.isfinite(value):
+                raise UncoveredError(f"the constant {value}")
+            writer.hold(target[0], value)
+        elif op == ca.OP_INPUT:
+            writer.input(target[0], source[1])
+        elif op == ca.OP_OUTPUT:
+            writer.write(Op.OUTPUT, int(offset[target[0]]) + target[1], source[0])
+        else:
+            _write(writer, op, target[0], source)
+    return writer.tape(int(offset[-1]))
+
+
+def _write(writer: _Writer, op: int, to: int, source: list[int]) -> None:
+    """One operation of CasADi's in the operations of a tape."""
+    a = source[0]
+    b = source[1] if len(source) > 1 else a
+    known = writer.constant
+    if op in _SAME:
+        if op == ca.OP_MUL and (a in known or b in known):
+            a, b = (b, a) if a in known else (a, b)
+            writer.write(Op.SCALE, to, a, k=known[b])
+        elif op == ca.OP_ADD and (a in known or b in known):
+            a, b = (b, a) if a in known else (a, b)
+            writer.write(Op.SHIFT, to, a, k=known[b])
+        elif op == ca.OP_SUB and b in known:
+            writer.write(Op.SHIFT, to, a, k=-known[b])
+        else:
+            writer.write(_SAME[op], to, a, b)
+    elif op in _UNARY:
+        writer.write(_UNARY[op], to, a)
+    elif op in (ca.OP_TWICE, ca.OP_NEG):
+        writer.write(Op.SCALE, to, a, k=2.0 if op == ca.OP_TWICE else -1.0)
+    elif op == ca.OP_ASSIGN:
+        writer.write(Op.SCALE, to, a, k=1.0)
+    else:
+        _write_composed(writer, op, to, a, b)
+
+
+def _write_composed(writer: _Writer, op: int, to: int, a: int, b: int) -> None:
+    """Operations that are others put together, by identities that are exact for real numbers."""
+    one = writer.temporary()
+    if op == ca.OP_INV:
+        writer.hold(one, 1.0)
+        writer.write(Op.DIV, to, one, a)
+    elif op == ca.OP_TAN:
+        other = writer.temporary()
+        writer.write(Op.SIN, one, a)
+        writer.write(Op.COS, other, a)
+        writer.write(Op.DIV, to, one, other)
+    elif op == ca.OP_HYPOT:
+        other = writer.temporary()
+        writer.write(Op.SQUARE, one, a)
+        writer.write(Op.SQUARE, other, b)
+        writer.write(Op.ADD, one, one, other)
+        writer.write(Op.SQRT, to, one)
+    elif op in (ca.OP_ASIN, ca.OP_ACOS):
+        # asin y = atan(y / sqrt(1 - y^2)), acos y = pi/2 - asin y, for |y| < 1.
+        writer.write(Op.SQUARE, one, a)
+        writer.write(Op.SCALE, one, one, k=-1.0)
+        writer.write(Op.SHIFT, one, one, k=1.0)
+        writer.write(Op.SQRT, one, one)
+        writer.write(Op.DIV, one, a, one)
+        writer.write(Op.ATAN, to, one)
+        if op == ca.OP_ACOS:
+            writer.write(Op.SCALE, to, to, k=-1.0)
+            _add_half_pi(writer, to)
+    elif op == ca.OP_ATAN2:
+        # atan2(y, x) = 2 atan(y / (sqrt(x^2 + y^2) + x)), off the negative x-axis.
+        other = writer.temporary()
+        writer.write(Op.SQUARE, one, a)
+        writer.write(Op.SQUARE, other, b)
+        writer.write(Op.ADD, one, one, other)
+        writer.write(Op.SQRT, one, one)
+        writer.write(Op.ADD, one, one, b)
+        writer.write(Op.DIV, one, a, one)
+        writer.write(Op.ATAN, one, one)
+        writer.write(Op.SCALE, to, one, k=2.0)
+    elif op in (ca.OP_POW, ca.OP_CONSTPOW) and b in writer.constant:
+        _write_power(writer, to, a, writer.constant[b])
+    else:
+        raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
+
+
+def _add_half_pi(writer: _Writer, to: int) -> None:
+    """Add pi / 2, as four times the arc tangent of 1 halved: no double is pi."""
+    quarter = writer.temporary()
+    writer.hold(quarter, 1.0)
+    writer.write(Op.ATAN, quarter, quarter)
+    writer.write(Op.SCALE, quarter, quarter, k=2.0)
+    writer.write(Op.ADD, to, to, quarter)
+
+
+def _write_power(writer: _Writer, to: int, a: int, power: float) -> None:
+    """A whole power, or half of one, as products, roots and a quotient."""
+    twice = 2 * power
+    if not (twice.is_integer() and 0 < abs(power) <= _LARGEST_POWER):
+        raise UncoveredError(f"the power {power:g}")
+    base, result = writer.temporary(), writer.temporary()
+    if power.is_integer():
+        writer.write(Op.SCALE, base, a, k=1.0)
+        left = int(abs(power))
+    else:
+        writer.write(Op.SQRT, base, a)
+        left = int(abs(twice))
+    empty = True
+    while left:
+        if left & 1:
+            if empty:
+                writer.write(Op.SCALE, result, base, k=1.0)
+            else:
+                writer.write(Op.MUL, result, result, base)
+            empty = False
+        left >>= 1
+        if left:
+            writer.write(Op.SQUARE, base, base)
+    if power < 0:
+        unit = writer.temporary()
+        writer.hold(unit, 1.0)
+        writer.write(Op.DIV, to, unit, result)
+    else:
+        writer.write(Op.SCALE, to, result, k=1.0)

@@ -1,0 +1,145 @@
+"""A proof on paper: the tree of boxes that a search went through, with the reason why each leaf was closed.
+
+A proof is a JSON object. It holds the case as text and how its program is stated, the value that was proved, and the
+tree in preorder, as bytes (compressed, in base64). With the box of the program's bounds as the root, each node is
+
+    half i             cut variable i in the middle, 0.5 lower + 0.5 upper: the lower half's tree, then the upper's
+    above i v, below i v    cut it at v: the part above (below) v is a leaf with the reason that follows; then the rest
+    face i, face' i    a monotone variable: only the box's upper (lower) face, which must lie on the root's, is left
+    bounded            nothing feasible in the box has a value above the bound
+    infeasible k       row k holds nowhere in the box
+    monotone i         no maximum lies in the box, because every function rises along variable i
+
+so that the boxes cover the root by construction, and a tree that does not end where it should is no proof. What the
+reasons mean, and why they are enough, is in ``docs/certificate.md``; :mod:`screwsynth.nlp.proofcheck` checks them.
+"""
+
+from __future__ import annotations
+
+import base64
+import enum
+import hashlib
+import json
+import zlib
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from screwsynth.nlp.errors import InputError
+from screwsynth.nlp.program import Nlp
+
+_FORMAT = "screwsynth-proof"
+_VERSION = 1
+
+
+class Node(enum.IntEnum):
+    """Kinds of node; the bytes that follow are those of the names in this module's docstring."""
+
+    HALF = 1
+    ABOVE = 2
+    BELOW = 3
+    FACE_UPPER = 4
+    FACE_LOWER = 5
+    BOUNDED = 6
+    INFEASIBLE = 7
+    MONOTONE = 8
+
+
+class ProofError(InputError):
+    """A proof is not one, or does not belong to the case."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Which program of a case a proof is about.
+
+    Attributes:
+        kind: one task by itself, or the combined program of several.
+        task: index of the task.
+        minimise: whether the task's sense was set to a minimum, to prove that F is above a value.
+        weights, best, ceiling: what the combined program was stated with.
+    """
+
+    kind: Literal["task", "weighted-sum", "worst-case"] = "task"
+    task: int = 0
+    minimise: bool = False
+    weights: tuple[float, ...] = ()
+    best: tuple[float, ...] = ()
+    ceiling: float = 0.0
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A proof as it is written and read.
+
+    Attributes:
+        case: the case file's text.
+        name: the case's name.
+        statement: which of its programs.
+        graph: fingerprint of the program's expressions and bounds.
+        bound: no feasible point of the root has a value above it, in the terms of what is maximised (minus F for a
+            minimum); None: there is no feasible point.
+        tree: the nodes' bytes.
+    """
+
+    case: str
+    name: str
+    statement: Statement
+    graph: str
+    bound: float | None
+    tree: bytes
+
+    def as_text(self) -> str:
+        """The JSON text."""
+        packed = zlib.compress(self.tree, 9)
+        content = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "name": self.name,
+            "case": self.case,
+            "statement": asdict(self.statement),
+            "graph": self.graph,
+            "bound": self.bound,
+            "digest": hashlib.sha256(self.tree).hexdigest(),
+            "tree": base64.b64encode(packed).decode("ascii"),
+        }
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def read_proof(text: str, source: str) -> Proof:
+    """A proof from its JSON text.
+
+    Raises:
+        ProofError: it is none, or was damaged.
+    """
+    try:
+        content: dict[str, Any] = json.loads(text)
+        if content["format"] != _FORMAT or content["version"] != _VERSION:
+            raise ProofError(f"{source}: is no proof of this version")
+        stated = dict(content["statement"])
+        stated["weights"], stated["best"] = tuple(stated["weights"]), tuple(stated["best"])
+        statement = Statement(**stated)
+        tree = zlib.decompress(base64.b64decode(content["tree"], validate=True))
+        digest, bound = content["digest"], None if content["bound"] is None else float(content["bound"])
+        proof = Proof(str(content["case"]), str(content["name"]), statement, str(content["graph"]), bound, tree)
+    except (ValueError, KeyError, TypeError, zlib.error) as error:
+        raise ProofError(f"{source}: is no proof: {type(error).__name__}: {error}") from None
+    if digest != hashlib.sha256(tree).hexdigest():
+        raise ProofError(f"{source}: is damaged: its digest is not that of its tree")
+    return proof
+
+
+def fingerprint(nlp: Nlp) -> str:
+    """SHA-256 of the program's expressions, as CasADi lists their operations, with its arguments and bounds."""
+    program = nlp.program
+    function = ca.Function("graph", [program.x, program.p], [ca.densify(program.objective), ca.densify(program.g)])
+    digest = hashlib.sha256()
+    for index in range(function.n_instructions()):
+        op, inputs = function.instruction_id(index), function.instruction_input(index)
+        constant = function.instruction_constant(index) if op == ca.OP_CONST else 0.0
+        digest.update(repr((op, inputs, function.instruction_output(index), float(constant).hex())).encode())
+    for numbers in (nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper, np.array([nlp.sign])):
+        digest.update(np.ascontiguousarray(numbers, dtype="<f8").tobytes())
+    return digest.hexdigest()

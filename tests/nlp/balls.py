@@ -1,0 +1,76 @@
+"""Tapes in 200-bit ball arithmetic: what the enclosures of the search are held against."""
+
+import flint
+import numpy as np
+
+from screwsynth.nlp.enclosure import Forms
+from screwsynth.nlp.instructions import Op, Tape
+
+
+def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - one branch for each operation
+    """Results of a tape at a point (n,) of doubles; a ball without an end is undefined."""
+    work: list[flint.arb] = [flint.arb(0)] * tape.registers
+    out: list[flint.arb] = [flint.arb(0)] * tape.outputs
+    unary = {Op.SQRT: "sqrt", Op.SIN: "sin", Op.COS: "cos", Op.EXP: "exp", Op.LOG: "log", Op.ATAN: "atan"}
+    flint.ctx.prec = 200
+    for op, to, a, b, k in zip(
+        *(column.tolist() for column in (tape.op, tape.to, tape.a, tape.b, tape.k)), strict=True
+    ):
+        if op == Op.OUTPUT:
+            out[to] = work[a]
+        elif op == Op.INPUT:
+            work[to] = flint.arb(float(point[a]))
+        elif op == Op.CONSTANT:
+            work[to] = flint.arb(k)
+        elif op == Op.ADD:
+            work[to] = work[a] + work[b]
+        elif op == Op.SUB:
+            work[to] = work[a] - work[b]
+        elif op == Op.MUL:
+            work[to] = work[a] * work[b]
+        elif op == Op.DIV:
+            work[to] = work[a] / work[b]
+        elif op == Op.SHIFT:
+            work[to] = work[a] + flint.arb(k)
+        elif op == Op.SCALE:
+            work[to] = work[a] * flint.arb(k)
+        elif op == Op.SQUARE:
+            work[to] = work[a] * work[a]
+        else:
+            work[to] = getattr(work[a], unary[Op(op)])()
+    return out
+
+
+def violations(
+    tape: Tape, forms: Forms, box: int, centre: np.ndarray, radius: np.ndarray, point: np.ndarray
+) -> tuple[int, int]:
+    """How many results lie surely outside of their interval, or of their form at a point of box number ``box``.
+
+    Returns:
+        Violations and checks; an undefined result must be poisoned, which is a check too.
+    """
+    flint.ctx.prec = 200
+    e = [
+        (flint.arb(float(x)) - flint.arb(float(c))) / flint.arb(float(r)) if r > 0 else flint.arb(0)
+        for x, c, r in zip(point, centre, radius, strict=True)
+    ]
+    t = max((abs(each) for each in e), key=lambda ball: float(ball.mid()), default=flint.arb(0))
+    bad = checks = 0
+    for k, ball in enumerate(in_balls(tape, point)):
+        checks += 2
+        if not ball.is_finite():
+            bad += 2 * int(np.isfinite(forms.s[k, box]))
+            continue
+        bad += int(bool(ball < flint.arb(float(forms.lo[k, box]))) or bool(ball > flint.arb(float(forms.hi[k, box]))))
+        if not np.isfinite(forms.s[k, box]):
+            continue
+        linear = flint.arb(float(forms.c[k, box]))
+        for i, step in enumerate(e):
+            linear += flint.arb(float(forms.a[k, i, box])) * step
+        s = flint.arb(float(forms.s[k, box]))
+        low, high = (
+            (linear + t * t * flint.arb(float(forms.p[k, box])) - s),
+            (linear + t * t * flint.arb(float(forms.q[k, box])) + s),
+        )
+        bad += int(bool(ball < low) or bool(ball > high))
+    return bad, checks

@@ -1,0 +1,407 @@
+"""The search of the whole box: both engines, soundness on random problems, and every trap that was met."""
+
+import json
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from screwsynth.models import stewart_gough
+from screwsynth.nlp import (
+    Case,
+    Free,
+    Rotation,
+    Task,
+    bounding,
+    case_from_tables,
+    formulate,
+    load_case,
+    quadratic,
+    solve,
+)
+from screwsynth.nlp.bounding import Examined, NumpyEngine, Verdict, search_tape
+from screwsynth.nlp.branchandbound import certify
+from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.certificate import CertificateStatus
+from screwsynth.nlp.engines import engine_for, kernel
+from screwsynth.nlp.formulation import formulate_worst
+from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.standardform import standard_form
+
+needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
+ENGINES = ["numpy", pytest.param("c", marks=needs_kernel)]
+
+
+def upu(free: str = "1", sense: str = "max", **axes: object) -> Case:
+    """A 3-UPU of the paper with the couple axes of some limbs free."""
+    tables = tomllib.loads(find_case(f"paper-4.4-{sense}").read_text(encoding="utf-8"))
+    del tables["expect"], tables["published"]
+    parameters = tables["robot"]["parameters"]
+    for k in range(3):
+        if str(k + 1) not in free:
+            azimuth = 2 * math.pi * k / 3
+            parameters[f"u1_{k + 1}"] = [math.cos(azimuth), math.sin(azimuth), 0]
+            parameters[f"u2_{k + 1}"] = [-math.sin(azimuth), math.cos(azimuth), 0]
+    parameters.update(axes)
+    return case_from_tables(tables, name="upu", source="upu")
+
+
+def variant(name: str, layout: str) -> Case:
+    tables = tomllib.loads(find_case(name).read_text(encoding="utf-8"))
+    tables["robot"]["layout"] = layout
+    del tables["expect"], tables["published"]
+    return case_from_tables(tables, name=name, source=name)
+
+
+def random_case(seed: int) -> Case:
+    """A random robot, twist, box and sense with 4 to 6 free variables and often an active rotation ball."""
+    rng = np.random.default_rng(seed)
+    x1, x2 = rng.uniform(6, 15), rng.uniform(4, 10)
+    position = [Free(-w, w) for w in rng.uniform(1, 6, 2)] + [Free(25.0, 25 + rng.uniform(3, 15))]
+    parameters = {"x1": x1, "x2": x2, "x3": rng.uniform(0.05, 0.5), "x4": rng.uniform(0.05, 0.5)}
+    size = rng.uniform(0.05, 0.3)
+    kind = rng.integers(3)
+    rotation = Rotation(axis=None, angle=Free(-size, size))
+    if kind == 0:
+        rotation = Rotation(axis=rng.normal(size=3), angle=Free(-size, size))
+        parameters["x4"] = Free(0.05, 0.5)
+    elif kind == 1:
+        position[2] = 30.0
+    twist = np.concatenate([rng.normal(size=3), rng.normal(size=3) * rng.choice([1.0, 10.0])])
+    task = Task(twist, "max" if rng.random() < 0.5 else "min")  # type: ignore[arg-type]
+    layout = "aligned" if rng.random() < 0.5 else "octahedral"
+    return Case(stewart_gough(layout=layout), parameters, position, [task], rotation=rotation)  # type: ignore[arg-type]
+
+
+def random_boxes(nlp: Nlp, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    room = (nlp.upper - nlp.lower)[:, None]
+    width = 10.0 ** rng.uniform(-4, 0, size=(nlp.n, count)) * (rng.random((nlp.n, count)) > 0.1)
+    low = nlp.lower[:, None] + room * rng.random((nlp.n, count)) * (1 - width)
+    return low, np.minimum(low + room * width, nlp.upper[:, None])
+
+
+@needs_kernel
+@pytest.mark.parametrize(
+    "case", [load_case("paper-4.1-helical"), load_case("paper-4.3"), upu()], ids=["4.1", "4.3", "upu"]
+)
+def test_the_engines_agree_box_by_box(case: Case) -> None:
+    nlp = formulate(case)
+    form = standard_form(nlp)
+    low, high = random_boxes(nlp, 600, 3)
+    reference = engine_for(form, "numpy").examine(low, high, 1.0 if "upu" in case.name else 400.0)
+    other = engine_for(form, "c", 2).examine(low, high, 1.0 if "upu" in case.name else 400.0)
+    assert (reference.verdict == other.verdict).mean() > 0.995
+    same = reference.verdict == other.verdict
+    assert np.array_equal(np.isfinite(reference.bound), np.isfinite(other.bound))
+    np.testing.assert_allclose(other.bound[same], reference.bound[same], rtol=1e-11, atol=1e-9)
+    agree = (
+        same
+        & (reference.cut_lower == other.cut_lower).all(axis=0)
+        & (reference.cut_upper == other.cut_upper).all(axis=0)
+    )
+    assert agree.mean() > 0.99
+    opened = agree & (reference.verdict == Verdict.OPEN)
+    np.testing.assert_allclose(other.lower[:, opened], reference.lower[:, opened], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(other.upper[:, opened], reference.upper[:, opened], rtol=1e-9, atol=1e-9)
+    assert (reference.split == other.split)[opened].mean() > 0.99
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["paper-4.2-rotation", "paper-4.2-translation"])
+def test_one_box_is_enough_for_a_flat_optimum(name: str, engine: str) -> None:
+    solution = solve(load_case(name), starts=2)
+    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine)
+    assert (proved.status, proved.boxes, proved.engine) == (CertificateStatus.PROVED, 1, engine)
+    assert proved.gap <= 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_paper_is_proved_to_a_ten_thousandth(engine: str) -> None:
+    solution = solve(load_case("paper-4.1-helical"), starts=4)
+    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine)
+    assert proved.status is CertificateStatus.PROVED
+    assert 0 <= proved.bound - 407.2106717 <= 1.0001e-4 * 407.2106717
+    assert proved.boxes <= 60_000
+
+
+@pytest.mark.slow
+@needs_kernel
+@pytest.mark.parametrize(
+    ("case", "gap", "most"),
+    [
+        (load_case("paper-4.1-helical"), 1e-6, 60_000),
+        (load_case("paper-4.1-rotation"), 1e-4, 60_000),
+        (variant("paper-4.1-helical", "octahedral"), 1e-4, 200_000),
+        (load_case("paper-4.3"), 1e-4, 600_000),
+        (upu(), 1e-4, 600_000),
+        (upu(sense="min"), 1e-4, 60_000),
+    ],
+    ids=["4.1 finer", "4.1 rotation", "4.1 octahedral", "4.3", "upu", "upu min"],
+)
+def test_the_kernel_proves(case: Case, gap: float, most: int) -> None:
+    solution = solve(case, starts=8)
+    proved = certify(solution.nlp, solution.x, claimed=solution.F, gap=gap, time_limit=120)
+    assert proved.status is CertificateStatus.PROVED
+    assert proved.gap <= proved.allowed * (1 + 1e-9)
+    assert proved.boxes <= most
+
+
+def ipopt_never_beats(case: Case, engine: str | None = None) -> tuple[float, float]:
+    """The certified bound and the best of many Ipopt starts, to be maximised."""
+    solution = solve(case, starts=48, seed=1)
+    proved = certify(solution.nlp, solution.x, gap=1e-2, time_limit=60, engine=engine)
+    assert proved.status is CertificateStatus.PROVED
+    sign = -solution.nlp.sign
+    return sign * proved.bound, sign * solution.F
+
+
+@pytest.mark.slow
+@needs_kernel
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=12, deadline=None)
+def test_no_start_beats_a_certified_bound(seed: int) -> None:
+    bound, best = ipopt_never_beats(random_case(seed))
+    assert bound >= best - 1e-9 * abs(best)
+
+
+def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trap: dropping a monotone box is sound only where no row stops a point from following."""
+    case = load_case("paper-4.1-helical", {"angle": 0})
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8"))
+    tables["pose"]["position"] = [0, 0, 30]
+    tables["pose"]["rotation"]["angle"] = {"min": -5, "max": 5}
+    del tables["expect"], tables["published"]
+    case = case_from_tables(tables, name="ball", source="ball")
+    solution = solve(case, starts=4)
+    (ball,) = [side for side in solution.evidence.active if side.name == "angle"]  # type: ignore[union-attr]
+    assert ball.bound == "max"
+    sound = certify(solution.nlp, None, engine="numpy", gap=1e-3)
+    assert sound.status is CertificateStatus.PROVED
+    assert sound.bound >= solution.F * (1 - 1e-12)
+
+    whole = NumpyEngine._monotone
+
+    def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
+        return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(NumpyEngine, "_monotone", careless)
+    inside = 0.5 * solution.x
+    wrong = certify(solution.nlp, inside, engine="numpy", gap=1e-9)
+    assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_box_without_a_value_is_kept(engine: str) -> None:
+    """Trap: comparing NaN closes a box and proves anything; a limb of zero length must end the search openly."""
+    task = Task((0.3, -0.2, 0.5, 1.0, 2.0, -0.5), "max")  # type: ignore[arg-type]
+    position = [Free(-2.0, 3.0), Free(-2.0, 2.0), Free(-1.0, 2.0)]
+    case = Case(stewart_gough(), {"x1": 5.0, "x2": 5.0, "x3": 0.3, "x4": 0.3}, position, [task])
+    found = certify(formulate(case), np.array([1.0, 1.0, 1.0]), engine=engine, time_limit=30)
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert not math.isfinite(found.bound)
+    assert "zero length" in found.reason
+    assert found.as_data()["bound"] is None
+    json.dumps(found.as_data(), allow_nan=False)
+
+
+def test_nan_in_a_bound_does_not_close_a_box() -> None:
+    nlp = formulate(load_case("paper-4.1-helical"))
+    engine = NumpyEngine(standard_form(nlp))
+    low, high = nlp.lower[:, None].copy(), nlp.upper[:, None].copy()
+    low[2], high[2] = np.nan, np.nan
+    assert engine.examine(low, high, 1e300).verdict[0] == Verdict.OPEN
+
+
+def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
+    """Trap: a solver that widens bounds returns values above the true maximum."""
+    solution = solve(load_case("paper-4.2-translation"), starts=4)
+    assert (solution.x >= solution.nlp.lower).all()
+    assert (solution.x <= solution.nlp.upper).all()
+    outside = solution.nlp.upper + 1e-6 * solution.nlp.scale
+    found = certify(solution.nlp, outside)
+    assert found.status is CertificateStatus.REFUSED
+    assert "outside of the limits" in found.statement
+
+
+def test_an_incumbent_that_is_too_good_is_refused() -> None:
+    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
+    found = certify(solution.nlp, solution.x, claimed=solution.F * (1 + 1e-3))
+    assert found.status is CertificateStatus.REFUSED
+    assert f"{solution.F:.10g}" in found.statement
+    assert found.boxes == 0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_incumbent_that_is_beaten_is_replaced(engine: str) -> None:
+    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
+    found = certify(solution.nlp, solution.nlp.centre, engine=engine)
+    assert found.status is CertificateStatus.PROVED
+    assert found.was_beaten
+    assert "better than the one given" in found.statement
+    assert found.incumbent == pytest.approx(solution.F, rel=1e-4)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_empty_feasible_set_is_a_proof_of_its_own(engine: str) -> None:
+    nlp = formulate(load_case("paper-4.1-helical"))
+    impossible = replace(nlp, g_lower=np.array([0.9]), g_upper=np.array([0.95]))
+    found = certify(impossible, engine=engine)
+    assert found.status is CertificateStatus.INFEASIBLE
+    assert found.as_data()["bound"] is None
+
+
+@pytest.mark.parametrize(("value", "status"), [(1.0, CertificateStatus.PROVED), (300.0, CertificateStatus.REFUSED)])
+def test_f_is_above_a_value_on_the_whole_box_or_a_point_shows_otherwise(
+    value: float, status: CertificateStatus
+) -> None:
+    nlp = formulate(load_case("paper-4.1-helical-axis-z"))
+    least = replace(nlp, sense=type(nlp.sense)("min"))
+    found = certify(least, above=value)
+    assert found.status is status
+    if status is CertificateStatus.PROVED:
+        assert found.bound > value
+    else:
+        assert found.x is not None
+        assert nlp.evaluate(found.x)[0] <= value
+
+
+def test_above_needs_a_minimisation() -> None:
+    with pytest.raises(ValueError, match="min"):
+        certify(formulate(load_case("paper-4.1-helical")), above=0.0)
+
+
+def test_stopping_early_still_gives_a_bound_that_holds() -> None:
+    solution = solve(load_case("paper-4.1-helical"), starts=4)
+    found = certify(solution.nlp, solution.x, time_limit=0.15, engine="numpy")
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert found.bound >= solution.F
+    assert found.open > 0
+    assert "stopped after" in found.statement
+
+
+def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    solution = solve(load_case("paper-4.1-helical"), starts=4)
+    examine, calls = NumpyEngine.examine, []
+
+    def interrupted(self: NumpyEngine, *arguments: object) -> Examined:
+        calls.append(1)
+        if len(calls) == 9:
+            raise KeyboardInterrupt
+        return examine(self, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(NumpyEngine, "examine", interrupted)
+    found = certify(solution.nlp, solution.x, engine="numpy")
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert math.isfinite(found.bound)
+    assert found.bound >= solution.F
+    assert "interrupted" in found.statement
+
+
+def test_a_case_with_nothing_free_is_its_own_bound() -> None:
+    nlp = formulate(load_case("paper-4.4-snu"))
+    found = certify(nlp)
+    assert found.status is CertificateStatus.PROVED
+    assert found.boxes == 0
+    assert found.bound == found.incumbent
+
+
+def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() -> None:
+    base = load_case("paper-4.1-helical-axis-z")
+    other = Task((0.1, 0.3, 1.0, 2.0, -1.0, 0.4), "max", "other")  # type: ignore[arg-type]
+    case = replace(base, tasks=[base.tasks[0], other])
+    nlp = formulate_worst(case, [1.0, 1.0], [400.0, 400.0], 400.0)
+    form = standard_form(nlp)
+    assert form.has_level
+    assert (len(form.functions), form.n, len(form.rows)) == (2, nlp.n - 1, 0)
+    found = certify(nlp, gap=1e-3)
+    assert found.status is CertificateStatus.PROVED
+    rng = np.random.default_rng(0)
+    each = [formulate(case, j) for j in range(2)]
+    points = each[0].lower + rng.random((2000, each[0].n)) * (each[0].upper - each[0].lower)
+    best = max(min(program.evaluate(x)[0] for program in each) for x in points)
+    assert best <= found.bound
+    assert found.incumbent >= best * (1 - 1e-9)
+
+
+def test_progress_and_history_shrink_to_the_gap() -> None:
+    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
+    seen: list[tuple[float, float, float, int, int]] = []
+    found = certify(solution.nlp, solution.x, progress=lambda *row: seen.append(row))
+    assert seen
+    bounds = [bound for _, bound, _ in found.history]
+    assert bounds == sorted(bounds, reverse=True)
+    assert found.history[-1][1] == found.bound
+
+
+def test_rules_use_every_constant_of_the_kernel_alike() -> None:
+    """The numbers that both engines must share are written in both files."""
+    source = find_case("paper-4.1-helical").parents[1] / "nlp" / "_bounds.c"
+    if not source.exists():
+        pytest.skip("an installed package has no source of the kernel")
+    text = source.read_text(encoding="utf-8")
+    numbers: dict[str, float] = {
+        "WORTH": bounding._WORTH,
+        "LINEAR": bounding._LINEAR,
+        "ROOT_SLACK": quadratic._ROOT_SLACK,
+        "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
+        "TANGENT_ROUNDS": bounding._TANGENT_ROUNDS,
+    }
+    for name, value in numbers.items():
+        (line,) = [line for line in text.splitlines() if line.startswith(f"#define {name} ")]
+        assert float(line.split()[2]) == value
+
+
+@pytest.mark.parametrize("engine", ["fortran", "c"])
+def test_an_engine_that_is_not_there_is_refused(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("screwsynth.nlp.engines.kernel", lambda: None)
+    form = standard_form(formulate(load_case("paper-4.2-rotation")))
+    with pytest.raises(ValueError, match="numpy"):
+        engine_for(form, engine)
+    assert engine_for(form).name == "numpy"
+
+
+def test_the_tape_is_the_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    del monkeypatch
+    form = standard_form(formulate(load_case("paper-4.3")))
+    x = 0.5 * (form.lower + form.upper)
+    engine: Callable[..., Examined] = engine_for(form).examine
+    found = engine(x[:, None], x[:, None], math.inf)
+    assert found.bound[0] == pytest.approx(form.level_of(x), rel=1e-11)
+    assert len(search_tape(form)) > 100
+
+
+def test_the_kernel_is_built_without_what_would_break_it() -> None:
+    """Trap: -ffast-math drops tests for NaN, and fused operations make the engines differ."""
+    path = find_case("paper-4.1-helical").parents[1] / "pyproject.toml"
+    if not path.exists():
+        pytest.skip("an installed package has no build settings")
+    (extension,) = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["setuptools"]["ext-modules"]
+    flags = extension["extra-compile-args"]
+    assert "-ffp-contract=off" in flags
+    assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
+    assert extension["optional"] is True
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_box_that_collapses_to_a_corner_is_examined_there(engine: str) -> None:
+    """Trap: a corner cannot be cut, and was not examined as a corner yet; it must not be left over."""
+    solution = solve(corner_case(), starts=8)
+    assert solution.evidence is not None
+    assert len(solution.evidence.active) == solution.nlp.n
+    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine, gap=1e-6)
+    assert proved.status is CertificateStatus.PROVED
+
+
+def corner_case() -> Case:
+    """Positions only, with an optimum in a corner of the box."""
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8"))
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": -13}
+    del tables["expect"], tables["published"]
+    return case_from_tables(tables, name="corner", source="corner")

@@ -1,0 +1,166 @@
+"""Enclosures against 200-bit ball arithmetic: on random graphs over every operation, and on the models."""
+
+import importlib.util
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from screwsynth.nlp import enclosure, formulate, load_case
+from screwsynth.nlp.bounding import search_tape
+from screwsynth.nlp.enclosure import enclose, midpoints
+from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.instructions import Op, Tape, lower
+from screwsynth.nlp.slopes import SlopeArithmetic
+from screwsynth.nlp.standardform import standard_form
+
+pytest.importorskip("flint")
+_spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
+assert _spec is not None
+assert _spec.loader is not None
+balls = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(balls)
+
+UNARY = (
+    ca.sin, ca.cos, ca.sqrt, ca.exp, ca.log, ca.atan, ca.tan, ca.asin, ca.acos, ca.sumsqr,
+    lambda x: -x, lambda x: 2 * x, lambda x: 1 / x, lambda x: x**3, lambda x: x**-2, lambda x: x**1.5,
+)  # fmt: skip
+BINARY = (
+    lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y, lambda x, y: x / y, ca.atan2, ca.hypot,
+)  # fmt: skip
+N = 3
+
+
+def random_function(seed: int, steps: int) -> ca.Function:
+    """A graph of random operations on three variables and constants; every value is a result."""
+    rng = np.random.default_rng(seed)
+    x = ca.SX.sym("x", N)
+    values = list(ca.vertsplit(x))
+    while len(values) < N + steps:
+        one = values[rng.integers(len(values))]
+        if rng.random() < 0.45:
+            value = UNARY[rng.integers(len(UNARY))](one)
+        else:
+            other = ca.SX(float(rng.normal())) if rng.random() < 0.3 else values[rng.integers(len(values))]
+            value = BINARY[rng.integers(len(BINARY))](*((one, other) if rng.random() < 0.5 else (other, one)))
+        # x - x becomes 0, and sqrt(x^2) becomes |x|, which has no rule.
+        if not value.is_constant() and "fabs" not in str(value):
+            values.append(value)
+    return ca.Function("random", [x], [ca.densify(ca.vertcat(*values[N:]))])
+
+
+def random_boxes(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes of every size from points to units, some of them with sides of no width."""
+    rng = np.random.default_rng(seed)
+    centre = rng.normal(size=(N, count)) * rng.choice([0.3, 1.0, 3.0], size=(1, count))
+    width = 10.0 ** rng.uniform(-12, 0, size=(N, count)) * (rng.random((N, count)) > 0.15)
+    return centre - width, centre + width
+
+
+def count_violations(
+    tape: Tape, lower_ends: np.ndarray, upper_ends: np.ndarray, points: int, seed: int
+) -> tuple[int, int]:
+    rng = np.random.default_rng(seed)
+    forms = enclose(tape, lower_ends, upper_ends)
+    centre, radius = midpoints(lower_ends, upper_ends)
+    bad = checks = 0
+    for box in range(lower_ends.shape[1]):
+        for k in range(points):
+            share = rng.random(len(lower_ends)) if k else rng.integers(0, 2, len(lower_ends))
+            point = lower_ends[:, box] + share * (upper_ends[:, box] - lower_ends[:, box])
+            point = np.clip(point, lower_ends[:, box], upper_ends[:, box])
+            more, made = balls.violations(tape, forms, box, centre[:, box], radius[:, box], point)
+            bad, checks = bad + more, checks + made
+    return bad, checks
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=60, deadline=None)
+def test_random_graphs_stay_inside_their_enclosures(seed: int) -> None:
+    tape = lower(random_function(seed, 24))
+    bad, checks = count_violations(tape, *random_boxes(seed + 1, 14), points=2, seed=seed)
+    assert bad == 0
+    assert checks == 14 * 2 * 2 * 24
+
+
+MODELS = ("paper-4.1-helical", "paper-4.1-helical-axis-z", "paper-4.2-rotation", "paper-4.3", "paper-4.4-max")
+
+
+def count_on_models(boxes: int, widths: tuple[float, float]) -> tuple[int, int]:
+    bad = checks = 0
+    for name in MODELS:
+        form = standard_form(formulate(load_case(name)))
+        rng = np.random.default_rng(7)
+        room = (form.upper - form.lower)[:, None]
+        width = 10.0 ** rng.uniform(*widths, size=(form.n, boxes))
+        low = form.lower[:, None] + room * rng.random((form.n, boxes)) * (1 - width)
+        more, made = count_violations(
+            search_tape(form), low, np.minimum(low + room * width, form.upper[:, None]), 2, 11
+        )
+        bad, checks = bad + more, checks + made
+    return bad, checks
+
+
+@pytest.mark.slow
+def test_models_stay_inside_their_enclosures_and_the_checks_are_many() -> None:
+    bad, checks = count_on_models(200, (-12, -0.5))
+    assert bad == 0
+    assert checks > 100_000
+
+
+def test_without_the_rounding_terms_violations_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enclosure, "ULP", 0.0)
+    monkeypatch.setattr(enclosure, "TINY", 0.0)
+    monkeypatch.setattr(enclosure, "_OFF", 0.0)
+    bad, checks = count_on_models(6, (-14, -9))
+    assert bad > checks / 50
+
+
+def test_every_operation_occurs_in_the_random_graphs() -> None:
+    met = {int(op) for seed in range(20) for op in lower(random_function(seed, 24)).op}
+    assert met == {int(op) for op in Op}
+
+
+@pytest.mark.parametrize("operation", [ca.fabs, ca.erf, ca.floor, ca.sinh])
+def test_an_operation_without_a_rule_is_refused_by_name(operation: object) -> None:
+    x = ca.SX.sym("x", 1)
+    name = operation.__name__  # type: ignore[attr-defined]
+    with pytest.raises(UncoveredError, match=f"'{name}'"):
+        lower(ca.Function("f", [x], [operation(x)]))  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("power", [0.3, 1e3])
+def test_a_power_without_a_rule_is_refused(power: float) -> None:
+    x = ca.SX.sym("x", 1)
+    with pytest.raises(UncoveredError, match="the power"):
+        lower(ca.Function("f", [x], [x**power]))
+
+
+def test_the_checkers_slopes_hold_the_values_too() -> None:
+    for seed in range(40):
+        function = random_function(seed, 20)
+        tape = lower(function)
+        low, high = random_boxes(seed, 10)
+        values = SlopeArithmetic(function)(low, high)
+        rng = np.random.default_rng(seed)
+        for box in range(10):
+            point = np.clip(low[:, box] + rng.random(N) * (high[:, box] - low[:, box]), low[:, box], high[:, box])
+            for value, ball in zip(values, balls.in_balls(tape, point), strict=True):
+                ends = float(value.V[0][box]), float(value.V[1][box])
+                if not ball.is_finite():
+                    assert np.isnan(ends).any() or np.isinf(ends).any()
+                elif not np.isnan(ends).any():
+                    assert not bool(ball < balls.flint.arb(ends[0]))
+                    assert not bool(ball > balls.flint.arb(ends[1]))
+
+
+@pytest.mark.parametrize("bad", ["sqrt(x - 2)", "1 / x", "log(x)"])
+def test_what_may_be_undefined_is_poisoned_for_good(bad: str) -> None:
+    x = ca.SX.sym("x", 1)
+    inner = eval(bad, {"x": x, "sqrt": ca.sqrt, "log": ca.log})  # noqa: S307 - the three above
+    for outer in (ca.sin(inner), ca.cos(inner) ** 2, ca.atan(inner), inner * (x + 3), ca.exp(ca.sin(inner))):
+        forms = enclose(lower(ca.Function("f", [x], [outer])), np.array([[-1.0]]), np.array([[1.0]]))
+        assert np.isinf([forms.s[0, 0], forms.lo[0, 0], forms.hi[0, 0]]).all()

@@ -1,0 +1,279 @@
+"""Proofs on paper: what the checker accepts, and that it rejects everything that was tampered with."""
+
+import base64
+import hashlib
+import json
+import tomllib
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from screwsynth.nlp import Case, case_from_tables, load_case
+from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.certification import Wanted, certify_case, program_of, proof_of
+from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint, read_proof
+from screwsynth.nlp.proofcheck import check_proof
+from screwsynth.nlp.prooftree import Reader, unfolded
+from screwsynth.nlp.standardform import standard_form
+
+Run = Callable[..., tuple[int, str, str]]
+NAME = "paper-4.1-helical-axis-z"
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return find_case(NAME).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def proof(text: str) -> Proof:
+    """Axis held: four variables, no row, faces and contraction."""
+    case = load_case(NAME)
+    return proof_of(certify_case(case, Wanted(gap=1e-4), case.search.but(4, None), with_proof=True), text)
+
+
+def ball_case() -> Case:
+    """A small box with an active rotation ball: rows, infeasible leaves and multipliers."""
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8"))
+    tables["pose"]["position"] = [0, 0, 30]
+    tables["pose"]["rotation"]["angle"] = {"min": -5, "max": 5}
+    del tables["expect"], tables["published"]
+    return case_from_tables(tables, name="ball", source="ball")
+
+
+@pytest.fixture(scope="module")
+def ball() -> Proof:
+    case = ball_case()
+    return proof_of(certify_case(case, Wanted(gap=1e-5), case.search.but(4, None), with_proof=True), "")
+
+
+def test_a_proof_holds_and_survives_writing_and_reading(proof: Proof) -> None:
+    again = read_proof(proof.as_text(), "again")
+    assert again == proof
+    nlp = program_of(load_case(NAME), proof.statement)
+    checked = check_proof(again, nlp)
+    assert checked.leaves > 10
+    assert checked.bound == proof.bound
+
+
+def test_a_proof_with_rows_holds(ball: Proof) -> None:
+    nlp = program_of(ball_case(), ball.statement)
+    claims = unfolded(ball.tree, standard_form(nlp))
+    assert {claim.kind for claim in claims} >= {Node.BOUNDED, Node.INFEASIBLE}
+    check_proof(ball, nlp)
+
+
+class Places(Reader):
+    """Notes where in the tree each closing reason stands, and how long it is."""
+
+    def _leaf(self, kind: int, lower: np.ndarray, upper: np.ndarray) -> None:
+        start = self.at - 1
+        super()._leaf(kind, lower, upper)
+        middle = 0.5 * (lower + upper)
+        feasible = self._form.violation_of(middle) <= 0
+        self.places = [*getattr(self, "places", []), (start, self.at - start, feasible)]
+
+
+def nodes(proof: Proof, case: Case) -> list[tuple[int, int, bool]]:
+    """Start and length of every closing reason in a tree, and whether the middle of its box is feasible."""
+    form = standard_form(program_of(case, proof.statement))
+    reader = Places(proof.tree, form)
+    waiting = [(np.array(form.lower), np.array(form.upper))]
+    while waiting:
+        waiting += reader.node(*waiting.pop())
+    assert reader.at == len(proof.tree)
+    return reader.places
+
+
+def rejected(proof: Proof, case: Case) -> str:
+    with pytest.raises(ProofError) as caught:
+        check_proof(proof, program_of(case, proof.statement))
+    return str(caught.value)
+
+
+def test_a_tree_without_one_of_its_leaves_is_rejected(proof: Proof) -> None:
+    places = nodes(proof, load_case(NAME))
+    for at, length, _ in (places[0], places[len(places) // 2], places[-1]):
+        tree = proof.tree[:at] + proof.tree[at + length :]
+        assert rejected(replace(proof, tree=tree), load_case(NAME))
+
+
+def test_a_tree_with_a_leaf_too_many_is_rejected(proof: Proof) -> None:
+    message = rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), load_case(NAME))
+    assert "goes on" in message
+
+
+def test_an_altered_bound_is_rejected(proof: Proof, ball: Proof) -> None:
+    assert proof.bound is not None
+    assert ball.bound is not None
+    message = rejected(replace(proof, bound=proof.bound * (1 - 3e-4)), load_case(NAME))
+    assert "bounded" in message
+    assert "bounded" in rejected(replace(ball, bound=ball.bound * (1 - 3e-4)), ball_case())
+
+
+def test_an_altered_cut_is_rejected(ball: Proof) -> None:
+    tree = bytearray(ball.tree)
+    at = next(at for at, kind in enumerate(tree) if kind == Node.HALF)
+    del tree[at : at + 2]
+    assert rejected(replace(ball, tree=bytes(tree)), ball_case())
+
+
+def test_a_changed_reason_is_rejected(ball: Proof) -> None:
+    places = nodes(ball, ball_case())
+    row = len(standard_form(program_of(ball_case(), ball.statement)).functions)
+    infeasible = [at for at, _, _ in places if ball.tree[at] == Node.INFEASIBLE]
+    bounded = [at for at, _, feasible in places if ball.tree[at] == Node.BOUNDED and feasible]
+    for at in (bounded[0], bounded[-1]):
+        tree = ball.tree[:at] + bytes([Node.INFEASIBLE, row]) + ball.tree[at + 1 :]
+        assert "infeasible" in rejected(replace(ball, tree=tree), ball_case())
+    for at in (bounded[0], infeasible[0]):
+        length = 1 if ball.tree[at] == Node.BOUNDED else 2
+        tree = ball.tree[:at] + bytes([Node.MONOTONE, 0]) + ball.tree[at + length :]
+        assert "monotone" in rejected(replace(ball, tree=tree), ball_case())
+
+
+@pytest.mark.parametrize(
+    "tree", [b"", b"\xff", bytes([Node.HALF]), bytes([Node.HALF, 200]), bytes([Node.INFEASIBLE, 9])]
+)
+def test_what_is_no_tree_is_rejected(proof: Proof, tree: bytes) -> None:
+    assert rejected(replace(proof, tree=tree), load_case(NAME))
+
+
+def test_a_face_that_is_not_the_cases_is_rejected(proof: Proof) -> None:
+    tree = bytes([Node.HALF, 0, Node.FACE_UPPER, 0]) + proof.tree
+    assert rejected(replace(proof, tree=tree + proof.tree), load_case(NAME))
+
+
+def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
+    other = load_case(NAME, {"x1": 12.5})
+    assert "other expressions" in rejected(proof, other)
+    assert fingerprint(program_of(load_case(NAME), proof.statement)) == proof.graph
+
+
+def test_the_command_line_writes_and_checks_proofs(cli: Run, tmp_path: Path) -> None:
+    target = tmp_path / "proof.json"
+    code, out, _ = cli("certify", NAME, "--gap", "1e-3", "--starts", "4", "--proof", str(target))
+    assert code == 0
+    assert "proved" in out
+    for arguments in ((str(target),), (str(target), NAME)):
+        code, out, _ = cli("verify-proof", *arguments)
+        assert code == 0, out
+        assert "holds: F is at most" in out
+    code, _, err = cli("verify-proof", str(target), "paper-4.1-rotation-axis-z")
+    assert code == 1
+    assert "other expressions" in err
+
+
+def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path: Path, proof: Proof) -> None:
+    target = tmp_path / "proof.json"
+    content = json.loads(proof.as_text())
+    tree = zlib.decompress(base64.b64decode(content["tree"]))
+    content["tree"] = base64.b64encode(zlib.compress(tree[:-1])).decode()
+    target.write_text(json.dumps(content))
+    code, _, err = cli("verify-proof", str(target))
+    assert code == 2
+    assert "damaged" in err
+    content["digest"] = hashlib.sha256(tree[:-1]).hexdigest()
+    target.write_text(json.dumps(content))
+    code, _, err = cli("verify-proof", str(target))
+    assert code == 1
+    assert "rejected" in err
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 1}', "\x00"])
+def test_what_is_no_proof_is_refused_in_a_sentence(cli: Run, tmp_path: Path, text: str) -> None:
+    target = tmp_path / "proof.json"
+    target.write_text(text)
+    code, out, err = cli("verify-proof", str(target))
+    assert (code, out) == (2, "")
+    assert str(target) in err
+    assert "Traceback" not in err
+
+
+def test_a_proof_that_is_not_there_is_refused(cli: Run, tmp_path: Path) -> None:
+    code, _, err = cli("verify-proof", str(tmp_path / "none.json"))
+    assert code == 2
+    assert "cannot be read" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("--gap", "0"), "--gap"),
+        (("--gap", "nan"), "--gap"),
+        (("--time", "0"), "--time"),
+        (("--above", "inf"), "--above"),
+        (("--proof", "-", "--json", "-"), "standard output"),
+        (("--proof", "/nowhere/p.json"), "no folder"),
+    ],
+)
+def test_wrong_input_to_certify_is_one_sentence(cli: Run, arguments: tuple[str, ...], fault: str) -> None:
+    code, out, err = cli("certify", NAME, *arguments)
+    assert (code, out) == (2, "")
+    assert fault in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_the_certificate_in_the_result(cli: Run) -> None:
+    code, out, _ = cli("solve", NAME, "--starts", "4", "--certify", "--json", "-")
+    assert code == 0
+    result = json.loads(out)
+    certificate = result["certificate"]
+    assert certificate["status"] == "proved"
+    assert certificate["engine"] in ("c", "numpy")
+    assert certificate["bound"] >= result["F"] == pytest.approx(certificate["incumbent"])
+    assert certificate["gap"] == pytest.approx(certificate["bound"] - certificate["incumbent"])
+    assert certificate["relative_gap"] <= 1e-4
+    assert certificate["open"] == 0
+    assert all(len(row) == 3 for row in certificate["history"])
+    code, out, _ = cli("solve", NAME, "--starts", "4", "--json", "-")
+    assert json.loads(out)["certificate"] is None
+
+
+def test_several_tasks_are_certified_one_by_one(cli: Run) -> None:
+    code, out, _ = cli("certify", "paper-4.2", "--json", "-")
+    assert code == 0
+    result = json.loads(out)
+    assert [task["certificate"]["status"] for task in result["tasks"]] == ["proved", "proved"]
+    assert result["certificate"] is None
+    code, _, err = cli("certify", "paper-4.2", "--proof", "p.json")
+    assert code == 2
+    assert "averaged" in err
+
+
+def test_above_on_the_command_line(cli: Run) -> None:
+    code, out, _ = cli("certify", NAME, "--above", "1")
+    assert code == 0
+    assert "F is above 1 on the whole box" in out
+    code, out, _ = cli("certify", NAME, "--above", "300")
+    assert code == 1
+    assert "not above 300" in out
+    assert load_case(NAME).tasks[0].sense.value == "max"
+
+
+@pytest.mark.parametrize("method", ["weighted-sum", "worst-case"])
+def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, method: str) -> None:
+    text = find_case(NAME).read_text(encoding="utf-8").split("[expect]")[0]
+    text += '[[task]]\nname = "other"\nsense = "max"\naxis = [0, 1, 1]\npoint = [1, 0, 3]\npitch = 2\n'
+    text += f'[combine]\nmethod = "{method}"\n'
+    case, target = tmp_path / "two.toml", tmp_path / "proof.json"
+    case.write_text(text, encoding="utf-8")
+    code, out, err = cli("certify", str(case), "--gap", "1e-3", "--proof", str(target), "--json", "-")
+    assert code == 0, err
+    result = json.loads(out)
+    assert result["certificate"]["status"] == "proved"
+    assert len(result["tasks"]) == 2
+    code, out, err = cli("verify-proof", str(target))
+    assert code == 0, err
+    bound = result["certificate"]["bound"]
+    assert f"{bound:.10g}" in out
+    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["combined"]["certificate"]["bound"] >= json.loads(out)["combined"]["value"]
+    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4")
+    assert code == 0
+    assert out.count("proved:") == 3
