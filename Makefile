@@ -38,4 +38,4 @@ docs: $(VENV)/ready ## write what the documentation shows of the program's outpu
 	$(BIN)/python -P docs/refresh.py
 
 clean: ## remove the environment and everything built
-	rm -rf $(VENV) build dist *.egg-info nlp/_bounds*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case, solve
-from screwsynth.nlp.branchandbound import certify
-from screwsynth.nlp.certificate import Certificate
-from screwsynth.nlp.engines import kernel
+from screwsynth.nlp.certificate.branchandbound import certify
+from screwsynth.nlp.certificate.certificate import Certificate
+from screwsynth.nlp.certificate.engines import kernel
 from screwsynth.nlp.solver import Solution
 
 LIMIT = 60.0

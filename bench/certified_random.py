@@ -15,8 +15,8 @@ import numpy as np
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
-from screwsynth.nlp.branchandbound import certify
 from screwsynth.nlp.case import Search
+from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.solver import solve_nlp
 
 

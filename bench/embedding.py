@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from screwsynth.nlp import Nlp, formulate, load_case
-from screwsynth.nlp.codegen import generate_c
+from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.sampling import starting_points
 
 NAME, STARTS = "paper-4.1-helical", 300

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from screwsynth.nlp.analysis import TaskAnalysis, analyse_tasks
-    from screwsynth.nlp.branchandbound import certify
     from screwsynth.nlp.case import Case
     from screwsynth.nlp.casefile import case_from_tables, load_case, shipped_cases
-    from screwsynth.nlp.certificate import Certificate, CertificateStatus
+    from screwsynth.nlp.certificate.branchandbound import certify
+    from screwsynth.nlp.certificate.certificate import Certificate, CertificateStatus
     from screwsynth.nlp.errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError
     from screwsynth.nlp.evaluation import RobotState, evaluate
     from screwsynth.nlp.formulation import formulate
@@ -120,8 +120,8 @@ _HOMES = {
         "Task",
     ),
     "robots": ("build_model",),
-    "certificate": ("Certificate", "CertificateStatus"),
-    "branchandbound": ("certify",),
+    "certificate.certificate": ("Certificate", "CertificateStatus"),
+    "certificate.branchandbound": ("certify",),
     "casefile": ("case_from_tables", "load_case", "shipped_cases"),
     "errors": ("CaseError", "EvaluationError", "InputError", "ScrewsynthError", "UncoveredError"),
     "evaluation": ("RobotState", "evaluate"),

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from screwsynth.nlp.bounding import search_tape
-from screwsynth.nlp.branchandbound import GAP, CertifyProgress, certify
 from screwsynth.nlp.case import Case
-from screwsynth.nlp.certificate import Certificate, CertificateStatus
+from screwsynth.nlp.certificate.bounding import search_tape
+from screwsynth.nlp.certificate.branchandbound import GAP, CertifyProgress, certify
+from screwsynth.nlp.certificate.certificate import Certificate, CertificateStatus
+from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.proofwriter import ProofWriter
+from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import InputError
 from screwsynth.nlp.formulation import formulate, formulate_each, formulate_weighted, formulate_worst
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.proof import Proof, Statement, fingerprint
-from screwsynth.nlp.proofwriter import ProofWriter
 from screwsynth.nlp.solver import Solution, solve_nlp
-from screwsynth.nlp.standardform import standard_form
 from screwsynth.nlp.tasks import Compromise, solve_tasks
 from screwsynth.nlp.values import Method, Search, Sense
 

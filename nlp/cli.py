@@ -168,10 +168,10 @@ def verify_proof(
     import tomllib
 
     from screwsynth.nlp.casefile import case_from_tables, load_case
+    from screwsynth.nlp.certificate.proof import ProofError, read_proof
+    from screwsynth.nlp.certificate.proofcheck import check_proof
     from screwsynth.nlp.certification import program_of
     from screwsynth.nlp.files import read_text
-    from screwsynth.nlp.proof import ProofError, read_proof
-    from screwsynth.nlp.proofcheck import check_proof
 
     given = read_proof(read_text(proof), proof)
     if case is not None:
@@ -274,7 +274,7 @@ def codegen(
 ) -> None:
     """Write F and its derivatives as C for embedding."""
     from screwsynth.nlp.casefile import find_case, load_case
-    from screwsynth.nlp.codegen import generate_c
+    from screwsynth.nlp.embedding.codegen import generate_c
     from screwsynth.nlp.errors import InputError
     from screwsynth.nlp.files import write_folder
 

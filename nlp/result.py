@@ -19,7 +19,7 @@ import numpy as np
 from screwsynth.models import Dimension, FloatArray, axis_from_screw
 from screwsynth.nlp.analysis import analyse_tasks
 from screwsynth.nlp.case import Case
-from screwsynth.nlp.certificate import Certificate
+from screwsynth.nlp.certificate.certificate import Certificate
 from screwsynth.nlp.designresult import NO_MARGINS, margins_in, relaxation_in, sensitivity_in
 from screwsynth.nlp.evaluation import RobotState, StatedPose, evaluate, stated_poses
 from screwsynth.nlp.ipopt import StartStatus

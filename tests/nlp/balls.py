@@ -3,8 +3,8 @@
 import flint
 import numpy as np
 
-from screwsynth.nlp.enclosure import Forms
-from screwsynth.nlp.instructions import Op, Tape
+from screwsynth.nlp.certificate.enclosure import Forms
+from screwsynth.nlp.certificate.instructions import Op, Tape
 
 
 def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - one branch for each operation

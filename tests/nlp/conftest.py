@@ -15,8 +15,8 @@ import pytest
 
 from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.cli import run as command_line
-from screwsynth.nlp.codegen import generate_c
-from screwsynth.nlp.ctext import identifier
+from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp.embedding.ctext import identifier
 
 Run = Callable[..., tuple[int, str, str]]
 

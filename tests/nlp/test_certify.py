@@ -24,14 +24,14 @@ from screwsynth.nlp import (
     quadratic,
     solve,
 )
-from screwsynth.nlp.bounding import Examined, NumpyEngine, Verdict, search_tape
-from screwsynth.nlp.branchandbound import certify
 from screwsynth.nlp.casefile import find_case
-from screwsynth.nlp.certificate import CertificateStatus
-from screwsynth.nlp.engines import engine_for, kernel
+from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, Verdict, search_tape
+from screwsynth.nlp.certificate.branchandbound import certify
+from screwsynth.nlp.certificate.certificate import CertificateStatus
+from screwsynth.nlp.certificate.engines import engine_for, kernel
+from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.formulation import formulate_worst
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.standardform import standard_form
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 ENGINES = ["numpy", pytest.param("c", marks=needs_kernel)]
@@ -342,7 +342,7 @@ def test_progress_and_history_shrink_to_the_gap() -> None:
 
 def test_rules_use_every_constant_of_the_kernel_alike() -> None:
     """The numbers that both engines must share are written in both files."""
-    source = find_case("paper-4.1-helical").parents[1] / "nlp" / "_bounds.c"
+    source = find_case("paper-4.1-helical").parents[1] / "nlp" / "certificate" / "_bounds.c"
     if not source.exists():
         pytest.skip("an installed package has no source of the kernel")
     text = source.read_text(encoding="utf-8")

@@ -13,8 +13,8 @@ import pytest
 
 from screwsynth.nlp import Nlp, case_from_tables, formulate, load_case, shipped_cases, solve
 from screwsynth.nlp.casefile import find_case
-from screwsynth.nlp.codegen import generate_c
-from screwsynth.nlp.ctext import identifier
+from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.sampling import starting_points
 
 Run = Callable[..., tuple[int, str, str]]

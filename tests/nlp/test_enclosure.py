@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from screwsynth.nlp import enclosure, formulate, load_case
-from screwsynth.nlp.bounding import search_tape
-from screwsynth.nlp.enclosure import enclose, midpoints
+from screwsynth.nlp.certificate.bounding import search_tape
+from screwsynth.nlp.certificate.enclosure import enclose, midpoints
+from screwsynth.nlp.certificate.instructions import Op, Tape, lower
+from screwsynth.nlp.certificate.slopes import SlopeArithmetic
+from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.instructions import Op, Tape, lower
-from screwsynth.nlp.slopes import SlopeArithmetic
-from screwsynth.nlp.standardform import standard_form
 
 pytest.importorskip("flint")
 _spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))

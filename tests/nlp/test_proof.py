@@ -14,11 +14,11 @@ import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, read_proof
+from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.prooftree import Reader, unfolded
+from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.certification import Wanted, certify_case, program_of, proof_of
-from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint, read_proof
-from screwsynth.nlp.proofcheck import check_proof
-from screwsynth.nlp.prooftree import Reader, unfolded
-from screwsynth.nlp.standardform import standard_form
 
 Run = Callable[..., tuple[int, str, str]]
 NAME = "paper-4.1-helical-axis-z"

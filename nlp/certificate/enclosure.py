@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.instructions import Op, Tape
+from screwsynth.nlp.certificate.instructions import Op, Tape
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray

@@ -1,8 +1,8 @@
 """A proven bound of the global optimum, by branch and bound over the whole box.
 
-Boxes are examined in blocks by :mod:`screwsynth.nlp.bounding`, or by the C kernel that does the same. A box is closed
-when its bound does not exceed the best value known by more than the gap, when a condition cannot hold in it, or when no
-maximum can lie in it; otherwise it is cut in two. What is left when the search is stopped still gives a bound, which is
+Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.bounding`, or by the C kernel that does the same. A box
+is closed when its bound does not exceed the best value known by more than the gap, when a condition cannot hold in it,
+or when no maximum can lie in it; otherwise it is cut in two. What is left when the search is stopped still gives a bound, which is
 as sure as that at the end.
 
 Nothing here trusts a solver: an incumbent is a point at which the program's own functions are evaluated.
@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.bounding import Examined, Verdict
-from screwsynth.nlp.certificate import Certificate, CertificateStatus
-from screwsynth.nlp.engines import Engine, engine_for
+from screwsynth.nlp.certificate.bounding import Examined, Verdict
+from screwsynth.nlp.certificate.certificate import Certificate, CertificateStatus
+from screwsynth.nlp.certificate.engines import Engine, engine_for
+from screwsynth.nlp.certificate.incumbent import Incumbent, IncumbentError
+from screwsynth.nlp.certificate.openboxes import Boxes, OpenBoxes
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 from screwsynth.nlp.evaluation import ZERO_F
-from screwsynth.nlp.incumbent import Incumbent, IncumbentError
 from screwsynth.nlp.kkt import FEASIBLE, linearise
-from screwsynth.nlp.openboxes import Boxes, OpenBoxes
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.standardform import StandardForm, standard_form
 from screwsynth.nlp.values import Sense
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ CertifyProgress = Callable[[float, float, float, int, int], None]
 
 
 class Recorder(Protocol):
-    """Takes down what became of every box: see :mod:`screwsynth.nlp.proof`."""
+    """Takes down what became of every box: see :mod:`screwsynth.nlp.certificate.proof`."""
 
     def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
         """A block of examined boxes.

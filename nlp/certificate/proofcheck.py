@@ -2,7 +2,8 @@
 
 The tree of boxes is unfolded from the program's own bounds, so that its leaves cover them by construction; every leaf
 and every face is then a *claim* about one box, and each claim is shown anew with the interval slopes of
-:mod:`screwsynth.nlp.slopes`, halving the box where that is too coarse. Nothing of the search is used, neither its
+:mod:`screwsynth.nlp.certificate.slopes`, halving the box where that is too coarse. Nothing of the search is used,
+neither its
 arithmetic nor its multipliers; what both share is the case's expressions and CasADi's derivatives of them.
 """
 
@@ -15,12 +16,12 @@ import casadi as ca
 import numpy as np
 
 from screwsynth.models import FloatArray
+from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint
+from screwsynth.nlp.certificate.prooftree import Claim, unfolded
+from screwsynth.nlp.certificate.slopebounds import quadratic_bound
+from screwsynth.nlp.certificate.slopes import Slope, SlopeArithmetic
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.proof import Node, Proof, ProofError, fingerprint
-from screwsynth.nlp.prooftree import Claim, unfolded
-from screwsynth.nlp.slopebounds import quadratic_bound
-from screwsynth.nlp.slopes import Slope, SlopeArithmetic
-from screwsynth.nlp.standardform import StandardForm, standard_form
 
 #: Boxes that are evaluated at once.
 _BLOCK = 512

@@ -1,6 +1,6 @@
 """Quadratic models of functions over boxes, from the Taylor forms of their gradients: sums, ends, and contraction.
 
-See :mod:`screwsynth.nlp.bounding` for the formula, and ``docs/certificate.md`` for how it comes about.
+See :mod:`screwsynth.nlp.certificate.bounding` for the formula, and ``docs/certificate.md`` for how it comes about.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.enclosure import TINY, ULP, Forms
+from screwsynth.nlp.certificate.enclosure import TINY, ULP, Forms
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.slopes import Slope
+from screwsynth.nlp.certificate.slopes import Slope
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray

@@ -11,7 +11,8 @@ tree in preorder, as bytes (compressed, in base64). With the box of the program'
     monotone i         no maximum lies in the box, because every function rises along variable i
 
 so that the boxes cover the root by construction, and a tree that does not end where it should is no proof. What the
-reasons mean, and why they are enough, is in ``docs/certificate.md``; :mod:`screwsynth.nlp.proofcheck` checks them.
+reasons mean, and why they are enough, is in ``docs/certificate.md``;
+:mod:`screwsynth.nlp.certificate.proofcheck` checks them.
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from screwsynth.models import FloatArray
+from screwsynth.nlp.certificate.standardform import StandardForm
 from screwsynth.nlp.errors import InputError
 from screwsynth.nlp.kkt import FEASIBLE, assembled, correct, linearise
 from screwsynth.nlp.sampling import starting_points
-from screwsynth.nlp.standardform import StandardForm
 
 #: A value that is claimed for a point may differ from what the program computes there by this part of its scale.
 _SAME_VALUE = 1e-9

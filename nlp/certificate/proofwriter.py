@@ -1,4 +1,4 @@
-"""Taking down a search as a proof: see :mod:`screwsynth.nlp.proof` for what is written."""
+"""Taking down a search as a proof: see :mod:`screwsynth.nlp.certificate.proof` for what is written."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.bounding import Examined, Verdict
-from screwsynth.nlp.openboxes import Boxes
-from screwsynth.nlp.proof import Node, ProofError
+from screwsynth.nlp.certificate.bounding import Examined, Verdict
+from screwsynth.nlp.certificate.openboxes import Boxes
+from screwsynth.nlp.certificate.proof import Node, ProofError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

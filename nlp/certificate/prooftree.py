@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.proof import Node, ProofError
-from screwsynth.nlp.standardform import StandardForm
+from screwsynth.nlp.certificate.proof import Node, ProofError
+from screwsynth.nlp.certificate.standardform import StandardForm
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray

@@ -23,10 +23,10 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from screwsynth.nlp import instructions
-from screwsynth.nlp.enclosure import ULP, Forms, enclose, midpoints
-from screwsynth.nlp.quadratic import Model, Quadratic, largest, reaching_affine
-from screwsynth.nlp.standardform import StandardForm
+from screwsynth.nlp.certificate import instructions
+from screwsynth.nlp.certificate.enclosure import ULP, Forms, enclose, midpoints
+from screwsynth.nlp.certificate.quadratic import Model, Quadratic, largest, reaching_affine
+from screwsynth.nlp.certificate.standardform import StandardForm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -19,13 +19,13 @@ import numpy as np
 
 from screwsynth.models import Dimension, FloatArray
 from screwsynth.nlp.case import Case
-from screwsynth.nlp.ctext import comment, identifier, integers, matrix, numbers, texts
+from screwsynth.nlp.embedding.ctext import comment, identifier, integers, matrix, numbers, texts
+from screwsynth.nlp.embedding.staged import Staged, stage
 from screwsynth.nlp.errors import CaseError, InputError
 from screwsynth.nlp.formulation import formulate
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.sampling import starting_points
 from screwsynth.nlp.solver import Status, solve_nlp
-from screwsynth.nlp.staged import Staged, stage
 from screwsynth.nlp.values import Sense
 
 _TEMPLATES = Path(__file__).parent / "c"

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from screwsynth.nlp.bounding import Examined, NumpyEngine, search_tape
-from screwsynth.nlp.instructions import Tape
-from screwsynth.nlp.standardform import StandardForm
+from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, search_tape
+from screwsynth.nlp.certificate.instructions import Tape
+from screwsynth.nlp.certificate.standardform import StandardForm
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray
@@ -111,7 +111,7 @@ def _packed(tape: Tape) -> tuple[Any, ...]:
 def kernel() -> ModuleType | None:
     """The C kernel, or None where it was not built."""
     try:
-        return import_module("screwsynth.nlp._bounds")
+        return import_module("screwsynth.nlp.certificate._bounds")
     except ImportError:
         return None
 

@@ -1,0 +1,1 @@
+"""C for embedding: the objective of a case and a whole solver, from the templates in ``c``."""
