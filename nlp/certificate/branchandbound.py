@@ -2,8 +2,8 @@
 
 Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.bounding`, or by the C kernel that does the same. A box
 is closed when its bound does not exceed the best value known by more than the gap, when a condition cannot hold in it,
-or when no maximum can lie in it; otherwise it is cut in two. What is left when the search is stopped still gives a bound, which is
-as sure as that at the end.
+or when no maximum can lie in it; otherwise it is cut in two. What is left when the search is stopped still gives a
+bound, which is as sure as that at the end.
 
 Nothing here trusts a solver: an incumbent is a point at which the program's own functions are evaluated.
 """

@@ -17,7 +17,6 @@ from screwsynth.nlp import (
     Free,
     Rotation,
     Task,
-    bounding,
     case_from_tables,
     formulate,
     load_case,
@@ -25,6 +24,7 @@ from screwsynth.nlp import (
     solve,
 )
 from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.certificate import bounding
 from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, Verdict, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.certificate.certificate import CertificateStatus

@@ -18,11 +18,11 @@ from screwsynth.nlp import (
     Sense,
     Task,
     build_model,
-    codegen,
     formulate,
     load_case,
     shipped_cases,
 )
+from screwsynth.nlp.embedding import codegen
 from screwsynth.nlp.kkt import linearise, multipliers
 from screwsynth.nlp.sampling import starting_points
 from screwsynth.nlp.solver import solve_nlp

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwsynth.nlp import enclosure, formulate, load_case
+from screwsynth.nlp import formulate, load_case
+from screwsynth.nlp.certificate import enclosure
 from screwsynth.nlp.certificate.bounding import search_tape
 from screwsynth.nlp.certificate.enclosure import enclose, midpoints
 from screwsynth.nlp.certificate.instructions import Op, Tape, lower
