@@ -20,11 +20,10 @@ from screwsynth.nlp import (
     case_from_tables,
     formulate,
     load_case,
-    quadratic,
     solve,
 )
 from screwsynth.nlp.casefile import find_case
-from screwsynth.nlp.certificate import bounding
+from screwsynth.nlp.certificate import bounding, quadratic
 from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, Verdict, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.certificate.certificate import CertificateStatus
