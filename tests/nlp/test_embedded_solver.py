@@ -276,6 +276,17 @@ def test_a_search_that_is_cut_off_is_no_answer(
     assert unfinished > 150
 
 
+@pytest.mark.parametrize("iterations", [3, 4, 5, 6])
+def test_a_search_that_ends_at_a_saddle_is_no_answer(
+    iterations: int, embed: Embed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # From Park's own axes the search runs into a saddle, and is cut off before it has left it.
+    monkeypatch.setattr(codegen, "_ITERATIONS", iterations)
+    case = load_case("paper-4.4-max")
+    solved = embed(case).solve(x0=formulate(case).start, seeds=0)
+    assert solved.status != OK
+
+
 def test_a_side_that_only_rounding_holds_does_not_make_an_optimum(embedded: EmbeddedCase) -> None:
     # With this task F is even in several variables: their middles are bounds here, stationary, and saddles.
     c, nlp = embedded("paper-4.3"), formulate(load_case("paper-4.3"))
@@ -303,9 +314,9 @@ def test_a_side_that_only_rounding_holds_does_not_make_an_optimum(embedded: Embe
 def test_the_residual_is_in_parts_of_the_size_of_f_where_it_is_found(embedded: EmbeddedCase) -> None:
     c, nlp = embedded("paper-4.1-helical"), formulate(load_case("paper-4.1-helical"))
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
-    lower[:3], upper[:3] = [-300, -300, 20], [300, 300, 600]
+    lower[:3], upper[:3] = [-1e4, -1e4, 20], [1e4, 1e4, 1e4]
     wide, checked = replace(nlp, lower=lower, upper=upper), 0
-    for x0 in starting_points(wide, 61, 4)[1:]:
+    for x0 in starting_points(wide, 301, 4)[1:]:
         solved = c.solve(lower=lower, upper=upper, x0=x0, seeds=0, maximise=0)
         if solved.status == OK:
             # The scale of F is taken at the start: here, where the search ended.
