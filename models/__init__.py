@@ -2,20 +2,17 @@
 
 from screwsynth.models.arrays import FloatArray, frozen_array
 from screwsynth.models.catalog import RobotFunction, UnknownModelError, model_names, robot_function
+from screwsynth.models.drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from screwsynth.models.hexapod import hexapod
 from screwsynth.models.legs import Leg, LeggedPlatform, legged_platform
 from screwsynth.models.model import (
-    Body,
     Closure,
     Dimension,
-    Link,
     Model,
     ModelError,
     Parameter,
-    Point,
     PoseSymbols,
     Quantity,
-    Scene,
     Unknown,
     Wrench,
     WrenchKind,
@@ -32,6 +29,7 @@ from screwsynth.models.rotation import (
 from screwsynth.models.screws import (
     Screw,
     axis_from_screw,
+    displacement,
     line_through,
     moved_screw,
     reciprocal_product,
@@ -43,12 +41,16 @@ from screwsynth.models.three_upu import three_upu
 
 __all__ = [
     "Body",
+    "Circle",
     "Closure",
     "Dimension",
+    "Direction",
     "FloatArray",
     "Leg",
     "LeggedPlatform",
     "Link",
+    "Mark",
+    "MarkKind",
     "Model",
     "ModelError",
     "Parameter",
@@ -66,6 +68,7 @@ __all__ = [
     "axis_from_screw",
     "component_names",
     "couple_about",
+    "displacement",
     "force_along",
     "frozen_array",
     "hexapod",
