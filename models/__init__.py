@@ -2,21 +2,18 @@
 
 from screwsynth.models.arrays import FloatArray, frozen_array
 from screwsynth.models.catalog import RobotFunction, UnknownModelError, model_names, robot_function
+from screwsynth.models.drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from screwsynth.models.hexapod import hexapod
 from screwsynth.models.legs import LeggedPlatform, legged_platform
 from screwsynth.models.model import (
-    Body,
     Closure,
     Dimension,
     Leg,
-    Link,
     Model,
     ModelError,
     Parameter,
-    Point,
     PoseSymbols,
     Quantity,
-    Scene,
     Unknown,
     Wrench,
     WrenchKind,
@@ -33,6 +30,7 @@ from screwsynth.models.rotation import (
 from screwsynth.models.screws import (
     Screw,
     axis_from_screw,
+    displacement,
     line_through,
     moved_screw,
     reciprocal_product,
@@ -44,12 +42,16 @@ from screwsynth.models.three_upu import three_upu
 
 __all__ = [
     "Body",
+    "Circle",
     "Closure",
     "Dimension",
+    "Direction",
     "FloatArray",
     "Leg",
     "LeggedPlatform",
     "Link",
+    "Mark",
+    "MarkKind",
     "Model",
     "ModelError",
     "Parameter",
@@ -67,6 +69,7 @@ __all__ = [
     "axis_from_screw",
     "component_names",
     "couple_about",
+    "displacement",
     "force_along",
     "frozen_array",
     "hexapod",

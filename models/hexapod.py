@@ -7,9 +7,11 @@ joint in the platform frame.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from casadi import SX
 
+from screwsynth.models.drawing import Mark, MarkKind
 from screwsynth.models.legs import legged_platform
 from screwsynth.models.model import Dimension, Leg, Model, Parameter, PoseSymbols
 
@@ -27,6 +29,7 @@ def hexapod() -> Model:
         )
         legs.append(Leg(name, b, a))
     parts = legged_platform(legs, pose)
+    joints = zip((*base, *platform), parts.scene.points, strict=False)
     return Model(
         name="hexapod",
         description="six legs between twelve joint centres given by their coordinates",
@@ -35,7 +38,10 @@ def hexapod() -> Model:
         home=(0.0, 0.0, 35.0),
         wrenches=parts.wrenches,
         quantities=parts.quantities,
-        scene=parts.scene,
+        scene=replace(
+            parts.scene,
+            marks=tuple(Mark(item.name, MarkKind.POINT, (joint.position,), joint.body) for item, joint in joints),
+        ),
         legs=parts.legs,
         built=parts.built,
     )

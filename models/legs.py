@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.model import Body, Dimension, Leg, Link, Point, PoseSymbols, Quantity, Scene, Wrench, force_along
+from screwsynth.models.drawing import Body, Link, Point, Scene
+from screwsynth.models.model import Dimension, Leg, PoseSymbols, Quantity, Wrench, force_along
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,8 @@ from types import MappingProxyType
 import casadi as ca
 from casadi import SX
 
+from screwsynth.models.drawing import Scene
+
 _AXES = ("x", "y", "z")
 
 #: Names by which programs call the pose and other numbers of a case.
@@ -224,41 +226,6 @@ class Leg:
         return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)
 
 
-class Body(enum.Enum):
-    """What a point of the drawing moves with."""
-
-    BASE = "base"
-    PLATFORM = "platform"
-    LIMB = "limb"
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A named point of the drawing: (3, 1) world coordinates, length."""
-
-    name: str
-    position: SX
-    body: Body
-
-
-@dataclass(frozen=True, eq=False)
-class Link:
-    """A straight line of the drawing between two named points; ``limb`` names the limb it is part of, if any."""
-
-    start: str
-    end: str
-    body: Body
-    limb: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """The robot as points and straight links, enough for a picture in true proportion."""
-
-    points: tuple[Point, ...]
-    links: tuple[Link, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class Model:
     """A parallel robot, symbolically.
@@ -290,7 +257,7 @@ class Model:
     home: tuple[float, float, float]
     wrenches: tuple[Wrench, ...]
     quantities: tuple[Quantity, ...] = ()
-    scene: Scene = Scene((), ())
+    scene: Scene = field(default_factory=Scene)
     unknowns: tuple[Unknown, ...] = ()
     closure: tuple[Closure, ...] = ()
     options: Mapping[str, object] = field(default_factory=dict)
@@ -326,6 +293,7 @@ def _check_names(model: Model) -> None:
     names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
     names += [quantity.name for quantity in model.quantities]
     names += [f"point {point.name}" for point in model.scene.points]
+    names += [f"direction {item.name}" for item in model.scene.directions]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise _fail(model, f"names appear twice: {', '.join(repeated)}")
@@ -357,7 +325,7 @@ def _check_shapes(model: Model) -> None:
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
-    expected += [(f"point {point.name}", point.position, (3, 1)) for point in model.scene.points]
+    expected += [(what, expression, (3, 1)) for what, expression in model.scene.expressions]
     for leg in model.legs:
         expected += [(f"leg {leg.name} base", leg.base, (3, 1)), (f"leg {leg.name} platform", leg.platform, (3, 1))]
     for what, expression, shape in expected:
@@ -378,7 +346,7 @@ def _check_symbols(model: Model) -> None:
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
         *(equation.expression for equation in model.closure),
         *(quantity.values for quantity in model.quantities),
-        *(point.position for point in model.scene.points),
+        *(expression for _, expression in model.scene.expressions),
         *(joint for leg in model.legs for joint in (leg.base, leg.platform)),
     ]
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
@@ -392,7 +360,6 @@ def _check_symbols(model: Model) -> None:
 
 
 def _check_scene(model: Model) -> None:
-    points = {point.name for point in model.scene.points}
     for leg in model.legs:
         if leg.name not in model.limbs:
             raise _fail(model, f"leg {leg.name!r} is no limb: it has no wrench")
@@ -400,9 +367,5 @@ def _check_scene(model: Model) -> None:
         (row.limb, row.kind) for row in model.wrenches
     ]:
         raise _fail(model, "the rows of the built machine are not those of the designed one")
-    for link in model.scene.links:
-        for end in (link.start, link.end):
-            if end not in points:
-                raise _fail(model, f"a link ends at {end!r}, which is no point of the drawing")
-        if link.limb is not None and link.limb not in model.limbs:
-            raise _fail(model, f"a link belongs to limb {link.limb!r}, which has no wrench")
+    for fault in model.scene.faults(model.limbs, [parameter.name for parameter in model.parameters]):
+        raise _fail(model, fault)

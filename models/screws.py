@@ -174,3 +174,24 @@ def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -
     direction = matrix @ coordinates[:3]
     moment = matrix @ coordinates[3:] + np.cross(frozen_array(translation, (3,)), direction)
     return frozen_array(np.concatenate([direction, moment]), (6,))
+
+
+def displacement(twist: ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
+    """The finite motion of a body that moves with a constant twist for a time ``t``: ``exp(t [twist])``.
+
+    It is the screw motion about the twist's axis; the twist itself is not changed by it.
+
+    Args:
+        twist: (6,) angular velocity, then velocity of the body's point at the world origin.
+        t: time.
+
+    Returns:
+        (3, 3) rotation and (3,) translation: a point ``x`` goes to ``R x + d``.
+    """
+    screw = axis_from_screw(twist)
+    if math.isinf(screw.pitch):
+        return frozen_array(np.eye(3), (3, 3)), frozen_array(screw.axis * screw.intensity * t, (3,))
+    angle, s = screw.intensity * t, screw.axis
+    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
+    R = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return frozen_array(R, (3, 3)), frozen_array(screw.point - R @ screw.point + screw.pitch * angle * s, (3,))

@@ -13,11 +13,13 @@ neighbour: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal
 
 import casadi as ca
 from casadi import SX
 
+from screwsynth.models.drawing import Body, Circle, Mark, MarkKind
 from screwsynth.models.legs import legged_platform
 from screwsynth.models.model import Dimension, Leg, Model, ModelError, Parameter, PoseSymbols
 
@@ -44,6 +46,12 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
             platform = centre + sign * (x4 if layout == "aligned" else _SIXTH - x4)
             legs.append(Leg(f"{k + 1}{mark}", _on_circle(x1, centre + sign * x3), _on_circle(x2, platform)))
     parts = legged_platform(legs, pose)
+    # Azimuths of a base pair and of a platform pair, where the drawing shows the half angles.
+    centres = (0.0, 0.0 if layout == "aligned" else _SIXTH)
+    plates = (
+        (Body.BASE, SX.eye(3), SX.zeros(3), x1, x3, centres[0], ("x1", "x3")),
+        (Body.PLATFORM, pose.rotation, pose.position, x2, x4, centres[1], ("x2", "x4")),
+    )
     return Model(
         name="stewart-gough",
         description="6-6 Stewart-Gough platform: six legs between pairs of joints on two circles",
@@ -58,11 +66,27 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
         home=(0.0, 0.0, 35.0),
         wrenches=parts.wrenches,
         quantities=parts.quantities,
-        scene=parts.scene,
+        scene=replace(
+            parts.scene,
+            circles=tuple(Circle(p, p + R @ _on_circle(r, 0), R[:, 2], body) for body, R, p, r, *_ in plates),
+            marks=tuple(mark for plate in plates for mark in _marks(*plate)),
+        ),
         legs=parts.legs,
         built=parts.built,
     )
 
 
-def _on_circle(radius: SX, azimuth: SX) -> SX:
+def _on_circle(radius: SX, azimuth: SX | float) -> SX:
     return ca.vertcat(radius * ca.cos(azimuth), radius * ca.sin(azimuth), 0)
+
+
+def _marks(
+    body: Body, R: SX, p: SX, radius: SX, half_angle: SX, centre: float, names: tuple[str, str]
+) -> tuple[Mark, ...]:
+    """Radius and half angle of a plate, the one at its second pair and the other at its first."""
+
+    def at(azimuth: SX | float) -> SX:
+        return p + R @ _on_circle(radius, azimuth)
+
+    length = Mark(names[0], MarkKind.LENGTH, (p, at(centre - _THIRD)), body)
+    return length, Mark(names[1], MarkKind.ANGLE, (p, at(centre), at(centre + half_angle)), body)

@@ -13,11 +13,14 @@ translational robot). In a real limb the second axis is also perpendicular to th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import casadi as ca
 from casadi import SX
 
+from screwsynth.models.drawing import Body, Circle, Direction, Mark, MarkKind, Scene
 from screwsynth.models.legs import legged_platform
 from screwsynth.models.model import Closure, Dimension, Leg, Model, ModelError, Parameter, PoseSymbols, couple_about
 
@@ -42,7 +45,7 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
     ]
     legs = [Leg(str(k + 1), base_radius * _radial(k), platform_radius * _radial(k)) for k in range(3)]
     parts = legged_platform(legs, pose)
-    couples, built, closure = [], [], []
+    couples, built, closure, axes_drawn = [], [], [], []
     for k, (row, row_built) in enumerate(zip(parts.wrenches, parts.built, strict=True)):
         first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
         if first is None:
@@ -51,10 +54,16 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         if axes == "free":
             parameters.append(_axis(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k)))
             second = parameters[-1].symbol
+            u1, u2 = pose.rotation @ first, pose.rotation @ second
             closure.append(Closure(f"u1_{row.limb} . u2_{row.limb}", ca.dot(first, second)))
             normals = [pose.rotation @ ca.cross(first, second)] * 2
         else:
-            normals = [_normal(pose.rotation @ first, each.force) for each in (row, row_built)]
+            u1, u2 = pose.rotation @ first, ca.cross(pose.rotation @ first, row.force)
+            normals = [_normal(u1, each.force) for each in (row, row_built)]
+        joint = pose.position + pose.rotation @ legs[k].platform
+        axes_drawn += [
+            Direction(f"{name}_{row.limb}", joint, u, Body.PLATFORM, row.limb) for name, u in (("u1", u1), ("u2", u2))
+        ]
         couples.append(couple_about(row.limb, normals[0]))
         built.append(couple_about(row.limb, normals[1]))
     return Model(
@@ -66,7 +75,7 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         home=(0.0, 0.0, 50.0),
         wrenches=(*parts.wrenches, *couples),
         quantities=parts.quantities,
-        scene=parts.scene,
+        scene=replace(_with_circles(parts.scene, legs, pose), directions=tuple(axes_drawn)),
         legs=parts.legs,
         built=(*parts.built, *built),
         closure=tuple(closure),
@@ -76,6 +85,16 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
 def _normal(u1: SX, s: SX) -> SX:
     """Common normal of u1 and u2 = u1 x s: the part of s that is perpendicular to u1."""
     return s * ca.sumsqr(u1) - u1 * ca.dot(u1, s)
+
+
+def _with_circles(scene: Scene, legs: Sequence[Leg], pose: PoseSymbols) -> Scene:
+    """The drawing with both joint circles, and with their radii marked at the first limb."""
+    R, p = pose.rotation, pose.position
+    base = Circle(SX.zeros(3), legs[0].base, SX([0, 0, 1]), Body.BASE)
+    platform = Circle(p, p + R @ legs[0].platform, R[:, 2], Body.PLATFORM)
+    radii = (("base_radius", base), ("platform_radius", platform))
+    marks = (Mark(name, MarkKind.LENGTH, (each.centre, each.through), each.body) for name, each in radii)
+    return replace(scene, circles=(base, platform), marks=tuple(marks))
 
 
 def _radial(k: int) -> SX:

@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rich.console import Console
 
     from screwsynth.nlp.case import Case
     from screwsynth.nlp.certification import Certified, Wanted
+    from screwsynth.nlp.scene import Drawing
     from screwsynth.nlp.solver import Solution
     from screwsynth.nlp.tasks import Compromise
 
@@ -40,6 +41,9 @@ app = typer.Typer(
 )
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
+PlotFile = Annotated[
+    str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")
+]
 JsonFile = Annotated[str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.")]
 
 
@@ -72,6 +76,7 @@ def solve(
         bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
     ] = False,
     json_file: JsonFile = None,
+    plot: PlotFile = None,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
     ] = False,
@@ -84,6 +89,7 @@ def solve(
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     _check_target(json_file)
+    _check_picture(plot)
     if json_file != "-":
         # The library of tables loads while Ipopt works outside of the interpreter.
         Thread(target=import_module, args=("screwsynth.nlp.tables",), daemon=True).start()
@@ -102,6 +108,10 @@ def solve(
         result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
     if json_file is not None:
         _write_json(json_file, result)
+    if plot is not None:
+        from screwsynth.nlp.gallery import drawings_of
+
+        _write_picture(plot, drawings_of(solution))
     if json_file != "-":
         from screwsynth.nlp.tables import print_compromise, print_solution
 
@@ -292,19 +302,33 @@ def codegen(
 
 
 @app.command()
-def models(name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None) -> None:
+def models(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None,
+    plot: PlotFile = None,
+) -> None:
     """List the robots, or show one with its parameters, options and wrenches."""
     from screwsynth.models import model_names
+    from screwsynth.nlp.errors import InputError
     from screwsynth.nlp.robots import build_model, model_options
     from screwsynth.nlp.tables import print_model, print_models
 
+    _check_picture(plot)
     if name is None:
+        if plot is not None:
+            raise InputError(f"--plot {plot}: needs the name of a robot")
         print_models(_console(), [(each, _description(each)) for each in model_names()])
         return
     options = model_options(name)
     needed = [option for option, _, default in options if default is None]
     # Without the options that it cannot do without, a robot has no parameters to show yet.
-    print_model(_console(), name, None if needed else build_model(name), options)
+    model = None if needed else build_model(name)
+    if plot is not None:
+        from screwsynth.nlp.scene import drawing_of_model
+
+        if model is None:
+            raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
+        _write_picture(plot, [drawing_of_model(model)])
+    print_model(_console(), name, model, options)
 
 
 @app.command()
@@ -450,6 +474,21 @@ def _check_target(target: str | None) -> None:
 
     if target is not None:
         check_target(target)
+
+
+def _check_picture(target: str | None) -> None:
+    if target is not None:
+        from screwsynth.nlp.extras import check_picture
+
+        check_picture(target)
+        _check_target(target)
+
+
+def _write_picture(target: str, drawings: Sequence[Drawing]) -> None:
+    from screwsynth.nlp.figures import ending_of, picture
+    from screwsynth.nlp.files import write_bytes
+
+    write_bytes(target, picture(drawings, ending_of(target)))
 
 
 def _write_json(target: str, result: dict[str, Any]) -> None:

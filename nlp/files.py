@@ -27,17 +27,33 @@ def write_text(target: str, text: str) -> None:
         if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
         else:
-            _replace(path.resolve(), text)
+            _replace(path.resolve(), text.encode("utf-8"))
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
 
 
-def _replace(path: Path, text: str) -> None:
+def write_bytes(target: str, content: bytes) -> None:
+    """Write bytes to a file, which appears under its name only when it is complete; ``-`` is a file's name here.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        path = Path(target)
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)
+        else:
+            _replace(path.resolve(), content)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
+
+
+def _replace(path: Path, content: bytes) -> None:
     """Put a complete file in the place of what is there."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
         # A temporary file is for its owner only; the result gets what any new file gets.
         mask = os.umask(0)
         os.umask(mask)

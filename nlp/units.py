@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from screwsynth.models import Dimension
+
+#: A twist whose size is within this of 1 is a unit screw: its motion is measured by its angle, or by its way.
+_UNIT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -42,3 +46,14 @@ class Units:
 
     def _is_degrees(self, dimension: Dimension) -> bool:
         return dimension is Dimension.ANGLE and self.angle == "deg"
+
+
+def rate_unit(twist: Iterable[float], units: Units) -> str:
+    """Unit of a limb's rate in a twist (6,): length per radian of a unit screw, or else per unit of time."""
+    parts = [float(part) for part in twist]
+    omega, v = math.hypot(*parts[:3]), math.hypot(*parts[3:])
+    if abs(omega - 1) <= _UNIT:
+        return f"{units.length}/rad"
+    if omega == 0 and abs(v - 1) <= _UNIT:
+        return f"{units.length}/{units.length}"
+    return f"{units.length} per unit of time"
