@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check docs clean
+.PHONY: help demo test quick check docs figures clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -36,6 +36,9 @@ check: $(VENV)/ready build/typing/screwsynth ## formatting, lint, types and impo
 
 docs: $(VENV)/ready ## write what the documentation shows of the program's output
 	$(BIN)/python -P docs/refresh.py
+
+figures: $(VENV)/ready ## draw the pictures of the documentation
+	$(BIN)/python -P docs/figures.py
 
 clean: ## remove the environment and everything built
 	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

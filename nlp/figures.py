@@ -27,7 +27,7 @@ _SETTINGS: dict[Any, Any] = {
     "pdf.fonttype": 42,
     "font.family": "DejaVu Sans",
     "axes.unicode_minus": True,
-    "savefig.dpi": 160,
+    "savefig.dpi": 130,
     "figure.dpi": 100,
 }
 _METADATA: dict[str, dict[str, str | None]] = {

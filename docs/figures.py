@@ -1,0 +1,33 @@
+"""Draw the pictures of the documentation: run by ``make figures``.
+
+The paper's Figs. 4, 5, 7, 8, 10 and 11 from the cases that stand for them, the limited hexapod, and the robots with
+their parameters.
+"""
+
+from pathlib import Path
+
+from screwsynth.models import model_names
+from screwsynth.nlp import load_case, solve, solve_tasks
+from screwsynth.nlp.figures import picture
+from screwsynth.nlp.gallery import drawings_of
+from screwsynth.nlp.robots import build_model
+from screwsynth.nlp.scene import drawing_of_model
+
+FOLDER = Path(__file__).parent / "figures"
+CASES = {
+    "fig-4-helical": "paper-4.1-helical",
+    "fig-5-rotation": "paper-4.1-rotation",
+    "fig-7-peg-in-hole": "paper-4.2",
+    "fig-8-joint-angle": "paper-4.3",
+    "fig-10-two-free-rotations": "paper-4.4-snu",
+    "fig-11-resisting": "paper-4.4-max",
+    "hexapod-machining": "hexapod-machining",
+}
+
+FOLDER.mkdir(exist_ok=True)
+for name, case in CASES.items():
+    loaded = load_case(case)
+    found = solve_tasks(loaded) if len(loaded.tasks) > 1 else solve(loaded)
+    (FOLDER / f"{name}.png").write_bytes(picture(drawings_of(found), ".png"))
+for model in model_names():
+    (FOLDER / f"model-{model}.png").write_bytes(picture([drawing_of_model(build_model(model))], ".png"))
