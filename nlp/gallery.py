@@ -31,9 +31,11 @@ def drawings_of(found: Solution | Compromise) -> list[Drawing]:
 
 
 def _headline(solution: Solution) -> str:
+    """What was found, in a line."""
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"
+    value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F
     if solution.status is not Status.OPTIMAL:
-        return f"F = {solution.F:.7g}"
+        return f"F = {value:.7g}"
     word = "largest" if solution.nlp.sense is Sense.MAX else "smallest"
-    return f"{word} F = {solution.F:.7g}"
+    return f"{word} F = {value:.7g}"

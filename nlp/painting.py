@@ -51,7 +51,9 @@ class Panel:
 
     def __init__(self, axes: Axes, view: View, drawing: Drawing) -> None:
         self.axes, self.view, self.drawing = axes, view, drawing
-        self.largest = max((abs(row.rate) for row in drawing.rows), default=0.0) or 1.0
+        # Where F is 0 there are no shares, and the rates are rounding error.
+        moved = [abs(row.rate) for row in drawing.rows if not math.isnan(row.share)]
+        self.largest = max(moved, default=0.0) or 1.0
         self.legend: list[tuple[Artist, str]] = []
         self._colours = LinearSegmentedColormap.from_list("rates", RATES)
         self._scale = Normalize(-self.largest, self.largest)
