@@ -11,12 +11,15 @@ from screwsynth.models import Body, Dimension, FloatArray, Model
 from screwsynth.nlp.posture import Posture
 from screwsynth.nlp.scene import Drawing, Motion
 from screwsynth.nlp.units import Units, rate_unit
+from screwsynth.nlp.view import View, clearest_view
 
 #: Postures on each side of the one drawn.
 _SIDE = 20
 #: The farthest turn, and the farthest way of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
+#: Of the eye at first, degrees.
+_ELEVATION = 26.0
 #: From shortening to lengthening: the colours of picture files.
 RATES = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
 
@@ -48,6 +51,7 @@ def view_data(drawing: Drawing) -> dict[str, Any]:
         "free": [_motion(each, units) for each in drawing.free],
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
         "colours": list(RATES),
+        "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
         "zero": zero,
         "frames": [_frame(drawing, t, posture, units) for t, posture in postures],
     }

@@ -17,8 +17,10 @@ class Markup(str):
     __slots__ = ()
 
 
+#: A cell with a number shorter than this is not broken.
+_SHORT = 24
 #: Elements without an end tag.
-_VOID = frozenset(["meta", "link", "input", "br"])
+_VOID = frozenset(["meta", "link", "input", "br", "img"])
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
@@ -48,8 +50,15 @@ def joined(content: Iterable[object]) -> Markup:
 
 
 def paragraphs(lines: Iterable[object]) -> Markup:
-    """A paragraph for each line of text."""
-    return joined(tag("p", _plain(line)) for line in lines)
+    """A paragraph for each line of text; a dim label before it stays one."""
+    return joined(tag("p", _labelled(line)) for line in lines)
+
+
+def _labelled(line: object) -> object:
+    if not (isinstance(line, Text) and line.spans and line.spans[0].start == 0 and line.spans[0].style == "dim"):
+        return _plain(line)
+    end = line.spans[0].end
+    return joined([tag("span", f"{line.plain[:end].strip()}:", class_="label"), " ", line.plain[end:]])
 
 
 def html_table(table: Table, caption: str, **attributes: object) -> Markup:
@@ -61,7 +70,8 @@ def html_table(table: Table, caption: str, **attributes: object) -> Markup:
 
 def grid(headers: Iterable[object], rows: Iterable[Iterable[object]], caption: str, **attributes: object) -> Markup:
     """A table of HTML, its first column naming the rows; a wide one scrolls by itself, also by keyboard."""
-    head = tag("tr", *(tag("th", header, scope="col") for header in headers))
+    # A heading without words names nothing: it is a mere cell.
+    head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     body = []
     for row in rows:
         first, *others = row
@@ -82,7 +92,11 @@ def _cell(value: object) -> Markup:
     if isinstance(value, Markup):
         return tag("td", value)
     text = str(value)
-    return tag("td", text, class_="number" if text[:1].isdigit() or text[:1] in "+-\N{MINUS SIGN}" else None)
+    return tag("td", text, class_="number" if _is_short_number(text) else None)
+
+
+def _is_short_number(text: str) -> bool:
+    return len(text) < _SHORT and (text[:1].isdigit() or text[:1] in {"+", "-"})
 
 
 def _plain(value: object) -> str:

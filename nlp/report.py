@@ -143,6 +143,7 @@ def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
         "first": [shown(i, float(value)) for value in plane.first],
         "second": [shown(j, float(value)) for value in plane.second],
         "F": [[float(f"{value:.5g}") if np.isfinite(value) else None for value in row] for row in plane.F],
+        "inside": ["".join("1" if kept else "0" for kept in row) for row in plane.inside],
         "at": [shown(i, float(x[i])), shown(j, float(x[j]))],
         "words": plane_words(nlp, x, plane),
     }
@@ -157,16 +158,18 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
         name = names[k].name
         return f"{name} = {units.shown(value, names[k].dimension):.5g} {units.label(names[k].dimension)}".strip()
 
-    inside = np.isfinite(plane.F)
-    if not inside.any():
-        return f"No point of this map of {names[i].name} and {names[j].name} keeps every limit."
-    best = (np.nanmax(plane.F) if nlp.sign < 0 else np.nanmin(plane.F)) == plane.F
-    row, column = (int(each[0]) for each in np.nonzero(best))
-    word = "largest" if nlp.sign < 0 else "smallest"
-    part = 100 * float(np.mean(inside))
-    left = "" if part == 100 else f" Blank: outside of the limits ({100 - part:.0f} % of the map)."
-    return (
-        f"F over {names[i].name} and {names[j].name} goes from {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}; "
-        f"on this grid it is {word} at {text(i, float(plane.first[column]))}, {text(j, float(plane.second[row]))}. "
-        f"The point found is at {text(i, float(x[i]))}, {text(j, float(x[j]))}.{left}"
+    if not np.isfinite(plane.F).any():
+        return f"{names[i].name} and {names[j].name} cannot move while the others are held."
+    words = (
+        f"F over {names[i].name} and {names[j].name} goes from {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}. "
     )
+    kept = np.where(plane.inside > 0, plane.F, np.nan)
+    part = 100 * float(np.mean(plane.inside))
+    if np.isfinite(kept).any():
+        best = int(np.nanargmax(kept) if nlp.sign < 0 else np.nanargmin(kept))
+        row, column = divmod(best, kept.shape[1])
+        word = "largest" if nlp.sign < 0 else "smallest"
+        at = f"{text(i, float(plane.first[column]))}, {text(j, float(plane.second[row]))}"
+        words += f"On this grid and within every limit it is {word} at {at}. "
+    words += f"The point found is at {text(i, float(x[i]))}, {text(j, float(x[j]))}."
+    return words if part == 100 else f"{words} Pale: outside of a limit or equation ({100 - part:.3g} % of the map)."

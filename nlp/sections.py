@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from rich.console import Group
 
 from screwsynth.nlp.charts import Curve, Spot, count_chart, line_chart
 from screwsynth.nlp.frames import RATES
+from screwsynth.nlp.ipopt import StartStatus
 from screwsynth.nlp.markup import Markup, grid, html_table, joined, paragraphs, tag
 from screwsynth.nlp.report import Part, Report
 from screwsynth.nlp.result import motion_of
@@ -68,7 +70,7 @@ def answer(report: Report) -> Markup:
 
 def _case(report: Report) -> Markup:
     case, first = report.case, report.parts[0]
-    lines = [case.model.description]
+    lines = [f"{case.model.description}."]
     for task in case.tasks:
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
         lines.append(f"Task “{task.name}”: make F {word} for a {motion_words(motion_of(task.twist), case.units)}.")
@@ -138,6 +140,8 @@ def _robot(report: Report) -> Markup:
             aria_label="The robot in three dimensions; the table below says the same in numbers.",
         ),
         buttons,
+        # Printers get a copy of the picture, because what WebGL draws is not printed.
+        tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
     content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
@@ -149,12 +153,12 @@ def _legend(view: dict[str, Any]) -> Markup:
     gradient = f"background:linear-gradient(90deg,{','.join(RATES)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
     words = [
-        "Limbs by their rate: blue shortens, grey keeps, orange lengthens. Bold black: the axis of the task's motion",
+        "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive. Bold black: the axis of the task's motion",
         ", with a purple path of its pitch" if view["motion"] and view["motion"]["path"] else "",
         ". Purple arrows: velocities of the platform's corners, not to scale.",
         " Dotted grey: the start." if view["reference"] else "",
         " Green, dashed: motions that nothing resists." if view["free"] else "",
-        " Cones on the platform: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
+        " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
         " Point at a limb for its length, rate, share of F and wrench.",
     ]
     return joined([bar, *words])
@@ -299,6 +303,8 @@ def _optima(report: Report) -> Markup:
 def _optima_of(solution: Solution) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
+    failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
+    yield from (tag("p", f"{count}: {status.value}.") for status, count in failed.items())
     if not solution.optima:
         return
     best = solution.optima[0]
@@ -343,7 +349,7 @@ def _around(report: Report) -> Markup:
         tag(
             "p",
             "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-            "dashed: outside of one. Vertical lines: the bounds. Dot: the point found."
+            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: the point found."
             + (
                 " A component of a free direction moves with the direction's others, which are scaled to unit length."
                 if report.parts[0].nlp.program.directions
@@ -377,7 +383,9 @@ def _slice(part: Part, each: Slice) -> Markup:
             k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
             best = "largest" if nlp.sign < 0 else "smallest"
             words += f", {best} within the limits at {values[k]:.5g} {unit}".rstrip()
-            if not kept[finite].all():
+            if kept.sum() == 1:
+                words += ", the only one of its points within them"
+            elif not kept[finite].all():
                 words += f"; within every limit on {100 * np.mean(kept):.0f} % of it"
         else:
             words += "; no point of it keeps every limit"
@@ -433,9 +441,9 @@ def _evidence(report: Report) -> Markup:
 
 
 def _evidence_of(report: Report, result: dict[str, Any]) -> Iterator[Markup]:
-    yield from paragraphs_of(
-        line for line in verdict_lines(report.case, {key: value for key, value in result.items() if key != "rank"})
-    )
+    # Rank and starts have their own places on the page.
+    rest = {key: value for key, value in result.items() if key != "rank"}
+    yield from paragraphs_of(verdict_lines(report.case, {**rest, "starts": {"run": 0}}))
     evidence = result["optimality"]
     if evidence is None:
         return

@@ -52,13 +52,15 @@ class Plane:
         variables: indices in the program.
         first: (k,) values of the first variable.
         second: (m,) values of the second.
-        F: (m, k) objective; nan where the robot is not defined or a limit is not kept.
+        F: (m, k) objective; nan where the robot is not defined.
+        inside: (m, k) whether every limit is kept.
     """
 
     variables: tuple[int, int]
     first: FloatArray
     second: FloatArray
     F: FloatArray
+    inside: FloatArray
 
 
 def slices_of(nlp: Nlp, x: FloatArray) -> list[Slice]:
@@ -79,7 +81,6 @@ def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
         first, second = _range(nlp, i, _PLANE, x), _range(nlp, j, _PLANE, x)
         across, up = np.meshgrid(first, second)
         F, inside = _values(nlp, _moved(nlp, x, [i, j], np.vstack([across.ravel(), up.ravel()])))
-        F[inside == 0] = np.nan
         shape = (len(second), len(first))
         found.append(
             Plane(
@@ -87,6 +88,7 @@ def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
                 frozen_array(first, first.shape),
                 frozen_array(second, second.shape),
                 frozen_array(F.reshape(shape), shape),
+                frozen_array(inside.reshape(shape), shape),
             )
         )
     return found

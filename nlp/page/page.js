@@ -5,7 +5,7 @@
   document.documentElement.classList.add("scripted");
   const INK = "#17212b", MUTED = "#55616c", VELOCITY = "#6d2a8c", FREE = "#0b6b57";
   const FACES = { base: "#c3ccd5", platform: "#a9c6de" };
-  const first = [1.5, -1.35, 0.75];
+  const FONT = "Arial, 'DejaVu Sans', sans-serif";
 
   // Text of a case must not become markup in a hover label, which knows some tags.
   const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
@@ -21,7 +21,8 @@
   let index = view ? view.zero : 0;
   let layout = null;
 
-  const largest = () => Math.max(...view.frames.flatMap((frame) => frame.rates.map(Math.abs))) || 1;
+  // Colours and bars have the scale of the position shown, as in picture files.
+  const largest = () => Math.max(...view.frames[index].rates.map(Math.abs)) || 1;
 
   function colour(rate) {
     const colours = view.colours, last = colours.length - 1;
@@ -56,14 +57,14 @@
       const rim = [];
       for (let m = 0; m < sides; m += 1) {
         const angle = (2 * Math.PI * m) / sides;
-        rim.push(add(plus(plus(back, a, 0.32 * length * Math.cos(angle)), b, 0.32 * length * Math.sin(angle))));
+        rim.push(add(plus(plus(back, a, 0.27 * length * Math.cos(angle)), b, 0.27 * length * Math.sin(angle))));
       }
       rim.forEach((at, m) => {
         const next = rim[(m + 1) % sides];
         i.push(top, middle); j.push(at, next); k.push(next, at);
       });
     });
-    return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false };
+    return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
   }
 
   function limbText(frame, limb) {
@@ -136,7 +137,7 @@
         starts.push(start); tips.push(plus(start, velocity, factor)); ways.push(velocity.map((each) => each / speed));
       });
       found.push(lines("velocities", starts.map((start, k) => [start, tips[k]]), { color: VELOCITY, width: 4 }));
-      found.push(heads("velocity heads", tips, ways, 0.06 * size, VELOCITY));
+      found.push(heads("velocity heads", tips, ways, 0.075 * size, VELOCITY));
     }
     view.rows.forEach((row, k) => {
       if (row.kind !== "couple" || row.at === null) return;
@@ -150,7 +151,7 @@
       found.push({
         type: "scatter3d", mode: "markers", name: "scale", x: [points[0][0]], y: [points[0][1]], z: [points[0][2]], hoverinfo: "skip", showlegend: false,
         marker: { size: 0.1, opacity: 0, color: [0], cmin: -top, cmax: top, colorscale: view.colours.map((each, k) => [k / (view.colours.length - 1), each]),
-          showscale: byId("view").clientWidth > 620, colorbar: { title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
+          showscale: byId("view").clientWidth > 620, colorbar: { x: 0.99, xanchor: "right", title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
       });
     }
     return found;
@@ -169,17 +170,36 @@
     const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6 });
     const [x, y, z] = ranges();
     return {
-      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: "inherit", color: INK, size: 12 }, hovermode: "closest",
-      scene: { aspectmode: "data", dragmode: "orbit", xaxis: axis("x", x), yaxis: axis("y", y), zaxis: axis("z", z), camera: camera(first) },
+      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: FONT, color: INK, size: 12 }, hovermode: "closest",
+      scene: { aspectmode: "data", dragmode: "orbit", xaxis: axis("x", x), yaxis: axis("y", y), zaxis: axis("z", z), camera: camera() },
     };
   }
 
-  const camera = (eye) => ({ eye: { x: eye[0], y: eye[1], z: eye[2] }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.05 } });
-  const config = { displaylogo: false, responsive: true, scrollZoom: false, modeBarButtonsToRemove: ["resetCameraLastSave3d", "hoverClosest3d", "tableRotation"] };
+  // From the side that shows most, so far that the whole box is seen: its sides have a product of 1 to the library.
+  function camera() {
+    const sides = ranges().map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
+    const wide = byId("view").clientWidth / byId("view").clientHeight;
+    const far = (0.72 * norm(sides) * Math.max(1, 0.95 / wide)) / mean;
+    const [x, y, z] = view.eye.map((each) => 1.72 * far * each);
+    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "perspective" } };
+  }
+  const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
   function draw() {
     if (!view || !window.Plotly || !layout) return null;
+    keep();
     return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, config);
+  }
+
+  // The copy for printers follows when the picture has been at rest for a while.
+  let later = 0;
+  function keep() {
+    clearTimeout(later);
+    later = setTimeout(async () => {
+      const box = byId("view");
+      byId("view-copy").src = await window.Plotly.toImage(box, { format: "png", width: 1000, height: 560 });
+      document.documentElement.dataset.copied = "yes";
+    }, 700);
   }
 
   function tell() {
@@ -195,7 +215,7 @@
       row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
       const bar = row.querySelector(".bar");
       bar.classList.toggle("minus", rate < 0);
-      bar.style.setProperty("--part", Math.min(Math.abs(rate) / largest(), 1).toFixed(4));
+      bar.style.setProperty("--part", (Math.abs(rate) / largest()).toFixed(4));
     });
   }
 
@@ -217,7 +237,8 @@
     if (key === "down") up = Math.max(up - Math.PI / 18, -1.5);
     if (key === "in") distance /= 1.2;
     if (key === "out") distance *= 1.2;
-    layout.scene.camera = key === "reset" ? camera(first) : { ...layout.scene.camera, eye: { x: distance * Math.cos(up) * Math.cos(round), y: distance * Math.cos(up) * Math.sin(round), z: distance * Math.sin(up) } };
+    layout.scene.camera = key === "reset" ? camera() : { ...layout.scene.camera, eye: { x: distance * Math.cos(up) * Math.cos(round), y: distance * Math.cos(up) * Math.sin(round), z: distance * Math.sin(up) } };
+    keep();
     window.Plotly.relayout(byId("view"), { "scene.camera": layout.scene.camera });
   }
 
@@ -227,15 +248,20 @@
     byId("map-words").textContent = plane.words;
     byId("map").setAttribute("aria-label", plane.words);
     if (!window.Plotly) return;
+    const hover = `${plain(label(0))}: %{x:.5g}<br>${plain(label(1))}: %{y:.5g}<br>F: %{z:.5g}<extra></extra>`;
+    const kept = plane.F.map((row, r) => row.map((value, k) => (plane.inside[r][k] === "1" ? value : null)));
+    const values = plane.F.flat().filter((value) => value !== null);
+    const contour = (z, more) => ({ type: "contour", x: plane.first, y: plane.second, z, zmin: Math.min(...values), zmax: Math.max(...values), colorscale: "Viridis", connectgaps: false, line: { width: 0.6, color: "rgba(255,255,255,0.6)" }, hovertemplate: hover, ...more });
+    const all = kept.flat().every((value, k) => value === plane.F.flat()[k]);
     window.Plotly.react(byId("map"), [
-      { type: "contour", x: plane.first, y: plane.second, z: plane.F, colorscale: "Viridis", connectgaps: false, line: { width: 0.6, color: "rgba(255,255,255,0.6)" },
-        colorbar: { title: { text: "F", side: "right" }, thickness: 14 }, hovertemplate: `${plain(label(0))}: %{x:.5g}<br>${plain(label(1))}: %{y:.5g}<br>F: %{z:.5g}<extra></extra>` },
+      ...(all ? [] : [contour(plane.F, { opacity: 0.35, showscale: false })]),
+      contour(kept.flat().some((value) => value !== null) ? kept : plane.F, { colorbar: { title: { text: "F", side: "right" }, thickness: 14 }, visible: true, ...(kept.flat().some((value) => value !== null) ? {} : { opacity: 0.35 }) }),
       { type: "scatter", mode: "markers", x: [plane.at[0]], y: [plane.at[1]], marker: { size: 13, color: "#ff8c1a", line: { color: "#000", width: 2 } }, hovertemplate: "the point found<extra></extra>", cliponaxis: false, showlegend: false },
     ], {
-      margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: "inherit", color: INK, size: 12 },
+      margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: FONT, color: INK, size: 12 },
       xaxis: { title: { text: plain(label(0)) }, range: [plane.first[0], plane.first[plane.first.length - 1]], zeroline: false },
       yaxis: { title: { text: plain(label(1)) }, range: [plane.second[0], plane.second[plane.second.length - 1]], zeroline: false },
-    }, { displaylogo: false, responsive: true });
+    }, { displaylogo: false, responsive: true, displayModeBar: false, scrollZoom: false });
   }
 
   async function copy() {
@@ -281,6 +307,7 @@
         byId("view").textContent = "";
         layout = newLayout();
         await draw();
+        byId("view").on("plotly_relayout", keep);
       }
     } catch {
       byId("view").textContent = "This browser cannot draw in three dimensions. The tables have every number.";
