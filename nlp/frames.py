@@ -24,8 +24,12 @@ _ELEVATION = 26.0
 RATES = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
 
 
-def view_data(drawing: Drawing) -> dict[str, Any]:
+def view_data(drawing: Drawing, rates: FloatArray) -> dict[str, Any]:
     """Everything that the 3-D view shows, in the case's units, as JSON.
+
+    Args:
+        drawing: the robot and its motion.
+        rates: (m,) work rates there, as the result has them, to the last bit.
 
     ``frames`` has one entry for each posture, in order of ``t``; the one at ``zero`` is the drawing itself.
     """
@@ -53,7 +57,10 @@ def view_data(drawing: Drawing) -> dict[str, Any]:
         "colours": list(RATES),
         "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
         "zero": zero,
-        "frames": [_frame(drawing, t, posture, units) for t, posture in postures],
+        "frames": [
+            _frame(drawing, t, posture, rates if k == zero else drawing.rates_at(posture), units)
+            for k, (t, posture) in enumerate(postures)
+        ],
     }
 
 
@@ -94,11 +101,7 @@ def _farthest(drawing: Drawing) -> float:
     return min(limits, default=1.0)
 
 
-def _frame(drawing: Drawing, t: float, posture: Posture, units: Units) -> dict[str, Any]:
-    rates = drawing.rates_at(posture)
-    if posture is drawing.posture and drawing.rows:
-        # The very numbers of the result, whose last bits another order of additions would change.
-        rates = np.array([row.rate for row in drawing.rows])
+def _frame(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, units: Units) -> dict[str, Any]:
     return {
         "t": t,
         "words": _words(drawing, t, units),

@@ -112,7 +112,7 @@ def _part(
 ) -> Part:
     view = None
     if state is not None:
-        view = view_data(drawing_of(nlp, x, state, task, is_answer=is_answer))
+        view = view_data(drawing_of(nlp, x, state, task, is_answer=is_answer), state.rates)
     can_move = state is not None and nlp.n > 0 and not has_loops(nlp)
     slices: Sequence[Slice] = slices_of(nlp, x) if can_move else []
     planes: Sequence[Plane] = planes_of(nlp, x, _PLANES // tasks) if can_move else []

@@ -153,7 +153,8 @@ def _legend(view: dict[str, Any]) -> Markup:
     gradient = f"background:linear-gradient(90deg,{','.join(RATES)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
     words = [
-        "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive. Bold black: the axis of the task's motion",
+        "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
+        " Bold black: the axis of the task's motion",
         ", with a purple path of its pitch" if view["motion"] and view["motion"]["path"] else "",
         ". Purple arrows: velocities of the platform's corners, not to scale.",
         " Dotted grey: the start." if view["reference"] else "",

@@ -181,7 +181,7 @@
     const wide = byId("view").clientWidth / byId("view").clientHeight;
     const far = (0.72 * norm(sides) * Math.max(1, 0.95 / wide)) / mean;
     const [x, y, z] = view.eye.map((each) => 1.72 * far * each);
-    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "perspective" } };
+    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.1 * far }, projection: { type: "perspective" } };
   }
   const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
