@@ -18,6 +18,8 @@ _SIDE = 20
 #: The farthest turn, and the farthest way of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
+#: Part of the terms of a rate that rounding may leave of it.
+_ROUNDING = 1e-9
 #: Of the eye at first, degrees.
 _ELEVATION = 26.0
 #: From shortening to lengthening: the colours of picture files.
@@ -112,9 +114,18 @@ def _frame(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, unit
         "jacobian": posture.jacobian.tolist(),
         "rates": rates.tolist(),
         "F": float(rates @ rates),
+        "noise": _noise(drawing, posture),
         "lengths": _lengths(drawing, posture),
         "velocities": _velocities(drawing, posture.points).tolist(),
     }
+
+
+def _noise(drawing: Drawing, posture: Posture) -> float:
+    """A rate below this is rounding error: the terms that a rate adds up are so much larger."""
+    if drawing.motion is None:
+        return 0.0
+    terms = np.abs(posture.jacobian) @ np.abs(np.concatenate([drawing.motion.twist[3:], drawing.motion.twist[:3]]))
+    return _ROUNDING * float(np.max(terms, initial=0.0))
 
 
 def _words(drawing: Drawing, t: float, units: Units) -> str:

@@ -168,7 +168,10 @@ def _legend(view: dict[str, Any]) -> Markup:
 def _rates(view: dict[str, Any]) -> Markup:
     """Rates of every row at the drawn posture; the script keeps it in step with the platform."""
     frame = view["frames"][view["zero"]]
-    largest = max((abs(rate) for rate in frame["rates"]), default=0.0) or 1.0
+    # Where the task's motion is resisted by nothing, what is left is rounding.
+    rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
+    largest = max(map(abs, rates), default=0.0) or 1.0
+    total = sum(rate**2 for rate in rates)
     couples = any(row["kind"] == "couple" for row in view["rows"])
     headers = [
         "limb",
@@ -180,10 +183,10 @@ def _rates(view: dict[str, Any]) -> Markup:
     ]
     body = []
     for k, row in enumerate(view["rows"]):
-        rate = frame["rates"][k]
+        rate = rates[k]
         part = rate / largest
         bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
-        share = f"{100 * rate**2 / frame['F']:.1f} %" if frame["F"] > 0 else "none"
+        share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
         cells = [f"{frame['lengths'][k]:.6g}", f"{rate:+.6g}", bar, share]
         kinds = ["length number", "rate number", "bars", "share number"]
         body.append(
@@ -198,7 +201,7 @@ def _rates(view: dict[str, Any]) -> Markup:
     caption = tag(
         "caption",
         "F = ",
-        tag("span", f"{frame['F']:.7g}", id="F-there"),
+        tag("span", f"{frame['F'] if total > 0 else 0:.7g}", id="F-there"),
         " with the platform ",
         tag("span", frame["words"], id="where"),
     )

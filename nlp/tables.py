@@ -222,7 +222,9 @@ def headline(case: Case, result: dict[str, Any]) -> RenderableType:
         status = "stationary, not proven optimal"
     if result["singular"]:
         status += f", singular: rank {result['rank']}"
-    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status}{over})"))
+    # What is left of an F that nothing resists is rounding.
+    F = 0.0 if result.get("task_is_free") and "poses" not in result else result["F"]
+    return Group(top, Text.assemble(f"{word} F = ", (_number(F), "bold green"), f"   ({status}{over})"))
 
 
 def _task(task: dict[str, Any], units: Units) -> Text:

@@ -2,6 +2,11 @@
 (() => {
   const byId = (id) => document.getElementById(id);
   const data = JSON.parse(byId("data").textContent);
+  // Where nothing resists a motion, what is left of its rates is rounding: it is shown as none.
+  for (const frame of data.views.flatMap((each) => each.frames)) {
+    frame.rates = frame.rates.map((rate) => (Math.abs(rate) > frame.noise ? rate : 0));
+    if (frame.rates.every((rate) => rate === 0)) frame.F = 0;
+  }
   document.documentElement.classList.add("scripted");
   const INK = "#17212b", MUTED = "#55616c", VELOCITY = "#6d2a8c", FREE = "#0b6b57";
   const FACES = { base: "#c3ccd5", platform: "#a9c6de" };
@@ -151,7 +156,7 @@
       found.push({
         type: "scatter3d", mode: "markers", name: "scale", x: [points[0][0]], y: [points[0][1]], z: [points[0][2]], hoverinfo: "skip", showlegend: false,
         marker: { size: 0.1, opacity: 0, color: [0], cmin: -top, cmax: top, colorscale: view.colours.map((each, k) => [k / (view.colours.length - 1), each]),
-          showscale: byId("view").clientWidth > 620, colorbar: { x: 0.99, xanchor: "right", title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
+          showscale: byId("view").clientWidth > 620, colorbar: { exponentformat: "e", x: 0.99, xanchor: "right", title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
       });
     }
     return found;
@@ -203,13 +208,13 @@
   }
 
   function tell() {
-    const frame = view.frames[index], top = Math.max(...frame.rates.map(Math.abs)) || 1;
+    const frame = view.frames[index];
     byId("travelled").textContent = frame.words;
     byId("travel").setAttribute("aria-valuetext", frame.words);
     byId("where").textContent = frame.words;
     byId("F-there").textContent = shown(frame.F, 7);
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
-      const rate = Math.abs(frame.rates[k]) < 1e-9 * top ? 0 : frame.rates[k];
+      const rate = frame.rates[k];
       row.querySelector(".length").textContent = shown(frame.lengths[k]);
       row.querySelector(".rate").textContent = shown(rate, 6, true);
       row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
