@@ -171,5 +171,5 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
         word = "largest" if nlp.sign < 0 else "smallest"
         at = f"{text(i, float(plane.first[column]))}, {text(j, float(plane.second[row]))}"
         words += f"On this grid and within every limit it is {word} at {at}. "
-    words += f"The point found is at {text(i, float(x[i]))}, {text(j, float(x[j]))}."
+    words += f"This point is at {text(i, float(x[i]))}, {text(j, float(x[j]))}."
     return words if part == 100 else f"{words} Pale: outside of a limit or equation ({100 - part:.3g} % of the map)."

@@ -77,6 +77,8 @@ def _case(report: Report) -> Markup:
     lines.append(
         "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
     )
+    if len(case.tasks) > 1:
+        lines.append(f"The tasks are brought together by the method {case.method.value}.")
     names = [variable.name for variable in first.nlp.program.variables if variable.name != LEVEL]
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
@@ -87,7 +89,8 @@ def _case(report: Report) -> Markup:
         lines.append("Nothing is free: the robot is evaluated where it stands.")
     if case.pose_count > 1:
         lines.append(
-            f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. Pictures show the first."
+            f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
+            "Pictures and their rates show the first."
         )
     limits = _point(report).get("limits") or []
     if limits:
@@ -145,7 +148,7 @@ def _robot(report: Report) -> Markup:
         tag("figcaption", _legend(first), id="view-words"),
     )
     content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
-    note = "Below without script: nothing moves, and the picture is missing; every number is in the tables."
+    note = "Without a script nothing moves and the picture is missing; every number is in the tables."
     return joined([*content, tag("noscript", tag("p", note))])
 
 
@@ -353,7 +356,7 @@ def _around(report: Report) -> Markup:
         tag(
             "p",
             "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: the point found."
+            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
             + (
                 " A component of a free direction moves with the direction's others, which are scaled to unit length."
                 if report.parts[0].nlp.program.directions
@@ -393,12 +396,12 @@ def _slice(part: Part, each: Slice) -> Markup:
                 words += f"; within every limit on {100 * np.mean(kept):.0f} % of it"
         else:
             words += "; no point of it keeps every limit"
-        words += f". Found: F = {here:.6g} at {at:.5g} {unit}".rstrip() + "."
+        words += f". Here: F = {here:.6g} at {at:.5g} {unit}".rstrip() + "."
     else:
         words = f"{variable.name}: it cannot move while the others are held."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
-        [Spot(at, here, "spot", f"found: {variable.name} = {at:.6g} {unit}, F = {here:.7g}")],
+        [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g}")],
         words=words,
         labels=(f"{variable.name}, {unit}" if unit else variable.name, "F"),
         bounds=(values[0], values[-1]),

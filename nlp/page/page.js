@@ -261,7 +261,7 @@
     window.Plotly.react(byId("map"), [
       ...(all ? [] : [contour(plane.F, { opacity: 0.35, showscale: false })]),
       contour(kept.flat().some((value) => value !== null) ? kept : plane.F, { colorbar: { title: { text: "F", side: "right" }, thickness: 14 }, visible: true, ...(kept.flat().some((value) => value !== null) ? {} : { opacity: 0.35 }) }),
-      { type: "scatter", mode: "markers", x: [plane.at[0]], y: [plane.at[1]], marker: { size: 13, color: "#ff8c1a", line: { color: "#000", width: 2 } }, hovertemplate: "the point found<extra></extra>", cliponaxis: false, showlegend: false },
+      { type: "scatter", mode: "markers", x: [plane.at[0]], y: [plane.at[1]], marker: { size: 13, color: "#ff8c1a", line: { color: "#000", width: 2 } }, hovertemplate: "this point<extra></extra>", cliponaxis: false, showlegend: false },
     ], {
       margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: FONT, color: INK, size: 12 },
       xaxis: { title: { text: plain(label(0)) }, range: [plane.first[0], plane.first[plane.first.length - 1]], zeroline: false },

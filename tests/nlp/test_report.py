@@ -15,12 +15,28 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
+from casadi import SX
 
-from screwsynth.nlp import formulate, load_case, solve
+from screwsynth.models import (
+    Body,
+    Closure,
+    Dimension,
+    Link,
+    Model,
+    Point,
+    PoseSymbols,
+    Scene,
+    Unknown,
+    force_along,
+)
+from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
 from screwsynth.nlp.frames import RATES
+from screwsynth.nlp.report import report_of
 from screwsynth.nlp.slices import planes_of, slices_of
+from screwsynth.nlp.webpage import page_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -326,6 +342,43 @@ def test_what_failed_is_no_answer(tmp_path: Path) -> None:
     assert "largest F =" not in found.words
     assert found.tables["design"][0][1] == "reached"
     assert {"class": "answer none", "id": "answer"} in [a for _, a in found.elements]
+
+
+def sliding(*shifts: float) -> Case:
+    """A vertical leg whose foot slides on x, where a loop keeps it below the platform."""
+    q, pose = SX.sym("q"), PoseSymbols()
+    foot, head = ca.vertcat(q, 0, 0), pose.position
+    model = Model(
+        name="sliding",
+        description="one leg and a loop",
+        parameters=(),
+        pose=pose,
+        home=(0.0, 0.0, 1.0),
+        wrenches=(force_along("1", foot, head - foot),),
+        unknowns=(Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),),
+        closure=(Closure("loop", q - head[0]),),
+        scene=Scene(
+            (Point("F", foot, Body.LIMB), Point("H", head, Body.PLATFORM)), (Link("F", "H", Body.LIMB, limb="1"),)
+        ),
+    )
+    task = Task([0, 0, 0, 0.6, 0, 0.8])
+    steps = tuple(Step(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
+    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], steps=steps)
+
+
+def test_robots_with_loops_follow() -> None:
+    for shifts in ((0.0,), (0.0, 1.0)):
+        solution = solve(sliding(*shifts), starts=2)
+        report = report_of("sliding", "", solution, result_of(solution))
+        assert report.parts[0].view is not None
+        for frame in report.parts[0].view["frames"]:
+            foot, head = np.array(frame["points"])
+            np.testing.assert_allclose(head, [1 + 0.6 * frame["t"], 0, 2 + 0.8 * frame["t"]], atol=1e-9)
+            np.testing.assert_allclose(foot, [head[0], 0, 0], atol=1e-9)
+            assert frame["rates"] == pytest.approx([0.8])
+        text = page_of(report)
+        assert "loops would open" in text
+        Page(text)
 
 
 def test_certificate(page: Callable[..., Page]) -> None:
