@@ -83,7 +83,6 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from screwsynth.nlp.casefile import load_case
-    from screwsynth.nlp.result import compromise_of, result_of
     from screwsynth.nlp.tasks import Compromise
 
     loaded = load_case(case)
@@ -93,19 +92,7 @@ def solve(
     if json_file != "-":
         # The library of tables loads while Ipopt works outside of the interpreter.
         Thread(target=import_module, args=("screwsynth.nlp.tables",), daemon=True).start()
-    proved = True
-    if certify:
-        from screwsynth.nlp.certification import Wanted
-
-        certified = _certify(loaded, Wanted(jobs=jobs), with_proof=False)
-        solution, proved = certified.solution, certified.is_proved
-        if isinstance(solution, Compromise):
-            result = compromise_of(solution, certified.tasks, certified.combined)
-        else:
-            result = result_of(solution, certificate=certified.tasks[0])
-    else:
-        solution = _solve(loaded, jobs)
-        result = compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution)
+    solution, result, proved = _solved(loaded, jobs, certify=certify)
     if json_file is not None:
         _write_json(json_file, result)
     if plot is not None:
@@ -116,6 +103,39 @@ def solve(
         from screwsynth.nlp.tables import print_compromise, print_solution
 
         (print_compromise if isinstance(solution, Compromise) else print_solution)(_console(), loaded, result)
+    raise typer.Exit(0 if solution.status.is_answer and proved else 1)
+
+
+@app.command()
+def report(
+    case: CaseName,
+    out: Annotated[str, typer.Option(metavar="FILE", help="Page to write, such as report.html; - is stdout.")],
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Prove the optimum too, and show the proof's way.")
+    ] = False,
+    starts: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Starting points instead of the case's.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")] = None,
+) -> None:
+    """Solve a case and write a page about it: one file that opens without a network."""
+    from screwsynth.nlp.casefile import find_case, load_case
+    from screwsynth.nlp.extras import check_library
+    from screwsynth.nlp.files import read_text, write_text
+
+    loaded = load_case(case)
+    text = read_text(str(find_case(case)))
+    loaded = replace(loaded, search=loaded.search.but(starts, seed))
+    _check_target(out)
+    check_library("plotly", "reports")
+    from screwsynth.nlp.report import report_of
+    from screwsynth.nlp.webpage import page_of
+
+    solution, result, proved = _solved(loaded, jobs, certify=certify)
+    write_text(out, page_of(report_of(case, text, solution, result)))
+    if out != "-":
+        typer.echo(f"{out}: {result['status']}")
     raise typer.Exit(0 if solution.status.is_answer and proved else 1)
 
 
@@ -406,6 +426,23 @@ def _description(model: str) -> str:
         return build_model(model).description
     except CaseError as error:
         return error.fault
+
+
+def _solved(case: Case, jobs: int | None, *, certify: bool) -> tuple[Solution | Compromise, dict[str, Any], bool]:
+    """A case solved, its result as plain data, and whether what was to be proved is."""
+    from screwsynth.nlp.result import compromise_of, result_of
+    from screwsynth.nlp.tasks import Compromise
+
+    if certify:
+        from screwsynth.nlp.certification import Wanted
+
+        certified = _certify(case, Wanted(jobs=jobs), with_proof=False)
+        solution = certified.solution
+        if isinstance(solution, Compromise):
+            return solution, compromise_of(solution, certified.tasks, certified.combined), certified.is_proved
+        return solution, result_of(solution, certificate=certified.tasks[0]), certified.is_proved
+    solution = _solve(case, jobs)
+    return solution, compromise_of(solution) if isinstance(solution, Compromise) else result_of(solution), True
 
 
 def _solve(case: Case, jobs: int | None) -> Solution | Compromise:

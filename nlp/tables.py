@@ -27,17 +27,17 @@ _TURNED = 1e-9
 
 def print_solution(console: Console, case: Case, result: dict[str, Any]) -> None:
     """The result of a solve, as :func:`screwsynth.nlp.result.result_of` gives it."""
-    console.print(_headline(case, result))
+    console.print(headline(case, result))
     if "parameters" in result:
-        console.print(_design(case, result))
-        console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
+        console.print(design_table(case, result))
+        console.print(pose_table(case, result) if "poses" in result else limb_table(case, result))
     if result.get("limits"):
-        console.print(_limits(result))
+        console.print(limit_table(result))
     if "tolerance" in result:
-        console.print(_tolerance(case, result))
-    for line in _verdict(case, result):
+        console.print(tolerance_line(case, result))
+    for line in verdict_lines(case, result):
         console.print(line)
-    for line in _certificate(result["certificate"]):
+    for line in certificate_lines(result["certificate"]):
         console.print(line)
 
 
@@ -47,11 +47,11 @@ def print_certified(console: Console, case: Case, result: dict[str, Any]) -> Non
     for task in result["tasks"]:
         if len(result["tasks"]) > 1:
             console.print(_labelled("task", f"{task['name']}, {task['sense']} F"))
-        for line in _certificate(task["certificate"]):
+        for line in certificate_lines(task["certificate"]):
             console.print(line)
     if len(result["tasks"]) > 1 and result["certificate"] is not None:
         console.print(_labelled("combined by", case.method.value))
-        for line in _certificate(result["certificate"]):
+        for line in certificate_lines(result["certificate"]):
             console.print(line)
 
 
@@ -65,9 +65,28 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
     for name in combined["violated"]:
         console.print(Text(f"violated: {name}", style="red"))
     if "parameters" in combined:
-        console.print(_design(case, combined))
+        console.print(design_table(case, combined))
     if combined.get("limits"):
-        console.print(_limits(combined))
+        console.print(limit_table(combined))
+    console.print(outcome_table(combined))
+    if combined["value"] is not None:
+        console.print(_labelled(combined["method"], _number(combined["value"])))
+        console.print(_labelled("verdict", combined["optimality"]["kind"]))
+    for task in result["tasks"]:
+        for line in certificate_lines(task["certificate"]):
+            console.print(_labelled("task", task["task"]["name"]) if "task" in task else Text())
+            console.print(line)
+    for line in certificate_lines(combined["certificate"]):
+        console.print(line)
+    for notice in combined["notices"]:
+        console.print(_labelled("note", notice))
+    if "rank" in combined:
+        for line in singularity_lines(case, {**combined, "task_is_free": False}):
+            console.print(line)
+
+
+def outcome_table(combined: dict[str, Any]) -> Table:
+    """What bringing several tasks together means for each."""
     table = _table("task", "sense", "weight", "F", "best alone", "loss", "at this point")
     for task in combined["tasks"]:
         shown = [_number(task[key]) if task[key] is not None else "none" for key in ("F", "best", "loss")]
@@ -75,21 +94,7 @@ def print_compromise(console: Console, case: Case, result: dict[str, Any]) -> No
         table.add_row(
             task["name"], task["sense"], f"{task['weight']:g}", shown[0], shown[1] + unique, shown[2], task["verdict"]
         )
-    console.print(table)
-    if combined["value"] is not None:
-        console.print(_labelled(combined["method"], _number(combined["value"])))
-        console.print(_labelled("verdict", combined["optimality"]["kind"]))
-    for task in result["tasks"]:
-        for line in _certificate(task["certificate"]):
-            console.print(_labelled("task", task["task"]["name"]) if "task" in task else Text())
-            console.print(line)
-    for line in _certificate(combined["certificate"]):
-        console.print(line)
-    for notice in combined["notices"]:
-        console.print(_labelled("note", notice))
-    if "rank" in combined:
-        for line in _singularity(case, {**combined, "task_is_free": False}):
-            console.print(line)
+    return table
 
 
 def print_checks(console: Console, checks: Iterable[CaseCheck]) -> None:
@@ -130,14 +135,14 @@ def print_state(console: Console, case: Case, result: dict[str, Any]) -> None:
         console.print(_labelled("F", _number(0.0 if task["task_is_free"] else task["F"])))
     for line in _violated(result["violated"]):
         console.print(line)
-    console.print(_design(case, result))
-    console.print(_poses(case, result) if "poses" in result else _limbs(case, result))
+    console.print(design_table(case, result))
+    console.print(pose_table(case, result) if "poses" in result else limb_table(case, result))
     if result["limits"]:
-        console.print(_limits(result))
+        console.print(limit_table(result))
     console.print(_jacobian(case, result))
     console.print(_labelled("singular values", _listed(result["singular_values"])))
     console.print(_principal(case, result["principal_motions"]))
-    for line in _singularity(case, result):
+    for line in singularity_lines(case, result):
         console.print(line)
 
 
@@ -205,7 +210,8 @@ def _listed(values: Iterable[float]) -> str:
     return "  ".join(f"{value + 0.0:.5g}" for value in values)
 
 
-def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
+def headline(case: Case, result: dict[str, Any]) -> RenderableType:
+    """What was found: title, task, and F or the status of what is no answer."""
     status = result["status"]
     top = Group(_title(case), _task(result["task"], case.units)) if "task" in result else _title(case)
     if result["F"] is None:
@@ -216,14 +222,16 @@ def _headline(case: Case, result: dict[str, Any]) -> RenderableType:
         status = "stationary, not proven optimal"
     if result["singular"]:
         status += f", singular: rank {result['rank']}"
-    return Group(top, Text.assemble(f"{word} F = ", (_number(result["F"]), "bold green"), f"   ({status}{over})"))
+    # What is left of an F that nothing resists is rounding.
+    F = 0.0 if result.get("task_is_free") and "poses" not in result else result["F"]
+    return Group(top, Text.assemble(f"{word} F = ", (_number(F), "bold green"), f"   ({status}{over})"))
 
 
 def _task(task: dict[str, Any], units: Units) -> Text:
-    return _labelled("task", f"{task['name']}, {task['sense']} F: {_motion(task, units)}")
+    return _labelled("task", f"{task['name']}, {task['sense']} F: {motion_words(task, units)}")
 
 
-def _design(case: Case, result: dict[str, Any]) -> Table:
+def design_table(case: Case, result: dict[str, Any]) -> Table:
     """Every dimension and the pose: value, unit, the range it was free in, and the limit it lies on."""
     reached = "reached" in result
     held = {side["name"]: side for side in (result.get("optimality") or {}).get("active", []) if not reached}
@@ -259,7 +267,7 @@ def _design(case: Case, result: dict[str, Any]) -> Table:
     return table
 
 
-def _poses(case: Case, result: dict[str, Any]) -> Table:
+def pose_table(case: Case, result: dict[str, Any]) -> Table:
     """The robot at every pose: F, where it stands, and the range of each measure over its limbs."""
     measures = [item for item in case.model.quantities if item.name in result["poses"][0]["quantities"]]
     words = [item.name.replace("_", " ").removesuffix(" angle") for item in measures]
@@ -295,7 +303,8 @@ def _held(held: dict[str, Any], name: str, unit: str) -> str:
     return "" if side is None else f"{side['bound']}, {side['multiplier']:.4g} F/{unit}"
 
 
-def _limbs(case: Case, result: dict[str, Any]) -> Table:
+def limb_table(case: Case, result: dict[str, Any]) -> Table:
+    """Every row of the Jacobian: its rate, its share of F, and the measures of its limb."""
     couples = any(row.kind.value == "couple" for row in case.model.wrenches)
     measures = list(result["quantities"])
     labels = [f"{name.replace('_', ' ')}\n{case.units.label(_dimension(case.model, name))}" for name in measures]
@@ -319,7 +328,7 @@ def _jacobian(case: Case, result: dict[str, Any]) -> Table:
     return table
 
 
-def _limits(result: dict[str, Any]) -> Table:
+def limit_table(result: dict[str, Any]) -> Table:
     """Every limit of the case: how near the design comes to it, where, and what it costs."""
     table = _table("limit", "", "unit", "nearest", "margin", "where", "costs")
     for row in result["limits"]:
@@ -333,7 +342,8 @@ def _limits(result: dict[str, Any]) -> Table:
     return table
 
 
-def _tolerance(case: Case, result: dict[str, Any]) -> Text:
+def tolerance_line(case: Case, result: dict[str, Any]) -> Text:
+    """What inexact joint centres may cost."""
     lost, unit = result["tolerance"], case.units.length
     part = f" ({100 * lost['loss'] / result['F']:.2g} %)" if result["F"] else ""
     text = f"{lost['joint_centre']:g} {unit} at every joint centre: F may be worse by {lost['loss']:.4g}{part}"
@@ -350,7 +360,7 @@ def _place(name: str) -> str:
     return name.partition(" ")[2]
 
 
-def _certificate(certificate: dict[str, Any] | None) -> Iterable[Text]:
+def certificate_lines(certificate: dict[str, Any] | None) -> Iterable[Text]:
     """What is proved, and what it took."""
     if certificate is None:
         return
@@ -366,7 +376,8 @@ def _certificate(certificate: dict[str, Any] | None) -> Iterable[Text]:
     yield _labelled("search", f"{boxes}, engine {certificate['engine']}")
 
 
-def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+def verdict_lines(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+    """What the point is, by which evidence, and how the starts ended."""
     evidence = result["optimality"]
     if evidence is not None:
         yield _labelled("verdict", evidence["kind"])
@@ -383,7 +394,7 @@ def _verdict(case: Case, result: dict[str, Any]) -> Iterable[Text]:
         yield Text(f"would be feasible with {row['key']} = {row['needed']:.6g}{unit} instead of {row['limit']:g}{unit}")
     yield from _starts(result["starts"])
     if "rank" in result and "reached" not in result:
-        yield from _singularity(case, result)
+        yield from singularity_lines(case, result)
 
 
 def _violated(sides: Sequence[dict[str, Any]]) -> Iterable[Text]:
@@ -416,15 +427,16 @@ def _principal(case: Case, motions: dict[str, Any]) -> Table:
         ranks = ("least", "", "most")
         for rank, motion in zip(ranks, motions[kind], strict=True):
             noise = _NOISE * motions[kind][-1]["F"]
-            table.add_row(rank, _number(motion["F"] if motion["F"] > noise else 0.0), _motion(motion, case.units))
+            table.add_row(rank, _number(motion["F"] if motion["F"] > noise else 0.0), motion_words(motion, case.units))
     return table
 
 
-def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+def singularity_lines(case: Case, result: dict[str, Any]) -> Iterable[Text]:
+    """Rank of the Jacobian, and the motions that nothing resists."""
     if result["task_is_free"]:
+        words = motion_words(result["task"], case.units)
         yield Text(
-            f"singular: F is 0, so the platform can make the task's motion ({_motion(result['task'], case.units)}) "
-            "with every actuator locked",
+            f"singular: F is 0, so the platform can make the task's motion ({words}) with every actuator locked",
             style="yellow",
         )
     if not result["singular"]:
@@ -433,10 +445,12 @@ def _singularity(case: Case, result: dict[str, Any]) -> Iterable[Text]:
     several = " combinations of" if len(result["free_motions"]) > 1 else ""
     yield _labelled("rank of J", f"{result['rank']}: the structure is singular; nothing resists{several}")
     for motion in result["free_motions"]:
-        yield Text(f"  {_motion(motion, case.units)}")
+        yield Text(f"  {motion_words(motion, case.units)}")
 
 
-def _motion(motion: dict[str, Any], units: Units) -> str:
+def motion_words(motion: dict[str, Any], units: Units) -> str:
+    """A motion in words: its axis, point and pitch."""
+
     def vector(values: Sequence[float]) -> str:
         noise = _NOISE * max(1.0, *map(abs, values))
         return f"({', '.join(f'{value if abs(value) > noise else 0:.4g}' for value in values)})"

@@ -46,6 +46,7 @@ def test_the_wheel_holds_every_module_and_case_and_runs(tmp_path: Path) -> None:
         for path in (ROOT / folder).iterdir():
             if path.suffix in (".py", ".toml", ".typed"):
                 assert f"screwsynth/{folder}/{path.name}" in held
+    assert {f"screwsynth/nlp/page/{path.name}" for path in (ROOT / "nlp" / "page").iterdir()} <= held
     site = tmp_path / "site"
     subprocess.run([*pip, "install", "--no-deps", "--target", str(site), str(wheel)], check=True)
     code = f"import screwsynth.nlp.cli as cli; assert cli.__file__.startswith({str(site)!r}), cli.__file__; cli.main()"

@@ -1,0 +1,326 @@
+"use strict";
+(() => {
+  const byId = (id) => document.getElementById(id);
+  const data = JSON.parse(byId("data").textContent);
+  // Where nothing resists a motion, what is left of its rates is rounding: it is shown as none.
+  for (const frame of data.views.flatMap((each) => each.frames)) {
+    frame.rates = frame.rates.map((rate) => (Math.abs(rate) > frame.noise ? rate : 0));
+    if (frame.rates.every((rate) => rate === 0)) frame.F = 0;
+  }
+  document.documentElement.classList.add("scripted");
+  const INK = "#17212b", MUTED = "#55616c", VELOCITY = "#6d2a8c", FREE = "#0b6b57";
+  const FACES = { base: "#c3ccd5", platform: "#a9c6de" };
+  const FONT = "Arial, 'DejaVu Sans', sans-serif";
+
+  // Text of a case must not become markup in a hover label, which knows some tags.
+  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  const shown = (value, digits = 6, signed = false) => {
+    const text = String(Number(value.toPrecision(digits)));
+    return (signed && value > 0 ? "+" : "") + text.replace(/-/g, "\u2212");
+  };
+  const plus = (a, b, factor = 1) => a.map((each, k) => each + factor * b[k]);
+  const norm = (a) => Math.hypot(...a);
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+  let view = data.views[0] || null;
+  let index = view ? view.zero : 0;
+  let layout = null;
+
+  // Colours and bars have the scale of the position shown, as in picture files.
+  const largest = () => Math.max(...view.frames[index].rates.map(Math.abs)) || 1;
+
+  function colour(rate) {
+    const colours = view.colours, last = colours.length - 1;
+    const place = Math.min(Math.max((rate / largest() + 1) / 2, 0), 1) * last;
+    const k = Math.min(Math.floor(place), last - 1), part = place - k;
+    const mixed = [1, 3, 5].map((at) => {
+      const [a, b] = [colours[k], colours[k + 1]].map((each) => parseInt(each.slice(at, at + 2), 16));
+      return Math.round(a + part * (b - a));
+    });
+    return `rgb(${mixed.join(",")})`;
+  }
+
+  // Lines given as lists of points, with a gap between them.
+  function lines(name, parts, style, more = {}) {
+    const axes = [[], [], []];
+    for (const part of parts) {
+      for (const point of part) point.forEach((value, k) => axes[k].push(value));
+      axes.forEach((axis) => axis.push(null));
+    }
+    return { type: "scatter3d", mode: "lines", name, x: axes[0], y: axes[1], z: axes[2], line: style, hoverinfo: "skip", showlegend: false, ...more };
+  }
+
+  // Heads of arrows as one mesh of cones: tips, unit directions, and one length.
+  function heads(name, tips, directions, length, fill) {
+    const x = [], y = [], z = [], i = [], j = [], k = [], sides = 10;
+    const add = (point) => { x.push(point[0]); y.push(point[1]); z.push(point[2]); return x.length - 1; };
+    tips.forEach((tip, n) => {
+      const s = directions[n], other = Math.abs(s[0]) < 0.8 ? [1, 0, 0] : [0, 1, 0];
+      let a = cross(s, other);
+      a = a.map((each) => each / norm(a));
+      const b = cross(s, a), back = plus(tip, s, -length), top = add(tip), middle = add(back);
+      const rim = [];
+      for (let m = 0; m < sides; m += 1) {
+        const angle = (2 * Math.PI * m) / sides;
+        rim.push(add(plus(plus(back, a, 0.27 * length * Math.cos(angle)), b, 0.27 * length * Math.sin(angle))));
+      }
+      rim.forEach((at, m) => {
+        const next = rim[(m + 1) % sides];
+        i.push(top, middle); j.push(at, next); k.push(next, at);
+      });
+    });
+    return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
+  }
+
+  function limbText(frame, limb) {
+    const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
+    const text = [`<b>limb ${plain(limb)}</b>`];
+    if (rows.length) text.push(`length ${shown(frame.lengths[rows[0][1]])} ${plain(view.unit)}`);
+    for (const [row, k] of rows) {
+      const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
+      const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value, 4));
+      text.push(`${row.kind}: rate ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
+      text.push(`wrench (${wrench.slice(0, 3).join(", ")}; ${wrench.slice(3).join(", ")})`);
+    }
+    return text.join("<br>");
+  }
+
+  function traces(frame) {
+    const found = [], size = view.size, points = frame.points;
+    if (view.reference) {
+      found.push(lines("start", view.links.map((link) => link.ends.map((end) => view.reference[end])), { color: "#8b959e", width: 2, dash: "dot" }));
+    }
+    for (const [body, loop] of Object.entries(view.plates)) {
+      const corners = loop.map((each) => points[each]);
+      const middle = [0, 1, 2].map((k) => corners.reduce((sum, each) => sum + each[k], 0) / corners.length);
+      const all = [...corners, middle], count = corners.length;
+      found.push({
+        type: "mesh3d", name: `${body} face`, x: all.map((p) => p[0]), y: all.map((p) => p[1]), z: all.map((p) => p[2]),
+        i: corners.map((_, k) => k), j: corners.map((_, k) => (k + 1) % count), k: corners.map(() => count),
+        color: FACES[body], opacity: 0.55, hoverinfo: "skip", showlegend: false, lighting: { ambient: 0.9, diffuse: 0.2, specular: 0 },
+      });
+    }
+    const edges = view.links.filter((link) => link.limb === null);
+    if (edges.length) found.push(lines("edges", edges.map((link) => link.ends.map((end) => points[end])), { color: MUTED, width: 4 }));
+    if (view.motion) {
+      found.push(lines("axis", [view.motion.line], { color: INK, width: 9 }));
+      const along = plus(view.motion.line[1], view.motion.line[0], -1), unit = along.map((each) => each / norm(along));
+      found.push(heads("axis head", [plus(view.motion.line[1], unit, 0.06 * size)], [unit], 0.11 * size, INK));
+      const path = view.motion.path;
+      if (path.length > 2) {
+        found.push(lines("path", [path], { color: VELOCITY, width: 5 }));
+        const last = path[path.length - 1], step = plus(last, path[path.length - 2], -1);
+        found.push(heads("path head", [plus(last, step, 0.05 * size / norm(step))], [step.map((each) => each / norm(step))], 0.08 * size, VELOCITY));
+      }
+    }
+    view.free.forEach((each) => found.push(lines("free motion", [each.line], { color: FREE, width: 5, dash: "dash" })));
+    const limbs = [...new Set(view.links.filter((link) => link.limb !== null).map((link) => link.limb))];
+    for (const limb of limbs) {
+      const own = view.links.filter((link) => link.limb === limb);
+      // Points along the limb, so that it answers wherever it is pointed at.
+      const parts = own.map(({ ends: [a, b] }) => Array.from({ length: 13 }, (_, n) => plus(points[a], plus(points[b], points[a], -1), n / 12)));
+      // Coloured by its force, or by its couple where it has no force.
+      const force = view.rows.findIndex((each) => each.limb === limb && each.kind === "force");
+      const row = force < 0 ? view.rows.findIndex((each) => each.limb === limb) : force;
+      const text = limbText(frame, limb);
+      found.push(lines(`limb ${limb}`, parts, { color: row < 0 ? MUTED : colour(frame.rates[row]), width: 12 }, {
+        hoverinfo: "text", hovertext: parts.flatMap((part) => [...part.map(() => text), text]), hoverlabel: { align: "left", bgcolor: "#fff", bordercolor: INK, font: { color: INK, size: 13 } },
+      }));
+    }
+    const joints = [...new Set(view.links.filter((link) => link.limb !== null).flatMap((link) => link.ends))].map((each) => points[each]);
+    found.push({
+      type: "scatter3d", mode: "markers", name: "joints", x: joints.map((p) => p[0]), y: joints.map((p) => p[1]), z: joints.map((p) => p[2]),
+      marker: { size: 5, color: "#fff", line: { color: INK, width: 2 } }, hoverinfo: "skip", showlegend: false,
+    });
+    const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
+    if (fastest > 1e-9 * size) {
+      const factor = 0.42 * size / fastest, starts = [], tips = [], ways = [];
+      frame.velocities.forEach((velocity, k) => {
+        const speed = norm(velocity);
+        if (speed < 1e-6 * fastest) return;
+        const start = points[view.corners[k]];
+        starts.push(start); tips.push(plus(start, velocity, factor)); ways.push(velocity.map((each) => each / speed));
+      });
+      found.push(lines("velocities", starts.map((start, k) => [start, tips[k]]), { color: VELOCITY, width: 4 }));
+      found.push(heads("velocity heads", tips, ways, 0.075 * size, VELOCITY));
+    }
+    view.rows.forEach((row, k) => {
+      if (row.kind !== "couple" || row.at === null) return;
+      const moment = frame.jacobian[k].slice(3), way = moment.map((each) => each / norm(moment)), start = points[row.at];
+      const tip = plus(start, way, 0.24 * size);
+      found.push(lines(`couple ${row.limb}`, [[start, tip]], { color: colour(frame.rates[k]), width: 6 }));
+      found.push(heads(`couple heads ${row.limb}`, [tip, plus(tip, way, -0.06 * size)], [way, way], 0.07 * size, colour(frame.rates[k])));
+    });
+    if (view.rows.length) {
+      const top = largest();
+      found.push({
+        type: "scatter3d", mode: "markers", name: "scale", x: [points[0][0]], y: [points[0][1]], z: [points[0][2]], hoverinfo: "skip", showlegend: false,
+        marker: { size: 0.1, opacity: 0, color: [0], cmin: -top, cmax: top, colorscale: view.colours.map((each, k) => [k / (view.colours.length - 1), each]),
+          showscale: byId("view").clientWidth > 620, colorbar: { exponentformat: "e", x: 0.99, xanchor: "right", title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
+      });
+    }
+    return found;
+  }
+
+  function ranges() {
+    const every = view.frames.flatMap((frame) => frame.points);
+    if (view.reference) every.push(...view.reference);
+    if (view.motion) every.push(...view.motion.line, ...view.motion.path);
+    const room = 0.12 * view.size;
+    return [0, 1, 2].map((k) => [Math.min(...every.map((p) => p[k])) - room, Math.max(...every.map((p) => p[k])) + room]);
+  }
+
+  function newLayout() {
+    const unit = view.unit ? `, ${plain(view.unit)}` : "";
+    const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6 });
+    const [x, y, z] = ranges();
+    return {
+      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: FONT, color: INK, size: 12 }, hovermode: "closest",
+      scene: { aspectmode: "data", dragmode: "orbit", xaxis: axis("x", x), yaxis: axis("y", y), zaxis: axis("z", z), camera: camera() },
+    };
+  }
+
+  // From the side that shows most, so far that the whole box is seen: its sides have a product of 1 to the library.
+  function camera() {
+    const sides = ranges().map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
+    const wide = byId("view").clientWidth / byId("view").clientHeight;
+    const far = (0.72 * norm(sides) * Math.max(1, 0.95 / wide)) / mean;
+    const [x, y, z] = view.eye.map((each) => 1.72 * far * each);
+    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.1 * far }, projection: { type: "perspective" } };
+  }
+  const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
+
+  function draw() {
+    if (!view || !window.Plotly || !layout) return null;
+    keep();
+    return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, config);
+  }
+
+  // The copy for printers follows when the picture has been at rest for a while.
+  let later = 0;
+  function keep() {
+    clearTimeout(later);
+    later = setTimeout(async () => {
+      const box = byId("view");
+      byId("view-copy").src = await window.Plotly.toImage(box, { format: "png", width: 1000, height: 560 });
+      document.documentElement.dataset.copied = "yes";
+    }, 700);
+  }
+
+  function tell() {
+    const frame = view.frames[index];
+    byId("travelled").textContent = frame.words;
+    byId("travel").setAttribute("aria-valuetext", frame.words);
+    byId("where").textContent = frame.words;
+    byId("F-there").textContent = shown(frame.F, 7);
+    document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
+      const rate = frame.rates[k];
+      row.querySelector(".length").textContent = shown(frame.lengths[k]);
+      row.querySelector(".rate").textContent = shown(rate, 6, true);
+      row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
+      const bar = row.querySelector(".bar");
+      bar.classList.toggle("minus", rate < 0);
+      bar.style.setProperty("--part", (Math.abs(rate) / largest()).toFixed(4));
+    });
+  }
+
+  let waiting = false;
+  function move(to) {
+    index = to;
+    tell();
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; draw(); });
+  }
+
+  function turn(key) {
+    const eye = layout.scene.camera.eye, far = Math.hypot(eye.x, eye.y, eye.z);
+    let round = Math.atan2(eye.y, eye.x), up = Math.asin(eye.z / far), distance = far;
+    if (key === "left") round -= Math.PI / 12;
+    if (key === "right") round += Math.PI / 12;
+    if (key === "up") up = Math.min(up + Math.PI / 18, 1.5);
+    if (key === "down") up = Math.max(up - Math.PI / 18, -1.5);
+    if (key === "in") distance /= 1.2;
+    if (key === "out") distance *= 1.2;
+    layout.scene.camera = key === "reset" ? camera() : { ...layout.scene.camera, eye: { x: distance * Math.cos(up) * Math.cos(round), y: distance * Math.cos(up) * Math.sin(round), z: distance * Math.sin(up) } };
+    keep();
+    window.Plotly.relayout(byId("view"), { "scene.camera": layout.scene.camera });
+  }
+
+  function map() {
+    const [part, which] = byId("pair").value.split(" ").map(Number), plane = data.planes[part][which];
+    const label = (k) => plane.names[k] + (plane.units[k] ? `, ${plane.units[k]}` : "");
+    byId("map-words").textContent = plane.words;
+    byId("map").setAttribute("aria-label", plane.words);
+    if (!window.Plotly) return;
+    const hover = `${plain(label(0))}: %{x:.5g}<br>${plain(label(1))}: %{y:.5g}<br>F: %{z:.5g}<extra></extra>`;
+    const kept = plane.F.map((row, r) => row.map((value, k) => (plane.inside[r][k] === "1" ? value : null)));
+    const values = plane.F.flat().filter((value) => value !== null);
+    const contour = (z, more) => ({ type: "contour", x: plane.first, y: plane.second, z, zmin: Math.min(...values), zmax: Math.max(...values), colorscale: "Viridis", connectgaps: false, line: { width: 0.6, color: "rgba(255,255,255,0.6)" }, hovertemplate: hover, ...more });
+    const all = kept.flat().every((value, k) => value === plane.F.flat()[k]);
+    window.Plotly.react(byId("map"), [
+      ...(all ? [] : [contour(plane.F, { opacity: 0.35, showscale: false })]),
+      contour(kept.flat().some((value) => value !== null) ? kept : plane.F, { colorbar: { title: { text: "F", side: "right" }, thickness: 14 }, visible: true, ...(kept.flat().some((value) => value !== null) ? {} : { opacity: 0.35 }) }),
+      { type: "scatter", mode: "markers", x: [plane.at[0]], y: [plane.at[1]], marker: { size: 13, color: "#ff8c1a", line: { color: "#000", width: 2 } }, hovertemplate: "this point<extra></extra>", cliponaxis: false, showlegend: false },
+    ], {
+      margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: FONT, color: INK, size: 12 },
+      xaxis: { title: { text: plain(label(0)) }, range: [plane.first[0], plane.first[plane.first.length - 1]], zeroline: false },
+      yaxis: { title: { text: plain(label(1)) }, range: [plane.second[0], plane.second[plane.second.length - 1]], zeroline: false },
+    }, { displaylogo: false, responsive: true, displayModeBar: false, scrollZoom: false });
+  }
+
+  async function copy() {
+    const text = byId("case-text").textContent;
+    let done = true;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      // Without leave for the clipboard, the old way through a selection is tried.
+      getSelection().selectAllChildren(byId("case-text"));
+      done = document.execCommand("copy");
+    }
+    byId("copied").textContent = done ? "Copied." : "Not copied: it is selected now, copy it by keyboard.";
+  }
+
+  byId("copy").addEventListener("click", copy);
+  if (view) {
+    byId("travel").addEventListener("input", (event) => move(Number(event.target.value)));
+    document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => layout && turn(button.dataset.turn)));
+    tell();
+    if (byId("task")) {
+      byId("task").addEventListener("change", (event) => {
+        view = data.views[Number(event.target.value)];
+        byId("travel").max = view.frames.length - 1;
+        byId("travel").value = view.zero;
+        if (window.Plotly) layout = newLayout();
+        move(view.zero);
+      });
+    }
+  }
+  if (byId("pair")) {
+    byId("pair").addEventListener("change", map);
+    map();
+  }
+
+  // The library is half of a second's work: it waits until words and tables are painted.
+  requestAnimationFrame(() => setTimeout(async () => {
+    const library = document.createElement("script");
+    library.textContent = byId("plotly").textContent;
+    document.head.append(library);
+    try {
+      if (view) {
+        byId("view").textContent = "";
+        layout = newLayout();
+        await draw();
+        byId("view").on("plotly_relayout", keep);
+      }
+    } catch {
+      byId("view").textContent = "This browser cannot draw in three dimensions. The tables have every number.";
+    }
+    if (byId("pair")) {
+      byId("map").textContent = "";
+      map();
+    }
+    document.documentElement.dataset.drawn = "yes";
+  }, 0));
+})();

@@ -1,0 +1,644 @@
+"""The page about a case: what stands in it without a browser, and what it does in a real one."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cache
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from screwsynth.models import (
+    Body,
+    Closure,
+    Dimension,
+    Link,
+    Model,
+    Point,
+    PoseSymbols,
+    Scene,
+    Unknown,
+    force_along,
+)
+from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
+from screwsynth.nlp.frames import RATES
+from screwsynth.nlp.report import report_of
+from screwsynth.nlp.slices import planes_of, slices_of
+from screwsynth.nlp.webpage import page_of
+
+Run = Callable[..., tuple[int, str, str]]
+
+MEGABYTE = 1_000_000
+CASES = ("paper-4.1-helical", "paper-4.2", "paper-4.4-max", "hexapod-machining")
+
+IMPOSSIBLE = """\
+title = "Legs of half a metre on a small robot"
+[units]
+length = "cm"
+[robot]
+model = "stewart-gough"
+layout = "aligned"
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = 8
+[pose]
+position = [0, 0, { min = 20, max = 50 }]
+rotation = { axis = [0, 0, 1], angle = 0 }
+[[task]]
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+[limits]
+leg_length = { min = 500 }
+[solve]
+starts = 2
+"""
+
+
+@dataclass
+class Page(HTMLParser):
+    """What a page has, read without a browser."""
+
+    text: str
+    elements: list[tuple[str, dict[str, str | None]]] = field(default_factory=list)
+    scripts: list[tuple[dict[str, str | None], str]] = field(default_factory=list)
+    words: str = ""
+    tables: dict[str, list[list[str]]] = field(default_factory=dict)
+    titles: str = ""
+
+    def __post_init__(self) -> None:
+        super().__init__()
+        self._open: list[str] = []
+        self._rows: list[list[str]] = []
+        self.feed(self.text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in {"meta", "link", "input", "img", "br"}:
+            self._open.append(tag)
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+        if tag == "table":
+            self._rows = []
+            self.tables[dict(attrs).get("id") or f"table {len(self.tables)}"] = self._rows
+        if tag == "tr":
+            self._rows.append([])
+        if tag in {"td", "th"}:
+            self._rows[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag, "elements close in order"
+
+    def handle_data(self, data: str) -> None:
+        if self._open[-1:] == ["script"]:
+            attributes, text = self.scripts[-1]
+            self.scripts[-1] = attributes, text + data
+        elif self._open == ["html", "head", "title"]:
+            self.titles += data
+        elif "style" not in self._open:
+            self.words += data
+            if {"td", "th"} & set(self._open):
+                self._rows[-1][-1] += data
+
+    def script(self, name: str) -> str:
+        return next(text for attributes, text in self.scripts if attributes.get("id") == name)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return dict(json.loads(self.script("data")))
+
+
+def made(case: str, target: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "report", case, "--out", str(target), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.fixture(scope="session")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """The page of a shipped case, made once."""
+
+    @cache
+    def make(case: str, *options: str) -> Path:
+        target = tmp_path_factory.mktemp("report") / "page.html"
+        done = made(case, target, *options)
+        assert (done.returncode, done.stderr) == (0, "")
+        return target
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def page(page_file: Callable[..., Path]) -> Callable[..., Page]:
+    return cache(lambda case, *options: Page(page_file(case, *options).read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_size_and_no_network(page_file: Callable[..., Path], page: Callable[..., Page], case: str) -> None:
+    assert page_file(case).stat().st_size <= 6 * MEGABYTE
+    found = page(case)
+    fetched = [
+        value
+        for tag, attributes in found.elements
+        for name, value in attributes.items()
+        if name in {"src", "srcset", "action", "data", "poster"} or (name == "href" and tag in {"link", "a", "base"})
+    ]
+    assert fetched
+    assert all(value is not None and value.startswith(("#", "data:")) for value in fetched)
+    policies = [a["content"] for tag, a in found.elements if tag == "meta" and "http-equiv" in a]
+    assert len(policies) == 1
+    assert policies[0] is not None
+    assert policies[0].startswith("default-src 'none';")
+    assert "http" not in policies[0]
+    own = found.text.replace(found.script("plotly"), "")
+    assert not re.search(r"url\(|@import|sourceMappingURL|fetch\(|XMLHttpRequest", own)
+
+
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "paper-4.2"])
+def test_data_is_the_json_result(page: Callable[..., Page], cli: Run, case: str) -> None:
+    _, out, _ = cli("solve", case, "--json", "-")
+
+    def timeless(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: timeless(each) for key, each in value.items() if key != "seconds"}
+        return [timeless(each) for each in value] if isinstance(value, list) else value
+
+    assert timeless(page(case).data["result"]) == timeless(json.loads(out))
+
+
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> None:
+    found = page(case)
+    result = found.data["result"]
+    design = {row[0]: row[1] for row in found.tables["design"]}
+    numbers = {name: float(design[name]) for name in (*result["parameters"], "p_x", "p_y", "p_z", "angle")}
+    expected = {**result["parameters"], "angle": result["pose"]["angle"]}
+    expected |= dict(zip(("p_x", "p_y", "p_z"), result["pose"]["position"], strict=True))
+    assert numbers == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    limbs = found.tables["design-limbs"][1:]
+    assert [row[0] for row in limbs] == result["limbs"]
+    assert [float(row[1]) for row in limbs] == pytest.approx(result["rates"], rel=1e-5)
+    assert f"{result['F']:.7g}" in found.words
+    active = [row["key"] for row in result["limits"] if row["active"]]
+    shown = [row[0] for row in found.tables.get("limit", []) if "active" in row[4]]
+    assert shown == active
+    for name, version in result["versions"].items():
+        assert [name, version] in found.tables["versions"]
+
+
+def test_rounding_is_no_rate(page: Callable[..., Page]) -> None:
+    found = page("paper-4.4-snu")
+    assert 0 < found.data["result"]["F"] < 1e-20
+    assert "F = 0 " in found.words
+    assert [(number(row[3]), row[5]) for row in found.tables["rates"][1:]] == [(0, "none")] * 6
+
+
+def test_published_beside_computed(page: Callable[..., Page]) -> None:
+    case = load_case("paper-4.1-helical")
+    rows = page("paper-4.1-helical").tables["compared"][1:]
+    assert [row[0] for row in rows] == [each.quantity for each in case.published]
+    assert [row[3] == "reproduced" for row in rows] == [each.reproduced for each in case.published]
+    assert "compared" not in page("hexapod-machining").tables
+
+
+def displaced(points: np.ndarray, twist: np.ndarray, t: float) -> np.ndarray:
+    """Points (n, 3) after a motion along a twist with a rotation, by Chasles: turn about the axis, move along it."""
+    size = float(np.linalg.norm(twist[:3]))
+    s = twist[:3] / size
+    point, pitch = np.cross(twist[:3], twist[3:]) / size**2, float(twist[:3] @ twist[3:]) / size**2
+    r, angle = points - point, size * t
+    turned = r * np.cos(angle) + np.cross(s, r) * np.sin(angle) + np.outer(r @ s, s) * (1 - np.cos(angle))
+    return np.asarray(point + turned + pitch * angle * s)
+
+
+def rates_of_lines(view: dict[str, Any], points: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths of straight limbs, and the rates at which a twist of their upper ends changes them."""
+    names = [point["body"] for point in view["points"]]
+    lengths, rates = [], []
+    for row in view["rows"]:
+        (ends,) = [link["ends"] for link in view["links"] if link["limb"] == row["limb"]]
+        lower, upper = sorted(ends, key=lambda index: names[index] == "platform")
+        along = points[upper] - points[lower]
+        length = float(np.linalg.norm(along))
+        lengths.append(length)
+        rates.append(along @ (twist[3:] + np.cross(twist[:3], points[upper])) / length)
+    return np.array(lengths), np.array(rates)
+
+
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+def test_frames_are_the_motion(page: Callable[..., Page], case: str) -> None:
+    data = page(case).data
+    (view,) = data["views"]
+    twist = np.array(data["result"]["task"]["twist"])
+    frames = view["frames"]
+    assert len(frames) == 41
+    assert frames[view["zero"]]["t"] == 0
+    assert frames[view["zero"]]["rates"] == data["result"]["rates"]
+    at_rest = np.array(frames[view["zero"]]["points"])
+    moving = np.array([point["body"] == "platform" for point in view["points"]])
+    for frame in frames:
+        expected = np.where(moving[:, None], displaced(at_rest, twist, frame["t"]), at_rest)
+        np.testing.assert_allclose(frame["points"], expected, atol=1e-9 * view["size"])
+        lengths, rates = rates_of_lines(view, expected, twist)
+        np.testing.assert_allclose(frame["lengths"], lengths, rtol=1e-9)
+        np.testing.assert_allclose(frame["rates"], rates, rtol=1e-8, atol=1e-9)
+        assert frame["F"] == pytest.approx(rates @ rates, rel=1e-8)
+    # The rate is what the length does: its slope over the slider agrees.
+    t = np.array([frame["t"] for frame in frames])
+    lengths = np.array([frame["lengths"] for frame in frames])
+    slope = (lengths[2:] - lengths[:-2]) / (t[2:] - t[:-2])[:, None]
+    np.testing.assert_allclose(
+        slope, np.array([frame["rates"] for frame in frames])[1:-1], atol=2e-2 * np.abs(slope).max()
+    )
+
+
+def test_slices_are_f() -> None:
+    solution = solve(load_case("hexapod-machining"), starts=4)
+    nlp, x = solution.nlp, solution.x
+    for each in slices_of(nlp, x):
+        assert each.values.min() == nlp.lower[each.variable]
+        assert each.values.max() == nlp.upper[each.variable]
+        for k in range(0, len(each.values), 17):
+            point = np.array(x)
+            point[each.variable] = each.values[k]
+            F, g = nlp.evaluate(point)
+            assert each.F[k] == pytest.approx(F, rel=1e-12)
+            size = np.maximum(1, np.abs(np.where(np.isfinite(nlp.g_lower), nlp.g_lower, nlp.g_upper)))
+            outside = np.maximum(nlp.g_lower - g, g - nlp.g_upper)
+            assert bool(each.inside[k]) == bool(np.all(outside <= 1e-9 * size))
+        (here,) = np.nonzero(each.values == x[each.variable])[0]
+        assert each.inside[here], "the optimum itself keeps every limit"
+
+
+def test_slices_keep_unit_vectors() -> None:
+    solution = solve(load_case("paper-4.4-max"), starts=4)
+    nlp, x = solution.nlp, solution.x
+    for each in slices_of(nlp, x)[:3]:
+        others = [k for k in range(3) if k != each.variable]
+        for k in range(0, len(each.values), 29):
+            point = np.array(x)
+            point[each.variable] = each.values[k]
+            point[others] *= np.sqrt(max(0, 1 - each.values[k] ** 2)) / np.linalg.norm(x[others])
+            assert each.F[k] == pytest.approx(nlp.evaluate(point)[0], rel=1e-9)
+
+
+def test_planes_are_f() -> None:
+    nlp = formulate(load_case("paper-4.1-helical"))
+    planes = planes_of(nlp, nlp.start, 5)
+    assert [plane.variables for plane in planes] == [(0, 1), (0, 2), (0, 3), (0, 4), (0, 5)]
+    plane = planes[1]
+    for row, column in ((0, 0), (7, 30), (40, 3)):
+        point = np.array(nlp.start)
+        point[[0, 2]] = plane.first[column], plane.second[row]
+        assert plane.F[row, column] == pytest.approx(nlp.evaluate(point)[0], rel=1e-12)
+
+
+def test_whatever_a_case_says_stays_text(tmp_path: Path) -> None:
+    title, task = "<script>alert(1)</script>&amp;", "</script><img src=x onerror=alert(2)>$title"
+    text = (
+        IMPOSSIBLE.replace('title = "Legs of half a metre on a small robot"', f'title = "{title}" # --> <b>]]>')
+        .replace('sense = "max"', f'sense = "max"\nname = "{task}"')
+        .replace("min = 500", "min = 5")
+        .replace('length = "cm"', 'length = "<i>cm"')
+    )
+    case = tmp_path / "evil.toml"
+    case.write_text(text, encoding="utf-8")
+    done = made(str(case), tmp_path / "evil.html")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = Page((tmp_path / "evil.html").read_text(encoding="utf-8"))
+    assert [attributes.get("id") for attributes, _ in found.scripts] == ["data", "plotly", None]
+    assert [a["id"] for tag, a in found.elements if tag in {"img", "b", "i"} and a] == ["view-copy"]
+    assert "<" not in found.script("data")
+    assert found.data["result"]["title"] == title
+    assert found.data["result"]["task"]["name"] == task
+    assert found.titles == f"{title} - screwsynth"
+    assert task in found.words
+    assert text in found.words
+
+
+def test_what_failed_is_no_answer(tmp_path: Path) -> None:
+    case = tmp_path / "impossible.toml"
+    case.write_text(IMPOSSIBLE, encoding="utf-8")
+    done = made(str(case), tmp_path / "page.html")
+    assert (done.returncode, done.stderr) == (1, "")
+    found = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert found.data["result"]["F"] is None
+    assert "infeasible: this is not an optimum" in found.words
+    assert "would be feasible with" in found.words
+    assert "largest F =" not in found.words
+    assert found.tables["design"][0][1] == "reached"
+    assert {"class": "answer none", "id": "answer"} in [a for _, a in found.elements]
+
+
+def sliding(*shifts: float) -> Case:
+    """A vertical leg whose foot slides on x, where a loop keeps it below the platform."""
+    q, pose = SX.sym("q"), PoseSymbols()
+    foot, head = ca.vertcat(q, 0, 0), pose.position
+    model = Model(
+        name="sliding",
+        description="one leg and a loop",
+        parameters=(),
+        pose=pose,
+        home=(0.0, 0.0, 1.0),
+        wrenches=(force_along("1", foot, head - foot),),
+        unknowns=(Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),),
+        closure=(Closure("loop", q - head[0]),),
+        scene=Scene(
+            (Point("F", foot, Body.LIMB), Point("H", head, Body.PLATFORM)), (Link("F", "H", Body.LIMB, limb="1"),)
+        ),
+    )
+    task = Task([0, 0, 0, 0.6, 0, 0.8])
+    steps = tuple(Step(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
+    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], steps=steps)
+
+
+def test_robots_with_loops_follow() -> None:
+    for shifts in ((0.0,), (0.0, 1.0)):
+        solution = solve(sliding(*shifts), starts=2)
+        report = report_of("sliding", "", solution, result_of(solution))
+        assert report.parts[0].view is not None
+        for frame in report.parts[0].view["frames"]:
+            foot, head = np.array(frame["points"])
+            np.testing.assert_allclose(head, [1 + 0.6 * frame["t"], 0, 2 + 0.8 * frame["t"]], atol=1e-9)
+            np.testing.assert_allclose(foot, [head[0], 0, 0], atol=1e-9)
+            assert frame["rates"] == pytest.approx([0.8])
+        text = page_of(report)
+        assert "loops would open" in text
+        Page(text)
+
+
+def test_certificate(page: Callable[..., Page]) -> None:
+    found = page("paper-4.1-rotation", "--certify")
+    certificate = found.data["result"]["certificate"]
+    assert certificate["status"] == "proved"
+    assert certificate["statement"] in found.words
+    assert f"{certificate['bound']:.7g}" in found.words
+
+
+def test_structure_is_accessible(page: Callable[..., Page]) -> None:
+    for case in CASES:
+        found = page(case)
+        tags = [tag for tag, _ in found.elements]
+        assert [tags.count(name) for name in ("html", "header", "nav", "main", "footer", "h1")] == [1] * 6
+        levels = [int(tag[1]) for tag in tags if re.fullmatch(r"h\d", tag)]
+        assert levels[0] == 1
+        assert all(after <= before + 1 for before, after in pairwise(levels))
+        ids = [a["id"] for _, a in found.elements if "id" in a]
+        assert len(ids) == len(set(ids))
+        for tag, attributes in found.elements:
+            for name in ("for", "aria-labelledby"):
+                assert attributes.get(name) is None or attributes[name] in ids
+            if tag == "a":
+                assert (attributes["href"] or "")[1:] in ids
+            if attributes.get("role") == "img":
+                assert attributes["aria-label"]
+            if tag in {"select", "input"}:
+                assert attributes["id"] in [a.get("for") for t, a in found.elements if t == "label"]
+        assert tags.count("figure") == tags.count("figcaption")
+        first = next(a for tag, a in found.elements if tag == "a")
+        assert (first["class"], first["href"]) == ("skip", "#main")
+
+
+def test_contrast() -> None:
+    style = (Path(__file__).parents[2] / "nlp" / "page" / "style.css").read_text(encoding="utf-8")
+    colours = dict(re.findall(r"--(ink|muted|blue|pale): (#[0-9a-f]{6})", style))
+    (warning,) = re.findall(r"\.warning {[^}]*[^-]color: (#[0-9a-f]{6})", style)
+
+    def light(colour: str) -> float:
+        parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+        return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+    for colour in (colours["ink"], colours["muted"], colours["blue"], warning):
+        for ground in ("#ffffff", colours["pale"]):
+            assert (light(ground) + 0.05) / (light(colour) + 0.05) >= 4.5
+
+
+def test_colours_are_those_of_picture_files() -> None:
+    painting = pytest.importorskip("screwsynth.nlp.painting")
+    assert painting.RATES == RATES
+
+
+def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("screwsynth.nlp.extras.find_spec", lambda _: None)
+    code, out, err = cli("report", "paper-4.2", "--out", str(tmp_path / "page.html"))
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "reports need plotly" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("screwsynth.nlp.solver.solve", lambda *_, **__: pytest.fail("it was solved"))
+    code, _, err = cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html"))
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "none" in err
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Chromium without a window, drawing 3-D in software."""
+    chromium, driver = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
+    if not (chromium.exists() and driver.exists()):
+        pytest.skip("Debian's chromium and chromium-driver are not installed")
+    webdriver = pytest.importorskip("selenium.webdriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(chromium)
+    switches = ["headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-dev-shm-usage"]
+    switches += ["disable-background-networking", "disable-component-update", "disable-sync", "window-size=1280,1000"]
+    switches += ["use-gl=angle", "use-angle=swiftshader", "enable-unsafe-swiftshader"]
+    switches += [f"user-data-dir={tmp_path_factory.mktemp('chromium')}"]
+    for switch in switches:
+        options.add_argument(f"--{switch}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    service = webdriver.chrome.service.Service(str(driver))
+    chrome = webdriver.Chrome(options=options, service=service)
+    chrome.set_page_load_timeout(120)
+    yield chrome
+    chrome.quit()
+
+
+@pytest.fixture
+def opened(browser: Any, page_file: Callable[..., Path]) -> Callable[[str], Any]:
+    """A page opened from disk, its picture drawn."""
+
+    def open_page(case: str) -> Any:
+        browser.get("about:blank")
+        for log in ("browser", "performance"):
+            browser.get_log(log)
+        browser.get(page_file(case).as_uri())
+        until(lambda: browser.execute_script("return document.documentElement.dataset.drawn === 'yes'"))
+        return browser
+
+    return open_page
+
+
+def until(done: Callable[[], Any], seconds: float = 60) -> Any:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if value := done():
+            return value
+        time.sleep(0.05)
+    pytest.fail(f"not within {seconds} s")
+
+
+LIMBS = """
+return document.getElementById("view").data.filter((each) => each.name.startsWith("limb "))
+  .map((each) => ({ name: each.name, x: each.x, y: each.y, z: each.z, text: each.hovertext[0] }))"""
+ROWS = """
+return [...document.querySelectorAll("#rates tbody tr")].map((row) => [row.querySelector("th").textContent,
+  ...["length", "rate", "share"].map((name) => row.querySelector("." + name).textContent)])"""
+MOVE = """
+const slider = document.getElementById("travel");
+slider.value = arguments[0];
+slider.dispatchEvent(new Event("input"));"""
+
+
+def number(text: str) -> float:
+    return float(text.replace("\N{MINUS SIGN}", "-").removesuffix(" %"))
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("case", CASES)
+def test_page_loads_clean(opened: Callable[[str], Any], case: str) -> None:
+    chrome = opened(case)
+    time.sleep(0.5)
+    assert [entry for entry in chrome.get_log("browser") if entry["level"] == "SEVERE"] == []
+    events = [json.loads(entry["message"])["message"] for entry in chrome.get_log("performance")]
+    asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+    assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [chrome.current_url]
+    paint = chrome.execute_script("return performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    assert 0 < paint < 2000
+    assert chrome.execute_script("return document.querySelectorAll('#view canvas').length") > 0
+    # Nothing is wider than the page, also on a telephone.
+    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+    chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    assert until(lambda: chrome.execute_script("return innerWidth === 400"))
+    assert until(lambda: chrome.execute_script("return document.documentElement.scrollWidth <= 400"), 10)
+    chrome.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+def test_slider_moves_the_platform(opened: Callable[[str], Any], page: Callable[..., Page], case: str) -> None:
+    chrome, data = opened(case), page(case).data
+    (view,) = data["views"]
+    twist = np.array(data["result"]["task"]["twist"])
+    at_rest = np.array(view["frames"][view["zero"]]["points"])
+    moving = np.array([point["body"] == "platform" for point in view["points"]])
+    start = chrome.execute_script(LIMBS)
+    assert [number(row[2]) for row in chrome.execute_script(ROWS)] == pytest.approx(data["result"]["rates"], rel=1e-5)
+    for index in (0, 33):
+        points = np.where(moving[:, None], displaced(at_rest, twist, view["frames"][index]["t"]), at_rest)
+        lengths, rates = rates_of_lines(view, points, twist)
+        before = chrome.execute_script(LIMBS)
+        chrome.execute_script(MOVE, index)
+        limbs = until(lambda before=before: (now := chrome.execute_script(LIMBS)) != before and now)
+        assert limbs != start
+        for limb in limbs:
+            ends = next(link["ends"] for link in view["links"] if f"limb {link['limb']}" == limb["name"])
+            drawn = np.array([limb["x"][:13], limb["y"][:13], limb["z"][:13]]).T
+            np.testing.assert_allclose(drawn[[0, 12]], points[ends], atol=1e-9 * view["size"])
+        rows = chrome.execute_script(ROWS)
+        assert [row[0] for row in rows] == [row["limb"] for row in view["rows"]]
+        np.testing.assert_allclose([number(row[1]) for row in rows], lengths, rtol=1e-5)
+        np.testing.assert_allclose([number(row[2]) for row in rows], rates, rtol=1e-5)
+        np.testing.assert_allclose([number(row[3]) for row in rows], 100 * rates**2 / (rates @ rates), atol=0.051)
+        for limb, rate, length in zip(limbs, rates, lengths, strict=True):
+            found = re.findall(r"length (\S+) .*rate (\S+) ", limb["text"].replace("\N{MINUS SIGN}", "-"))
+            assert [float(each) for each in found[0]] == pytest.approx([length, rate], rel=1e-5)
+
+
+@pytest.mark.browser
+def test_slider_by_keyboard(opened: Callable[[str], Any], page: Callable[..., Page]) -> None:
+    chrome, case = opened("paper-4.1-helical"), "paper-4.1-helical"
+    (view,) = page(case).data["views"]
+    slider = chrome.find_element("id", "travel")
+    slider.send_keys("\ue014")  # the right arrow
+    words = view["frames"][view["zero"] + 1]["words"]
+    assert chrome.find_element("id", "travelled").text == words
+    assert slider.get_attribute("aria-valuetext") == words
+    assert chrome.find_element("css selector", "label[for=travel]").text
+
+
+@pytest.mark.browser
+def test_hover_over_a_limb(opened: Callable[[str], Any], page: Callable[..., Page]) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains  # noqa: PLC0415 - not installed everywhere
+
+    chrome = opened("paper-4.1-helical")
+    result = page("paper-4.1-helical").data["result"]
+    chrome.execute_script("document.getElementById('view').scrollIntoView()")
+    chrome.execute_script(
+        "window.found = null; document.getElementById('view').on('plotly_hover', (event) => {"
+        " const at = event.points[0];"
+        " window.found = [at.data.name, at.hovertext || at.data.hovertext[at.pointNumber]]; })"
+    )
+    view = chrome.find_element("id", "view")
+    places = [(x, y) for y in range(-60, 70, 20) for x in range(-150, 120, 14)]
+    for x, y in places:
+        with suppress(Exception):
+            ActionChains(chrome, duration=0).move_to_element_with_offset(view, x, y).perform()
+        if chrome.execute_script("return window.found"):
+            break
+    name, text = until(lambda: chrome.execute_script("return window.found"), 5)
+    row = result["limbs"].index(name.removeprefix("limb "))
+    text = text.replace("\N{MINUS SIGN}", "-")
+    assert f"<b>{name}</b>" in text
+    (rate, share) = re.findall(r"rate (\S+) \S+, (\S+) % of F", text)[0]
+    assert float(rate) == pytest.approx(result["rates"][row], rel=1e-5)
+    assert float(share) == pytest.approx(100 * result["rates"][row] ** 2 / result["F"], abs=0.051)
+    length = result["quantities"]["leg_length"][result["limbs"][row]]
+    assert float(re.findall(r"length (\S+)", text)[0]) == pytest.approx(length, rel=1e-5)
+    wrench = [float(each) for each in re.findall(r"wrench \((.*)\)", text)[0].replace(";", ",").split(",")]
+    np.testing.assert_allclose(wrench, result["jacobian"][row], rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.browser
+def test_several_tasks_and_maps(opened: Callable[[str], Any], page: Callable[..., Page]) -> None:
+    chrome, data = opened("paper-4.2"), page("paper-4.2").data
+    for k, outcome in enumerate(data["result"]["combined"]["tasks"]):
+        chrome.execute_script(
+            "const s = document.getElementById('task'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))", k
+        )
+        rates = [number(row[2]) for row in chrome.execute_script(ROWS)]
+        np.testing.assert_allclose(rates, outcome["rates"], atol=1e-9)
+    chosen = data["planes"][1][2]
+    chrome.execute_script(
+        "const s = document.getElementById('pair'); s.value = '1 2'; s.dispatchEvent(new Event('change'))"
+    )
+    assert chrome.find_element("id", "map-words").text == chosen["words"]
+    last = chrome.execute_script("return document.getElementById('map').data.filter((d) => d.type === 'contour').pop()")
+    assert last["x"] == chosen["first"]
+
+
+@pytest.mark.browser
+def test_case_text_is_copied(opened: Callable[[str], Any]) -> None:
+    chrome = opened("paper-4.2")
+    chrome.execute_script("document.documentElement.style.scrollBehavior = 'auto'")
+    chrome.find_element("id", "copy").click()
+    assert until(lambda: chrome.find_element("id", "copied").text)
+    shown = chrome.execute_script("return document.getElementById('case-text').textContent")
+    assert shown == (Path(__file__).parents[2] / "cases" / "paper-4.2.toml").read_text(encoding="utf-8")
+
+
+def test_browser_is_where_ci_installs_it() -> None:
+    """The table of `.ci/run` has what the tests marked ``browser`` start."""
+    text = (Path(__file__).parents[2] / ".ci" / "run").read_text(encoding="utf-8")
+    assert "[chromium]=chromium" in text
+    assert "[chromedriver]=chromium-driver" in text
+    assert shutil.which("bash")
