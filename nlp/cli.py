@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from screwsynth.nlp.case import Case
     from screwsynth.nlp.certification import Certified, Wanted
-    from screwsynth.nlp.scene import Drawing
+    from screwsynth.nlp.pictures.scene import Drawing
     from screwsynth.nlp.solver import Solution
     from screwsynth.nlp.tasks import Compromise
 
@@ -96,7 +96,7 @@ def solve(
     if json_file is not None:
         _write_json(json_file, result)
     if plot is not None:
-        from screwsynth.nlp.gallery import drawings_of
+        from screwsynth.nlp.pictures.gallery import drawings_of
 
         _write_picture(plot, drawings_of(solution))
     if json_file != "-":
@@ -121,16 +121,16 @@ def report(
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
     from screwsynth.nlp.casefile import find_case, load_case
-    from screwsynth.nlp.extras import check_library
     from screwsynth.nlp.files import read_text, write_text
+    from screwsynth.nlp.pictures.extras import check_library
 
     loaded = load_case(case)
     text = read_text(str(find_case(case)))
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     _check_target(out)
     check_library("plotly", "reports")
-    from screwsynth.nlp.report import report_of
-    from screwsynth.nlp.webpage import page_of
+    from screwsynth.nlp.pictures.report import report_of
+    from screwsynth.nlp.pictures.webpage import page_of
 
     solution, result, proved = _solved(loaded, jobs, certify=certify)
     write_text(out, page_of(report_of(case, text, solution, result)))
@@ -343,7 +343,7 @@ def models(
     # Without the options that it cannot do without, a robot has no parameters to show yet.
     model = None if needed else build_model(name)
     if plot is not None:
-        from screwsynth.nlp.scene import drawing_of_model
+        from screwsynth.nlp.pictures.scene import drawing_of_model
 
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
@@ -515,15 +515,15 @@ def _check_target(target: str | None) -> None:
 
 def _check_picture(target: str | None) -> None:
     if target is not None:
-        from screwsynth.nlp.extras import check_picture
+        from screwsynth.nlp.pictures.extras import check_picture
 
         check_picture(target)
         _check_target(target)
 
 
 def _write_picture(target: str, drawings: Sequence[Drawing]) -> None:
-    from screwsynth.nlp.figures import ending_of, picture
     from screwsynth.nlp.files import write_bytes
+    from screwsynth.nlp.pictures.figures import ending_of, picture
 
     write_bytes(target, picture(drawings, ending_of(target)))
 

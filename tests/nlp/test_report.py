@@ -33,10 +33,10 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
-from screwsynth.nlp.frames import RATES
-from screwsynth.nlp.report import report_of
-from screwsynth.nlp.slices import planes_of, slices_of
-from screwsynth.nlp.webpage import page_of
+from screwsynth.nlp.pictures.frames import RATES
+from screwsynth.nlp.pictures.report import report_of
+from screwsynth.nlp.pictures.slices import planes_of, slices_of
+from screwsynth.nlp.pictures.webpage import page_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -429,7 +429,7 @@ def test_contrast() -> None:
 
 
 def test_colours_are_those_of_picture_files() -> None:
-    painting = pytest.importorskip("screwsynth.nlp.painting")
+    painting = pytest.importorskip("screwsynth.nlp.pictures.painting")
     assert painting.RATES == RATES
 
 

@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from screwsynth.models import Body, FloatArray, MarkKind, WrenchKind
-from screwsynth.nlp.labels import Label, place_labels
-from screwsynth.nlp.posture import Posture
-from screwsynth.nlp.scene import Drawing, Motion
-from screwsynth.nlp.view import View, painting_order
+from screwsynth.nlp.pictures.labels import Label, place_labels
+from screwsynth.nlp.pictures.posture import Posture
+from screwsynth.nlp.pictures.scene import Drawing, Motion
+from screwsynth.nlp.pictures.view import View, painting_order
 
 INK, MUTED, FAINT = "#17212b", "#55616c", "#b9c1c9"
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"

@@ -14,7 +14,7 @@ from screwsynth.nlp.case import Case
 from screwsynth.nlp.errors import EvaluationError
 from screwsynth.nlp.evaluation import RobotState
 from screwsynth.nlp.kkt import assembled
-from screwsynth.nlp.posture import Linkage, Posture
+from screwsynth.nlp.pictures.posture import Linkage, Posture
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.solver import state_or_none
 

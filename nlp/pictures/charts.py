@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from screwsynth.nlp.markup import Markup, joined, tag
+from screwsynth.nlp.pictures.markup import Markup, joined, tag
 
 #: Size of a chart in its own units, and what its axes take.
 _WIDTH, _HEIGHT = 320.0, 190.0

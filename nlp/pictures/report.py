@@ -14,11 +14,11 @@ import numpy as np
 from screwsynth.models import FloatArray
 from screwsynth.nlp.case import Case
 from screwsynth.nlp.evaluation import RobotState
-from screwsynth.nlp.frames import view_data
+from screwsynth.nlp.pictures.frames import view_data
+from screwsynth.nlp.pictures.scene import drawing_of
+from screwsynth.nlp.pictures.slices import Plane, Slice, has_loops, planes_of, slices_of
 from screwsynth.nlp.program import Nlp
 from screwsynth.nlp.regress import CaseCheck, check_case
-from screwsynth.nlp.scene import drawing_of
-from screwsynth.nlp.slices import Plane, Slice, has_loops, planes_of, slices_of
 from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tasks import Compromise
 

@@ -15,10 +15,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from screwsynth.nlp.painting import INK, MUTED, RATES, Panel
-from screwsynth.nlp.scene import Drawing
+from screwsynth.nlp.pictures.painting import INK, MUTED, RATES, Panel
+from screwsynth.nlp.pictures.scene import Drawing
+from screwsynth.nlp.pictures.view import View, clearest_view
 from screwsynth.nlp.units import rate_unit
-from screwsynth.nlp.view import View, clearest_view
 
 #: Everything that would make two files of one picture differ, or depend on the user's own settings.
 _SETTINGS: dict[Any, Any] = {

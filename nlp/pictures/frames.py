@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from screwsynth.models import Body, Dimension, FloatArray, Model
-from screwsynth.nlp.posture import Posture
-from screwsynth.nlp.scene import Drawing, Motion
+from screwsynth.nlp.pictures.posture import Posture
+from screwsynth.nlp.pictures.scene import Drawing, Motion
+from screwsynth.nlp.pictures.view import View, clearest_view
 from screwsynth.nlp.units import Units, rate_unit
-from screwsynth.nlp.view import View, clearest_view
 
 #: Postures on each side of the one drawn.
 _SIDE = 20

@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.resources import files
 from string import Template
 
-from screwsynth.nlp.markup import Markup, joined, script_json, tag
-from screwsynth.nlp.report import Report
-from screwsynth.nlp.sections import answer, sections
+from screwsynth.nlp.pictures.markup import Markup, joined, script_json, tag
+from screwsynth.nlp.pictures.report import Report
+from screwsynth.nlp.pictures.sections import answer, sections
 
 
 def page_of(report: Report) -> str:
@@ -48,4 +48,4 @@ def page_of(report: Report) -> str:
 
 
 def _file(name: str) -> str:
-    return (files("screwsynth.nlp") / "page" / name).read_text(encoding="utf-8")
+    return (files("screwsynth.nlp.pictures") / "page" / name).read_text(encoding="utf-8")

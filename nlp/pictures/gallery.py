@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from screwsynth.nlp.scene import Drawing, drawing_of
+from screwsynth.nlp.pictures.scene import Drawing, drawing_of
 from screwsynth.nlp.solver import Solution, Status
 from screwsynth.nlp.tasks import Compromise
 from screwsynth.nlp.values import Sense

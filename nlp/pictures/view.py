@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.scene import Drawing
+from screwsynth.nlp.pictures.scene import Drawing
 
 #: Directions that are tried for a view, in degrees.
 _AZIMUTHS = range(-170, 190, 10)

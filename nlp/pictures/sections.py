@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from rich.console import Group
 
-from screwsynth.nlp.charts import Curve, Spot, count_chart, line_chart
-from screwsynth.nlp.frames import RATES
 from screwsynth.nlp.ipopt import StartStatus
-from screwsynth.nlp.markup import Markup, grid, html_table, joined, paragraphs, tag
-from screwsynth.nlp.report import Part, Report
+from screwsynth.nlp.pictures.charts import Curve, Spot, count_chart, line_chart
+from screwsynth.nlp.pictures.frames import RATES
+from screwsynth.nlp.pictures.markup import Markup, grid, html_table, joined, paragraphs, tag
+from screwsynth.nlp.pictures.report import Part, Report
+from screwsynth.nlp.pictures.slices import LEVEL, Slice, has_loops
 from screwsynth.nlp.result import motion_of
-from screwsynth.nlp.slices import LEVEL, Slice, has_loops
 from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tables import (
     certificate_lines,

@@ -1,0 +1,1 @@
+"""Pictures: a robot and its task as numbers, as picture files, and as a page."""
