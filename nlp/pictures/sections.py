@@ -274,7 +274,7 @@ def _limits(report: Report) -> Markup:
             tag("p", f"Per part of its own size, {row['key']} costs most: F changes by {row['cost']:+.4g} per {unit}.")
         )
     if point.get("tolerance"):
-        parts.append(tag("p", str(tolerance_line(report.case, point))))
+        parts += paragraphs_of([tolerance_line(report.case, point)])
     rows = [
         [
             row["name"],
@@ -482,20 +482,21 @@ def _certificates(report: Report) -> Markup:
         if name:
             parts.append(tag("h3", name))
         parts += paragraphs_of(certificate_lines(certificate))
-        parts += _bound_chart(certificate)
+        parts += bound_chart(certificate)
     return joined(parts)
 
 
-def _bound_chart(certificate: dict[str, Any]) -> list[Markup]:
+def bound_chart(certificate: dict[str, Any]) -> list[Markup]:
+    """The bound and the best F known against time."""
     rows = [row for row in certificate["history"] if row[1] is not None and row[2] is not None]
     if len(rows) < 2:
         if not rows:
             return []
         seconds, bound, best = rows[0]
-        return [tag("p", f"It took one round: after {seconds:.2g} s the bound was {bound:.7g}, the best F {best:.7g}.")]
+        return [tag("p", f"It took one round: after {seconds:.3g} s the bound was {bound:.7g}, the best F {best:.7g}.")]
     seconds, bounds, best = ([float(row[k]) for row in rows] for k in range(3))
     words = (
-        f"The bound goes from {bounds[0]:.7g} after {seconds[0]:.2g} s to {bounds[-1]:.7g} after {seconds[-1]:.2g} s; "
+        f"The bound goes from {bounds[0]:.7g} after {seconds[0]:.3g} s to {bounds[-1]:.7g} after {seconds[-1]:.3g} s; "
         f"the best F known from {best[0]:.7g} to {best[-1]:.7g}."
     )
     chart = line_chart(

@@ -33,6 +33,8 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
+from screwsynth.nlp.pictures import sections
+from screwsynth.nlp.pictures.charts import Curve, Spot, line_chart
 from screwsynth.nlp.pictures.frames import RATES
 from screwsynth.nlp.pictures.report import report_of
 from screwsynth.nlp.pictures.slices import planes_of, slices_of
@@ -389,6 +391,42 @@ def test_certificate(page: Callable[..., Page]) -> None:
     assert f"{certificate['bound']:.7g}" in found.words
 
 
+def points_of(path: str) -> list[list[tuple[float, float]]]:
+    """The pieces of a path of lines."""
+    return [
+        [(float(x), float(y)) for x, y in re.findall(r"(-?[\d.]+) (-?[\d.]+)", piece)] for piece in path.split("M")[1:]
+    ]
+
+
+def test_charts_put_points_where_they_belong() -> None:
+    x, y = [0.0, 1.0, 2.0, 3.0, 4.0], [5.0, 7.0, float("nan"), 1.0, 3.0]
+    drawn = str(line_chart([Curve(x, y, "curve")], [Spot(1, 7, "spot", "it")], words="w", labels=("a<b", "F")))
+    assert "a&lt;b" in drawn
+    (path,) = re.findall(r'd="([^"]*)" class="curve"', drawn)
+    first, second = points_of(path)
+    assert (len(first), len(second)) == (2, 2)
+    places = np.array([*first, *second])
+    values = np.array([[a, b] for a, b in zip(x, y, strict=True) if np.isfinite(b)])
+    for k, sign in ((0, 1), (1, -1)):
+        slope, offset = np.polyfit(values[:, k], places[:, k], 1)
+        assert sign * slope > 0
+        np.testing.assert_allclose(slope * values[:, k] + offset, places[:, k], atol=0.1)
+    (spot,) = re.findall(r'class="spot" cx="([\d.]+)" cy="([\d.]+)"', drawn)
+    assert tuple(map(float, spot)) == first[1]
+
+
+def test_bound_against_time() -> None:
+    history = [[0.5, 12.0, 9.0], [1.0, 11.0, 10.0], [2.0, 10.1, 10.0]]
+    chart, words = (str(part) for part in sections.bound_chart({"history": history})[0].split("<figcaption>"))
+    bound, best = (points_of(path)[0] for path in re.findall(r'd="([^"]*)" class="curve(?: best)?"', chart))
+    # Level up to each point, then down: a bound holds until a better one is there.
+    assert [x for x, _ in bound] == [x for x, _ in best]
+    assert [y for _, y in bound] == sorted(y for _, y in bound)
+    assert bound[0][1] == bound[1][1] < bound[2][1] == bound[3][1]
+    assert bound[-1][1] < best[-1][1], "the bound stays above the best point"
+    assert "from 12 after 0.5 s to 10.1 after 2 s" in words
+
+
 def test_structure_is_accessible(page: Callable[..., Page]) -> None:
     for case in CASES:
         found = page(case)
@@ -414,7 +452,7 @@ def test_structure_is_accessible(page: Callable[..., Page]) -> None:
 
 
 def test_contrast() -> None:
-    style = (Path(__file__).parents[2] / "nlp" / "page" / "style.css").read_text(encoding="utf-8")
+    style = (Path(__file__).parents[2] / "nlp" / "pictures" / "page" / "style.css").read_text(encoding="utf-8")
     colours = dict(re.findall(r"--(ink|muted|blue|pale): (#[0-9a-f]{6})", style))
     (warning,) = re.findall(r"\.warning {[^}]*[^-]color: (#[0-9a-f]{6})", style)
 
@@ -434,7 +472,7 @@ def test_colours_are_those_of_picture_files() -> None:
 
 
 def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("screwsynth.nlp.pictures.extras.find_spec", lambda _: None)
     code, out, err = cli("report", "paper-4.2", "--out", str(tmp_path / "page.html"))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
