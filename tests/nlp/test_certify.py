@@ -196,6 +196,27 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
 
 
+@pytest.mark.slow
+def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test of the test above: no incumbent is given, so a rule that drops the optimum cannot hide behind it."""
+    whole = NumpyEngine._monotone
+
+    def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
+        return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
+
+    def caught() -> int:
+        wrong = 0
+        for seed in range(10):
+            solution = solve(random_case(seed), starts=8, seed=1)
+            bound = certify(solution.nlp, None, gap=1e-2, engine="numpy", time_limit=20).bound
+            wrong += -solution.nlp.sign * (bound - solution.F) < -1e-6 * abs(solution.F)
+        return wrong
+
+    assert caught() == 0
+    monkeypatch.setattr(NumpyEngine, "_monotone", careless)
+    assert caught() >= 1
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_box_without_a_value_is_kept(engine: str) -> None:
     """Trap: comparing NaN closes a box and proves anything; a limb of zero length must end the search openly."""
