@@ -132,12 +132,12 @@
       type: "scatter3d", mode: "markers", name: "joints", x: joints.map((p) => p[0]), y: joints.map((p) => p[1]), z: joints.map((p) => p[2]),
       marker: { size: 5, color: "#fff", line: { color: INK, width: 2 } }, hoverinfo: "skip", showlegend: false,
     });
-    const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
-    if (fastest > 1e-9 * size) {
-      const factor = 0.42 * size / fastest, starts = [], tips = [], ways = [];
+    const factor = speedScale();
+    if (factor > 0) {
+      const starts = [], tips = [], ways = [];
       frame.velocities.forEach((velocity, k) => {
         const speed = norm(velocity);
-        if (speed < 1e-6 * fastest) return;
+        if (speed * factor < 1e-6 * size) return;
         const start = points[view.corners[k]];
         starts.push(start); tips.push(plus(start, velocity, factor)); ways.push(velocity.map((each) => each / speed));
       });
@@ -162,11 +162,27 @@
     return found;
   }
 
+  // Length of an arrow for a velocity of 1; none where nothing moves.
+  function speedScale() {
+    const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
+    return fastest > 1e-9 * view.size ? (0.42 * view.size) / fastest : 0;
+  }
+
   function ranges() {
     const every = view.frames.flatMap((frame) => frame.points);
+    // What stands outside of the box is not drawn, so arrows count too.
+    const factor = speedScale();
+    for (const frame of view.frames) {
+      frame.velocities.forEach((velocity, k) => every.push(plus(frame.points[view.corners[k]], velocity, factor)));
+      view.rows.forEach((row, k) => {
+        if (row.kind !== "couple" || row.at === null) return;
+        const moment = frame.jacobian[k].slice(3);
+        every.push(plus(frame.points[row.at], moment, 0.24 * view.size / norm(moment)));
+      });
+    }
     if (view.reference) every.push(...view.reference);
     if (view.motion) every.push(...view.motion.line, ...view.motion.path);
-    const room = 0.12 * view.size;
+    const room = 0.08 * view.size;
     return [0, 1, 2].map((k) => [Math.min(...every.map((p) => p[k])) - room, Math.max(...every.map((p) => p[k])) + room]);
   }
 
@@ -186,7 +202,7 @@
     const wide = byId("view").clientWidth / byId("view").clientHeight;
     const far = (0.72 * norm(sides) * Math.max(1, 0.95 / wide)) / mean;
     const [x, y, z] = view.eye.map((each) => 1.72 * far * each);
-    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.1 * far }, projection: { type: "perspective" } };
+    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.07 * far }, projection: { type: "perspective" } };
   }
   const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
