@@ -101,3 +101,8 @@ def _is_short_number(text: str) -> bool:
 
 def _plain(value: object) -> str:
     return value.plain if isinstance(value, Text) else str(value)
+
+
+def paragraphs_of(lines: Any) -> list[Markup]:  # noqa: ANN401 - any lines of text
+    """A paragraph for each line of text."""
+    return [paragraphs([line]) for line in lines]

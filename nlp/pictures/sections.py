@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
 from rich.console import Group
 
-from screwsynth.nlp.ipopt import StartStatus
-from screwsynth.nlp.pictures.charts import Curve, Spot, count_chart, line_chart
+from screwsynth.nlp.pictures.exploration import around, optima
 from screwsynth.nlp.pictures.frames import RATES
-from screwsynth.nlp.pictures.markup import Markup, grid, html_table, joined, paragraphs, tag
-from screwsynth.nlp.pictures.report import Part, Report
-from screwsynth.nlp.pictures.slices import LEVEL, Slice, has_loops
+from screwsynth.nlp.pictures.judgement import certificates, evidence_section, published
+from screwsynth.nlp.pictures.markup import Markup, grid, html_table, joined, paragraphs, paragraphs_of, tag
+from screwsynth.nlp.pictures.report import Report
+from screwsynth.nlp.pictures.slices import LEVEL
 from screwsynth.nlp.result import motion_of
-from screwsynth.nlp.solver import Solution
 from screwsynth.nlp.tables import (
-    certificate_lines,
     design_table,
     headline,
     limb_table,
@@ -28,11 +23,7 @@ from screwsynth.nlp.tables import (
     pose_table,
     singularity_lines,
     tolerance_line,
-    verdict_lines,
 )
-
-#: So many optima are shown in full.
-_OPTIMA = 12
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
@@ -42,11 +33,11 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("robot", "The robot and its motion", _robot(report)),
         ("result", "Result", _result(report)),
         ("limits", "Limits: margins and costs", _limits(report)),
-        ("optima", "Optima found", _optima(report)),
-        ("around", "F around this point", _around(report)),
-        ("evidence", "Evidence of optimality", _evidence(report)),
-        ("certificate", "Certificate", _certificates(report)),
-        ("published", "Published and computed", _published(report)),
+        ("optima", "Optima found", optima(report)),
+        ("around", "F around this point", around(report)),
+        ("evidence", "Evidence of optimality", evidence_section(report)),
+        ("certificate", "Certificate", certificates(report)),
+        ("published", "Published and computed", published(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
     return [(anchor, title, content) for anchor, title, content in found if content]
@@ -293,239 +284,6 @@ def _limits(report: Report) -> Markup:
     return joined(parts)
 
 
-def _optima(report: Report) -> Markup:
-    parts: list[Markup] = []
-    solutions = [(part.name, part.solution) for part in report.parts]
-    if report.combined is not None:
-        solutions.append(("the combined program", report.combined))
-    for name, solution in solutions:
-        if not solution.starts:
-            continue
-        if len(solutions) > 1:
-            parts.append(tag("h3", name))
-        parts += _optima_of(solution)
-    return joined(parts)
-
-
-def _optima_of(solution: Solution) -> Iterator[Markup]:
-    converged = sum(found.count for found in solution.optima)
-    yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
-    failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
-    yield from (tag("p", f"{count}: {status.value}.") for status, count in failed.items())
-    if not solution.optima:
-        return
-    best = solution.optima[0]
-    words = f"{len(solution.optima)} distinct optima; the best, F = {best.F:.7g}, was found {best.count} times."
-    if len(solution.optima) == 1:
-        words = f"All of these ended in one optimum, F = {best.F:.7g}."
-        yield tag("p", words)
-    else:
-        chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=("F", "starts"))
-        yield tag("figure", chart, tag("figcaption", words))
-    nlp = solution.nlp
-    units = nlp.case.units
-    names = [variable.name for variable in nlp.program.variables]
-    labels = [units.label(variable.dimension) for variable in nlp.program.variables]
-    headers = ["", *(f"{name}, {unit}" if unit else name for name, unit in zip(names, labels, strict=True))]
-    rows = [
-        [
-            f"F = {found.F:.7g}, {found.count} starts"
-            + (f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > 1e-3 else ""),
-            *(
-                f"{units.shown(float(value), variable.dimension):.6g}"
-                for value, variable in zip(found.x, nlp.program.variables, strict=True)
-            ),
-        ]
-        for found in solution.optima[:_OPTIMA]
-    ]
-    left = len(solution.optima) - len(rows)
-    more = f" ({left} worse ones are left out)" if left else ""
-    yield grid(headers, rows, f"Where they lie{more}")
-
-
-def _around(report: Report) -> Markup:
-    parts: list[Markup] = []
-    with_maps = [k for k, part in enumerate(report.parts) if part.planes]
-    if not any(part.slices for part in report.parts):
-        if any(has_loops(part.nlp) for part in report.parts) and report.parts[0].nlp.n:
-            return paragraphs(
-                ["One variable cannot move alone: the robot's loops would open. So there are no slices of F."]
-            )
-        return Markup("")
-    parts.append(
-        tag(
-            "p",
-            "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
-            + (
-                " A component of a free direction moves with the direction's others, which are scaled to unit length."
-                if report.parts[0].nlp.program.directions
-                else ""
-            ),
-        )
-    )
-    for part in report.parts:
-        if len(report.parts) > 1:
-            parts.append(tag("h3", f"Slices for “{part.name}”"))
-        parts.append(tag("div", *(_slice(part, each) for each in part.slices), class_="charts"))
-    if with_maps:
-        parts.append(tag("h3", "Two variables at once"))
-        parts.append(_maps(report, with_maps))
-    return joined(parts)
-
-
-def _slice(part: Part, each: Slice) -> Markup:
-    nlp, x = part.nlp, part.x
-    variable, units = nlp.program.variables[each.variable], nlp.case.units
-    values = [units.shown(float(value), variable.dimension) for value in each.values]
-    inside = np.where(each.inside > 0, each.F, np.nan)
-    at = units.shown(float(x[each.variable]), variable.dimension)
-    here = nlp.evaluate(x)[0]
-    unit = units.label(variable.dimension)
-    finite = np.isfinite(each.F)
-    if finite.any():
-        kept = np.isfinite(inside)
-        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} on the slice"
-        if kept.any():
-            k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
-            best = "largest" if nlp.sign < 0 else "smallest"
-            words += f", {best} within the limits at {values[k]:.5g} {unit}".rstrip()
-            if kept.sum() == 1:
-                words += ", the only one of its points within them"
-            elif not kept[finite].all():
-                words += f"; within every limit on {100 * np.mean(kept):.0f} % of it"
-        else:
-            words += "; no point of it keeps every limit"
-        words += f". Here: F = {here:.6g} at {at:.5g} {unit}".rstrip() + "."
-    else:
-        words = f"{variable.name}: it cannot move while the others are held."
-    chart = line_chart(
-        [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
-        [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g}")],
-        words=words,
-        labels=(f"{variable.name}, {unit}" if unit else variable.name, "F"),
-        bounds=(values[0], values[-1]),
-    )
-    return tag("figure", chart, tag("figcaption", words))
-
-
-def _maps(report: Report, parts: Sequence[int]) -> Markup:
-    options = []
-    for k in parts:
-        part = report.parts[k]
-        for index, plane in enumerate(part.planes):
-            i, j = (part.nlp.program.variables[each].name for each in plane.variables)
-            prefix = f"{part.name}: " if len(report.parts) > 1 else ""
-            options.append(tag("option", f"{prefix}{i} and {j}", value=f"{k} {index}"))
-    chooser = tag(
-        "p", tag("label", "Variables: ", for_="pair"), tag("select", *options, id="pair"), class_="controls script"
-    )
-    shown, every = len(options), sum(part.pairs for part in report.parts)
-    picture = tag(
-        "div",
-        tag("p", "The map appears when its script has started.", class_="waiting script"),
-        id="map",
-        class_="map",
-        role="img",
-        aria_label="Map of F over two variables",
-    )
-    few = tag("p", f"The first {shown} of {every} pairs are here.") if shown < every else None
-    return joined([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])
-
-
-def _evidence(report: Report) -> Markup:
-    result = report.result
-    parts: list[Markup] = []
-    if "combined" not in result:
-        return joined(_evidence_of(report, result))
-    for k, own in enumerate(result["tasks"]):
-        parts += [tag("h3", f"“{report.parts[k].name}” by itself"), *_evidence_of(report, own)]
-    combined = result["combined"]
-    if combined["optimality"] is not None:
-        parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {combined['optimality']['kind']}.")]
-        parts += _active(combined["optimality"])
-    return joined(parts)
-
-
-def _evidence_of(report: Report, result: dict[str, Any]) -> Iterator[Markup]:
-    # Rank and starts have their own places on the page.
-    rest = {key: value for key, value in result.items() if key != "rank"}
-    yield from paragraphs_of(verdict_lines(report.case, {**rest, "starts": {"run": 0}}))
-    evidence = result["optimality"]
-    if evidence is None:
-        return
-    yield from _active(evidence)
-    if evidence["reduced_hessian_eigenvalues"] and "reached" not in result:
-        listed = ", ".join(f"{value:.4g}" for value in evidence["reduced_hessian_eigenvalues"])
-        yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
-
-
-def _active(evidence: dict[str, Any]) -> list[Markup]:
-    if not evidence["active"]:
-        return [tag("p", "No bound or limit is active.")]
-    rows = [[s["name"], s["bound"], f"{s['value']:.7g}", f"{s['multiplier']:.4g}"] for s in evidence["active"]]
-    return [grid(["", "side", "value", "multiplier, F per unit"], rows, "Active bounds and limits")]
-
-
-def _certificates(report: Report) -> Markup:
-    result = report.result
-    found: list[tuple[str, dict[str, Any] | None]] = []
-    if "combined" in result:
-        found += [(f"“{report.parts[k].name}” by itself", own["certificate"]) for k, own in enumerate(result["tasks"])]
-        found.append(("The combined program", result["combined"]["certificate"]))
-    else:
-        found.append(("", result["certificate"]))
-    parts: list[Markup] = []
-    for name, certificate in found:
-        if certificate is None:
-            continue
-        if name:
-            parts.append(tag("h3", name))
-        parts += paragraphs_of(certificate_lines(certificate))
-        parts += bound_chart(certificate)
-    return joined(parts)
-
-
-def bound_chart(certificate: dict[str, Any]) -> list[Markup]:
-    """The bound and the best F known against time."""
-    rows = [row for row in certificate["history"] if row[1] is not None and row[2] is not None]
-    if len(rows) < 2:
-        if not rows:
-            return []
-        seconds, bound, best = rows[0]
-        return [tag("p", f"It took one round: after {seconds:.3g} s the bound was {bound:.7g}, the best F {best:.7g}.")]
-    seconds, bounds, best = ([float(row[k]) for row in rows] for k in range(3))
-    words = (
-        f"The bound goes from {bounds[0]:.7g} after {seconds[0]:.3g} s to {bounds[-1]:.7g} after {seconds[-1]:.3g} s; "
-        f"the best F known from {best[0]:.7g} to {best[-1]:.7g}."
-    )
-    chart = line_chart(
-        [Curve(seconds, bounds, "curve", steps=True), Curve(seconds, best, "curve best", steps=True)],
-        [Spot(seconds[-1], bounds[-1], "spot", f"bound {bounds[-1]:.7g}")],
-        words=words,
-        labels=("seconds", "F"),
-    )
-    return [tag("figure", chart, tag("figcaption", f"Bound (blue) and best point known (orange). {words}"))]
-
-
-def _published(report: Report) -> Markup:
-    if report.check is None:
-        return Markup("")
-    rows = [
-        [
-            row.published.quantity,
-            ", ".join(f"{value:g}" for value in row.published.value),
-            ", ".join(f"{value:.7g}" for value in row.computed) or "none",
-            row.verdict,
-            row.published.source,
-            row.published.because or row.rule,
-        ]
-        for row in report.check.published
-    ]
-    headers = ["quantity", "published", "computed", "", "where", "how it is known"]
-    return grid(headers, rows, "What the literature prints beside what is computed here", id="compared")
-
-
 def _origin(report: Report) -> Markup:
     result = report.result
     rows = [[name, text] for name, text in result["versions"].items()]
@@ -543,11 +301,6 @@ def _origin(report: Report) -> Markup:
     return joined(
         [grid(["", ""], rows, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
     )
-
-
-def paragraphs_of(lines: Any) -> list[Markup]:  # noqa: ANN401 - any lines of text
-    """A paragraph for each line of text."""
-    return [paragraphs([line]) for line in lines]
 
 
 def _last_line(group: object) -> list[object]:

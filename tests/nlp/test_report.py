@@ -33,7 +33,7 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
-from screwsynth.nlp.pictures import sections
+from screwsynth.nlp.pictures import judgement
 from screwsynth.nlp.pictures.charts import Curve, Spot, line_chart
 from screwsynth.nlp.pictures.frames import RATES
 from screwsynth.nlp.pictures.report import report_of
@@ -417,7 +417,7 @@ def test_charts_put_points_where_they_belong() -> None:
 
 def test_bound_against_time() -> None:
     history = [[0.5, 12.0, 9.0], [1.0, 11.0, 10.0], [2.0, 10.1, 10.0]]
-    chart, words = (str(part) for part in sections.bound_chart({"history": history})[0].split("<figcaption>"))
+    chart, words = (str(part) for part in judgement.bound_chart({"history": history})[0].split("<figcaption>"))
     bound, best = (points_of(path)[0] for path in re.findall(r'd="([^"]*)" class="curve(?: best)?"', chart))
     # Level up to each point, then down: a bound holds until a better one is there.
     assert [x for x, _ in bound] == [x for x, _ in best]
