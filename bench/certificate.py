@@ -13,7 +13,7 @@ from screwsynth.nlp import Case, Free, Rotation, Task, load_case, solve
 from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.certificate.certificate import Certificate
 from screwsynth.nlp.certificate.engines import kernel
-from screwsynth.nlp.solver import Solution
+from screwsynth.nlp.solve.multistart import Solution
 
 LIMIT = 60.0
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
-from screwsynth.nlp.case import Search
+from screwsynth.nlp.case.case import Search
 from screwsynth.nlp.certificate.branchandbound import certify
-from screwsynth.nlp.solver import solve_nlp
+from screwsynth.nlp.solve.multistart import solve_nlp
 
 
 def random_case(seed: int) -> Case:

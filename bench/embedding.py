@@ -16,7 +16,7 @@ import numpy as np
 
 from screwsynth.nlp import Nlp, formulate, load_case
 from screwsynth.nlp.embedding.codegen import generate_c
-from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.program.sampling import starting_points
 
 NAME, STARTS = "paper-4.1-helical", 300
 DRIVER = """#include "ID.h"

@@ -1,33 +1,15 @@
 """Symbolic robots and the screw algebra they are written in."""
 
-from screwsynth.models.arrays import FloatArray, frozen_array
-from screwsynth.models.catalog import RobotFunction, UnknownModelError, model_names, robot_function
-from screwsynth.models.drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
-from screwsynth.models.hexapod import hexapod
-from screwsynth.models.legs import LeggedPlatform, legged_platform
-from screwsynth.models.model import (
-    Closure,
-    Dimension,
-    Leg,
-    Model,
-    ModelError,
-    Parameter,
-    PoseSymbols,
-    Quantity,
-    Unknown,
-    Wrench,
-    WrenchKind,
-    component_names,
-    couple_about,
-    force_along,
-)
-from screwsynth.models.rotation import (
-    axis_angle_from_matrix,
-    matrix_from_axis_angle,
-    matrix_from_cayley,
-    matrix_from_quaternion_vector,
-)
-from screwsynth.models.screws import (
+from .arrays import FloatArray, frozen_array
+from .catalog import RobotFunction, UnknownModelError, model_names, robot_function
+from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
+from .hexapod import hexapod
+from .instance import LegInstance, RobotInstance, vanished
+from .legs import LeggedPlatform, legged_platform
+from .model import Model, ModelError
+from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
+from .rotation import axis_angle_from_matrix, matrix_from_axis_angle, matrix_from_cayley, matrix_from_quaternion_vector
+from .screws import (
     Screw,
     axis_from_screw,
     displacement,
@@ -37,8 +19,9 @@ from screwsynth.models.screws import (
     screw_from_axis,
     unit_vector,
 )
-from screwsynth.models.stewart_gough import stewart_gough
-from screwsynth.models.three_upu import three_upu
+from .stewart_gough import stewart_gough
+from .three_upu import three_upu
+from .wrench import Wrench, WrenchKind, couple_about, force_along
 
 __all__ = [
     "Body",
@@ -48,6 +31,7 @@ __all__ = [
     "Direction",
     "FloatArray",
     "Leg",
+    "LegInstance",
     "LeggedPlatform",
     "Link",
     "Mark",
@@ -59,6 +43,7 @@ __all__ = [
     "PoseSymbols",
     "Quantity",
     "RobotFunction",
+    "RobotInstance",
     "Scene",
     "Screw",
     "Unknown",
@@ -86,4 +71,5 @@ __all__ = [
     "stewart_gough",
     "three_upu",
     "unit_vector",
+    "vanished",
 ]

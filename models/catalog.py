@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from screwsynth.models.hexapod import hexapod
-from screwsynth.models.model import Model
-from screwsynth.models.stewart_gough import stewart_gough
-from screwsynth.models.three_upu import three_upu
+from .hexapod import hexapod
+from .model import Model
+from .stewart_gough import stewart_gough
+from .three_upu import three_upu
 
 
 class UnknownModelError(KeyError):

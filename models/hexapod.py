@@ -11,9 +11,10 @@ from dataclasses import replace
 
 from casadi import SX
 
-from screwsynth.models.drawing import Mark, MarkKind
-from screwsynth.models.legs import legged_platform
-from screwsynth.models.model import Dimension, Leg, Model, Parameter, PoseSymbols
+from .drawing import Mark, MarkKind
+from .legs import legged_platform
+from .model import Model
+from .parts import Dimension, Leg, Parameter, PoseSymbols
 
 
 def hexapod() -> Model:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.drawing import Body, Link, Point, Scene
-from screwsynth.models.model import Dimension, Leg, PoseSymbols, Quantity, Wrench, force_along
+from .drawing import Body, Link, Point, Scene
+from .parts import Dimension, Leg, PoseSymbols, Quantity
+from .wrench import Wrench, force_along
 
 
 @dataclass(frozen=True, eq=False)

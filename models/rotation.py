@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from screwsynth.models.arrays import FloatArray, frozen_array
+from .arrays import FloatArray, frozen_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -11,7 +11,7 @@ A screw of intensity ``q`` about the unit axis ``s`` through the point ``s0`` wi
 A line is a screw of zero pitch. Because both kinds have the same coordinates, one set of functions serves them.
 
 Source: R. S. Ball, *A Treatise on the Theory of Screws*, Cambridge University Press, 1900, and equations 3 to 6 of the
-paper that :mod:`screwsynth.nlp.formulation` cites.
+paper that :mod:`screwsynth.nlp.program.formulation` cites.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.models.arrays import FloatArray, frozen_array
+from .arrays import FloatArray, frozen_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

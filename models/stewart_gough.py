@@ -19,9 +19,10 @@ from typing import Literal
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.drawing import Body, Circle, Mark, MarkKind
-from screwsynth.models.legs import legged_platform
-from screwsynth.models.model import Dimension, Leg, Model, ModelError, Parameter, PoseSymbols
+from .drawing import Body, Circle, Mark, MarkKind
+from .legs import legged_platform
+from .model import Model, ModelError
+from .parts import Dimension, Leg, Parameter, PoseSymbols
 
 _THIRD = 2 * math.pi / 3
 _SIXTH = math.pi / 3

@@ -20,9 +20,11 @@ from typing import Literal
 import casadi as ca
 from casadi import SX
 
-from screwsynth.models.drawing import Body, Circle, Direction, Mark, MarkKind, Scene
-from screwsynth.models.legs import legged_platform
-from screwsynth.models.model import Closure, Dimension, Leg, Model, ModelError, Parameter, PoseSymbols, couple_about
+from .drawing import Body, Circle, Direction, Mark, MarkKind, Scene
+from .legs import legged_platform
+from .model import Model, ModelError
+from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols
+from .wrench import couple_about
 
 _THIRD = 2 * math.pi / 3
 

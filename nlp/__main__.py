@@ -1,5 +1,5 @@
 """``python -m screwsynth.nlp`` is the command line."""
 
-from screwsynth.nlp.cli import main
+from .cli.main import main
 
 main()

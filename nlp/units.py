@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from screwsynth.models import Dimension
+from ..models import Dimension
 
 #: A twist whose size is within this of 1 is a unit screw: its motion is measured by its angle, or by its way.
 _UNIT = 1e-9

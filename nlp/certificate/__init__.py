@@ -1,1 +1,1 @@
-"""The proven bound of the global optimum: a branch and bound, its proofs on paper, and their checker."""
+"""Proven bounds of the global optimum, and their proofs. Nothing here imports a solver."""

@@ -23,15 +23,15 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from screwsynth.nlp.certificate import instructions
-from screwsynth.nlp.certificate.enclosure import ULP, Forms, enclose, midpoints
-from screwsynth.nlp.certificate.quadratic import Model, Quadratic, largest, reaching_affine
-from screwsynth.nlp.certificate.standardform import StandardForm
+from . import instructions
+from .enclosure import ULP, Forms, enclose, midpoints
+from .quadratic import GradientModel, Quadratic, largest, reaching_affine
+from .standardform import StandardForm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 #: Rounds of the coordinate-wise searches for multipliers and for a tangent point: any result of them is sound.
 _MULTIPLIER_ROUNDS = 8
@@ -158,7 +158,7 @@ class NumpyEngine:
             verdict, reason, bound, lo, hi, cut_lower, cut_upper, self._split(L, lower, upper, lo, hi), value, centre
         )
 
-    def _model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> Model:
+    def _model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
         n, R = self.form.n, len(self.equation)
         box = enclose(self._tape, lower, upper)
         shape = (R, n, lower.shape[1])
@@ -167,7 +167,7 @@ class NumpyEngine:
         def scaled(values: FloatArray) -> FloatArray:
             return np.where(r > 0, values[R:].reshape(shape) * r, 0.0)
 
-        return Model(
+        return GradientModel(
             value=Forms(*(each[:R] for each in vars(box).values())),
             b=scaled(box.c),
             A=box.a[R:].reshape(R, n, n, lower.shape[1]) * radius[None, :, None],
@@ -180,7 +180,7 @@ class NumpyEngine:
             gradient_hi=box.hi[R:].reshape(shape),
         )
 
-    def _multipliers(self, model: Model, high: FloatArray) -> FloatArray:
+    def _multipliers(self, model: GradientModel, high: FloatArray) -> FloatArray:
         """(R, B) weights that make the combined gradient small: of functions on the simplex, of rows negated.
 
         Coordinate descent on the least squares of the scaled gradient at the centre.
@@ -214,7 +214,7 @@ class NumpyEngine:
         weights[:J, bad], weights[0, bad] = 0.0, 1.0
         return weights
 
-    def _quadratic_bound(self, model: Model, weights: FloatArray) -> tuple[FloatArray, Quadratic]:
+    def _quadratic_bound(self, model: GradientModel, weights: FloatArray) -> tuple[FloatArray, Quadratic]:
         """Upper bound of the Lagrangian over the box, and its model."""
         L = Quadratic.combined(model, weights)
         mean = L.middle + np.maximum(np.abs(L.slope_lo), np.abs(L.slope_hi)).sum(axis=0)
@@ -258,7 +258,7 @@ class NumpyEngine:
 
     def _monotone(
         self,
-        model: Model,
+        model: GradientModel,
         binding: NDArray[np.bool_],
         lower: FloatArray,
         upper: FloatArray,
@@ -294,7 +294,7 @@ class NumpyEngine:
 
     def _contract(
         self,
-        model: Model,
+        model: GradientModel,
         L: Quadratic,
         lo: FloatArray,
         hi: FloatArray,

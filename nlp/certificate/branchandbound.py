@@ -18,17 +18,17 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.certificate.bounding import Examined, Verdict
-from screwsynth.nlp.certificate.certificate import Certificate, CertificateStatus
-from screwsynth.nlp.certificate.engines import Engine, engine_for
-from screwsynth.nlp.certificate.incumbent import Incumbent, IncumbentError
-from screwsynth.nlp.certificate.openboxes import Boxes, OpenBoxes
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
-from screwsynth.nlp.evaluation import ZERO_F
-from screwsynth.nlp.kkt import FEASIBLE, linearise
-from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.values import Sense
+from ...models import FloatArray, frozen_array
+from ..case.task import Sense
+from ..evidence.kkt import FEASIBLE, linearise
+from ..evidence.state import ZERO_F
+from ..program.nlp import Nlp
+from .bounding import Examined, Verdict
+from .certificate import Certificate, CertificateStatus
+from .engines import Engine, engine_for
+from .incumbent import Incumbent, IncumbentError
+from .openboxes import Boxes, OpenBoxes
+from .standardform import StandardForm, standard_form
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

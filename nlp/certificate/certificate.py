@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from screwsynth.models import FloatArray
-from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.values import Sense
+from ...models import FloatArray
+from ..case.task import Sense
+from ..program.nlp import Nlp
 
 #: What every statement is about: the proof covers the expressions as CasADi holds them, not the machine.
 SCOPE = "for the double-precision expression graph of this case"

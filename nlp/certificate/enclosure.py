@@ -25,10 +25,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.certificate.instructions import Op, Tape
+from .instructions import Op, Tape
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 #: Four times the rounding unit 2^-53: what an end of an interval moves outwards per operation, in parts of itself.
 ULP = 2.0**-51

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, search_tape
-from screwsynth.nlp.certificate.instructions import Tape
-from screwsynth.nlp.certificate.standardform import StandardForm
+from .bounding import Examined, NumpyEngine, search_tape
+from .instructions import Tape
+from .standardform import StandardForm
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 
 class Engine(Protocol):

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from screwsynth.models import FloatArray
-from screwsynth.nlp.certificate.standardform import StandardForm
-from screwsynth.nlp.errors import InputError
-from screwsynth.nlp.kkt import FEASIBLE, assembled, correct, linearise
-from screwsynth.nlp.sampling import starting_points
+from ...models import FloatArray
+from ..errors import InputError
+from ..evidence.kkt import FEASIBLE, assembled, correct, linearise
+from ..program.sampling import starting_points
+from .standardform import StandardForm
 
 #: A value that is claimed for a point may differ from what the program computes there by this part of its scale.
 _SAME_VALUE = 1e-9

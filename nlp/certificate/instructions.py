@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from screwsynth.nlp.errors import UncoveredError
+from ..errors import UncoveredError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 
 class Op(enum.IntEnum):

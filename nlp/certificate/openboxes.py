@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 #: With more boxes than this the newest are taken first, whatever their bounds: the search then goes to the bottom
 #: before it goes on, and needs no more memory.

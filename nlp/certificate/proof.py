@@ -28,8 +28,8 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from screwsynth.nlp.errors import InputError
-from screwsynth.nlp.program import Nlp
+from ..errors import InputError
+from ..program.nlp import Nlp
 
 _FORMAT = "screwsynth-proof"
 _VERSION = 1

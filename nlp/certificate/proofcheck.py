@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from screwsynth.models import FloatArray
-from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint
-from screwsynth.nlp.certificate.prooftree import Claim, unfolded
-from screwsynth.nlp.certificate.slopebounds import quadratic_bound
-from screwsynth.nlp.certificate.slopes import Slope, SlopeArithmetic
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
-from screwsynth.nlp.program import Nlp
+from ...models import FloatArray
+from ..program.nlp import Nlp
+from .proof import Node, Proof, ProofError, fingerprint
+from .prooftree import Claim, unfolded
+from .slopebounds import quadratic_bound
+from .slopes import Slope, SlopeArithmetic
+from .standardform import StandardForm, standard_form
 
 #: Boxes that are evaluated at once.
 _BLOCK = 512

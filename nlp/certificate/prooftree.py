@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.certificate.proof import Node, ProofError
-from screwsynth.nlp.certificate.standardform import StandardForm
+from .proof import Node, ProofError
+from .standardform import StandardForm
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ def unfolded(tree: bytes, form: StandardForm) -> list[Claim]:
     Raises:
         ProofError: it is not whole.
     """
-    reader = Reader(tree, form)
+    reader = TreeReader(tree, form)
     waiting = [(np.array(form.lower), np.array(form.upper))]
     while waiting:
         waiting += reader.node(*waiting.pop())
@@ -40,7 +40,7 @@ def unfolded(tree: bytes, form: StandardForm) -> list[Claim]:
     return reader.claims
 
 
-class Reader:
+class TreeReader:
     """Reads nodes from a tree's bytes, and collects what they claim."""
 
     def __init__(self, tree: bytes, form: StandardForm) -> None:

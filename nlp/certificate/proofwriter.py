@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.certificate.bounding import Examined, Verdict
-from screwsynth.nlp.certificate.openboxes import Boxes
-from screwsynth.nlp.certificate.proof import Node, ProofError
+from .bounding import Examined, Verdict
+from .openboxes import Boxes
+from .proof import Node, ProofError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 
 class ProofWriter:

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.certificate.enclosure import TINY, ULP, Forms
+from .enclosure import TINY, ULP, Forms
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 #: What is taken off the level that a quadratic must reach, in parts of its terms: far more than its root's rounding.
 _ROOT_SLACK = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class GradientModel:
     """The expressions over the boxes: R of them, the first J are functions."""
 
     value: Forms  # (R, ...)
@@ -74,7 +74,7 @@ class Quadratic:
         return np.where(known, low, -1.0), np.where(known, high, 1.0)
 
     @classmethod
-    def combined(cls, model: Model, weights: FloatArray) -> Quadratic:
+    def combined(cls, model: GradientModel, weights: FloatArray) -> Quadratic:
         """The model of a sum of expressions, weighted by (R, B)."""
         size = np.abs(weights)
         used = size > 0

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from screwsynth.nlp.certificate.slopes import Slope
+from .slopes import Slope
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
 #: What a sum of a few hundred rounded terms may be off by, in parts of their sizes.
 _SUMS = 1e-13

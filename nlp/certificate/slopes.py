@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from screwsynth.nlp.errors import UncoveredError
+from ..errors import UncoveredError
 
 if TYPE_CHECKING:
-    from screwsynth.models import FloatArray
+    from ...models import FloatArray
 
     Ends = tuple[FloatArray, FloatArray]
 

@@ -17,15 +17,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from screwsynth.models import FloatArray, frozen_array
-from screwsynth.nlp.program import Nlp
+from ...models import FloatArray, frozen_array
+from ..program.nlp import Nlp
 
-#: The variable and the constraints' names of :func:`screwsynth.nlp.formulation.formulate_worst`.
+#: The variable and the constraints' names of :func:`screwsynth.nlp.program.formulation.formulate_worst`.
 _LEVEL = "level"
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class Condition:
     """A condition ``expression <= 0``, or ``expression = 0``."""
 
     name: str
@@ -52,7 +52,7 @@ class StandardForm:
     lower: FloatArray
     upper: FloatArray
     functions: tuple[SX, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[Condition, ...]
     sign: float
     has_level: bool
 
@@ -136,14 +136,14 @@ def _own_function(expression: SX, level: SX, sign: float) -> SX:
     return -without / slope if sign < 0 else without / slope
 
 
-def _rows(constraints: Sequence[tuple[str, SX, float, float]]) -> list[Row]:
+def _rows(constraints: Sequence[tuple[str, SX, float, float]]) -> list[Condition]:
     rows = []
     for name, expression, low, high in constraints:
         if low == high:
-            rows.append(Row(name, expression - low, is_equation=True))
+            rows.append(Condition(name, expression - low, is_equation=True))
             continue
         if np.isfinite(high):
-            rows.append(Row(name, expression - high, is_equation=False))
+            rows.append(Condition(name, expression - high, is_equation=False))
         if np.isfinite(low):
-            rows.append(Row(name, low - expression, is_equation=False))
+            rows.append(Condition(name, low - expression, is_equation=False))
     return rows

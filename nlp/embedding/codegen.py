@@ -17,16 +17,16 @@ from string import Template
 import casadi as ca
 import numpy as np
 
-from screwsynth.models import Dimension, FloatArray
-from screwsynth.nlp.case import Case
-from screwsynth.nlp.embedding.ctext import comment, identifier, integers, matrix, numbers, texts
-from screwsynth.nlp.embedding.staged import Staged, stage
-from screwsynth.nlp.errors import CaseError, InputError
-from screwsynth.nlp.formulation import formulate
-from screwsynth.nlp.program import Nlp
-from screwsynth.nlp.sampling import starting_points
-from screwsynth.nlp.solver import Status, solve_nlp
-from screwsynth.nlp.values import Sense
+from ...models import Dimension, FloatArray
+from ..case.case import Case
+from ..case.task import Sense
+from ..errors import CaseError, InputError
+from ..program.formulation import formulate
+from ..program.nlp import Nlp
+from ..program.sampling import starting_points
+from ..solve.multistart import Status, solve_nlp
+from .ctext import comment, identifier, integers, matrix, numbers, texts
+from .staged import Staged, stage
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Ending of each of the files that the prefix names, and its template.

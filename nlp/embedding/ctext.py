@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from screwsynth.models import FloatArray
+from ...models import FloatArray
 
 
 def identifier(name: str) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 from casadi import SX
 
-from screwsynth.nlp.program import Program
+from ..program.program import Program
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from screwsynth.nlp import (
     Case,
     CaseError,
     Free,
-    Kind,
+    PointKind,
     RobotState,
     Rotation,
     Solution,
@@ -268,10 +268,10 @@ def test_free_directions_have_no_poles(many: Solution) -> None:
     assert all(abs(start.F - goal) < 1e-12 for start in converged)
     assert len(many.optima) == 1
     verdicts = {examine(many.nlp, start.x).kind for start in converged}
-    assert verdicts <= {Kind.NOT_ISOLATED, Kind.UNDECIDED}
+    assert verdicts <= {PointKind.NOT_ISOLATED, PointKind.UNDECIDED}
     for start in many.starts:
         if start.status is StartStatus.SADDLE:
-            assert examine(many.nlp, start.x).kind is Kind.SADDLE
+            assert examine(many.nlp, start.x).kind is PointKind.SADDLE
             assert goal - 1e-6 > start.F
 
 

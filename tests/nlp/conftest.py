@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import Case, load_case
-from screwsynth.nlp.cli import run as command_line
+from screwsynth.nlp.cli.main import run as command_line
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 

@@ -12,25 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import (
-    Case,
-    Free,
-    Rotation,
-    Task,
-    case_from_tables,
-    formulate,
-    load_case,
-    solve,
-)
-from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp import Case, Free, Rotation, Task, case_from_tables, formulate, load_case, solve
+from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.certificate import bounding, quadratic
 from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, Verdict, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.engines import engine_for, kernel
 from screwsynth.nlp.certificate.standardform import standard_form
-from screwsynth.nlp.formulation import formulate_worst
-from screwsynth.nlp.program import Nlp
+from screwsynth.nlp.program.formulation import formulate_worst
+from screwsynth.nlp.program.nlp import Nlp
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 ENGINES = ["numpy", pytest.param("c", marks=needs_kernel)]

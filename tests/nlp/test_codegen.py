@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import Nlp, case_from_tables, formulate, load_case, shipped_cases, solve
-from screwsynth.nlp.casefile import find_case
+from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
-from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.program.sampling import starting_points
 
 Run = Callable[..., tuple[int, str, str]]
 Embedded = Any

@@ -10,23 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from screwsynth.nlp import (
-    Case,
-    Free,
-    Nlp,
-    Rotation,
-    Sense,
-    Task,
-    build_model,
-    formulate,
-    load_case,
-    shipped_cases,
-)
+from screwsynth.nlp import Case, Free, Nlp, Rotation, Sense, Task, build_model, formulate, load_case, shipped_cases
+from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.embedding import codegen
-from screwsynth.nlp.kkt import linearise, multipliers
-from screwsynth.nlp.sampling import starting_points
-from screwsynth.nlp.solver import solve_nlp
-from screwsynth.nlp.values import Search
+from screwsynth.nlp.evidence.kkt import linearise, multipliers
+from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.solve.multistart import solve_nlp
 
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT = range(4)
 FEASIBLE, STATIONARY = 1e-9, 1e-7

@@ -10,11 +10,11 @@ import pytest
 
 from screwsynth.models import Body, model_names
 from screwsynth.nlp import Solution, load_case, shipped_cases, solve, solve_tasks
-from screwsynth.nlp.pictures.figures import figure_of, picture
-from screwsynth.nlp.pictures.gallery import drawings_of
-from screwsynth.nlp.pictures.scene import Drawing, drawing_of_model
-from screwsynth.nlp.pictures.view import clearest_view
-from screwsynth.nlp.robots import build_model
+from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.output.pictures.figures import figure_of, picture
+from screwsynth.nlp.output.pictures.gallery import drawings_of
+from screwsynth.nlp.output.pictures.scene import Drawing, drawing_of_model
+from screwsynth.nlp.output.pictures.view import clearest_view
 
 Run = Callable[..., tuple[int, str, str]]
 

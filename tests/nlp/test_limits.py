@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from screwsynth.models import Model, hexapod, stewart_gough, three_upu
 from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
-from screwsynth.nlp.formulation import formulate
-from screwsynth.nlp.ipopt import StartStatus
-from screwsynth.nlp.limits import Cone, Interval, Limits
-from screwsynth.nlp.segments import squared_distance
-from screwsynth.nlp.solver import solve_nlp
-from screwsynth.nlp.spectrum import largest_eigenvalue, smallest_eigenvalue
-from screwsynth.nlp.starter import starter_case
-from screwsynth.nlp.values import Search
+from screwsynth.nlp.case.limits.limits import Cone, Interval, Limits
+from screwsynth.nlp.case.limits.segments import squared_distance
+from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eigenvalue
+from screwsynth.nlp.case.settings import Search
+from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.solve.ipopt import StartStatus
+from screwsynth.nlp.solve.multistart import solve_nlp
 
 Array = NDArray[np.float64]
 Run = Any

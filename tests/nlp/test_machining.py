@@ -15,10 +15,10 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, result_of, solve
-from screwsynth.nlp.casefile import find_case
-from screwsynth.nlp.solver import solve_nlp
-from screwsynth.nlp.tolerance import BuiltRobot
-from screwsynth.nlp.values import Search
+from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.settings import Search
+from screwsynth.nlp.evidence.tolerance import BuiltRobot
+from screwsynth.nlp.solve.multistart import solve_nlp
 
 Array = NDArray[np.float64]
 Run = Any

@@ -9,11 +9,11 @@ import pytest
 from casadi import SX
 
 from screwsynth.models import Dimension
-from screwsynth.nlp import Kind, Nlp, examine, formulate, load_case
-from screwsynth.nlp.expressions import Constraint, Reading, Scalar
-from screwsynth.nlp.linear import nonnegative_least_squares, plain_basis
-from screwsynth.nlp.program import Program
-from screwsynth.nlp.values import Sense
+from screwsynth.nlp import Nlp, PointKind, examine, formulate, load_case
+from screwsynth.nlp.case.limits.constraint import Constraint, Reading
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.evidence.linalg import nonnegative_least_squares, plain_basis
+from screwsynth.nlp.program.program import Program, Scalar
 
 
 def program_of(
@@ -54,7 +54,7 @@ def test_strict_minimum_inside() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MIN, [(-2, 2), (-2, 2)])
     evidence = examine(nlp, np.array([1.0, 0.0]))
-    assert evidence.kind is Kind.STRICT_MINIMUM
+    assert evidence.kind is PointKind.STRICT_MINIMUM
     # Half ranges are 2: second derivatives 2 and 8 in scaled variables are 8 and 32.
     np.testing.assert_allclose(evidence.eigenvalues, [8, 32])
     assert evidence.active == ()
@@ -64,29 +64,29 @@ def test_strict_minimum_inside() -> None:
 def test_the_same_point_is_no_maximum() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MAX, [(-2, 2), (-2, 2)])
-    assert examine(nlp, np.array([1.0, 0.0])).kind is Kind.SADDLE
+    assert examine(nlp, np.array([1.0, 0.0])).kind is PointKind.SADDLE
 
 
 def test_not_stationary_away_from_the_optimum() -> None:
     x = SX.sym("x", 1)
     nlp = program_of(x, x**2, Sense.MIN, [(-1, 3)])
     evidence = examine(nlp, np.array([0.5]))
-    assert evidence.kind is Kind.NOT_STATIONARY
+    assert evidence.kind is PointKind.NOT_STATIONARY
     assert evidence.stationarity == pytest.approx(2 * 0.5 * 2)
 
 
 def test_a_bound_that_pushes_the_wrong_way_holds_nothing() -> None:
     x = SX.sym("x", 1)
     nlp = program_of(x, x**2, Sense.MIN, [(1, 3)])
-    assert examine(nlp, np.array([1.0])).kind is Kind.STRICT_MINIMUM
-    assert examine(nlp, np.array([3.0])).kind is Kind.NOT_STATIONARY
+    assert examine(nlp, np.array([1.0])).kind is PointKind.STRICT_MINIMUM
+    assert examine(nlp, np.array([3.0])).kind is PointKind.NOT_STATIONARY
 
 
 def test_multiplier_is_the_gain_per_unit_of_room() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, 3 * x[0] - x[1] ** 2, Sense.MAX, [(0, 5), (-1, 1)])
     evidence = examine(nlp, np.array([5.0, 0.0]))
-    assert evidence.kind is Kind.STRICT_MAXIMUM
+    assert evidence.kind is PointKind.STRICT_MAXIMUM
     (side,) = evidence.active
     assert (side.name, side.bound, side.value) == ("v0", "max", 5.0)
     assert side.multiplier == pytest.approx(3)
@@ -99,7 +99,7 @@ def test_multiplier_of_a_constraint_matches_the_optimal_value_function(sense: Se
     nlp = program_of(x, ca.dot(ca.DM(a), x), sense, [(-9, 9), (-7, 7)], [("disc", ca.sumsqr(x), -np.inf, c)])
     point = a / 5 * 2 * (1 if sense is Sense.MAX else -1)
     evidence = examine(nlp, point)
-    assert evidence.kind in (Kind.STRICT_MAXIMUM, Kind.STRICT_MINIMUM)
+    assert evidence.kind in (PointKind.STRICT_MAXIMUM, PointKind.STRICT_MINIMUM)
     (side,) = evidence.active
     assert side.multiplier == pytest.approx(5 / (2 * 2))
     assert evidence.eigenvalues.shape == (1,)
@@ -110,7 +110,7 @@ def test_an_equation_is_active_and_its_multiplier_may_be_negative() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, ca.sumsqr(x), Sense.MIN, [(-5, 5), (-4, 4)], [("sum", x[0] + x[1], 2.0, 2.0)])
     evidence = examine(nlp, np.array([1.0, 1.0]))
-    assert evidence.kind is Kind.STRICT_MINIMUM
+    assert evidence.kind is PointKind.STRICT_MINIMUM
     (side,) = evidence.active
     assert side.bound == "equal"
     assert side.multiplier == pytest.approx(-2)  # improvement of a minimum: minus its growth
@@ -120,7 +120,7 @@ def test_outside_a_limit_is_infeasible_and_names_it() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, x[0], Sense.MAX, [(-9, 9), (-9, 9)], [("disc", ca.sumsqr(x), -np.inf, 1.0)])
     evidence = examine(nlp, np.array([1.5, 0.0]))
-    assert evidence.kind is Kind.INFEASIBLE
+    assert evidence.kind is PointKind.INFEASIBLE
     assert evidence.violated == ("disc",)
 
 
@@ -128,7 +128,7 @@ def test_a_manifold_of_minima_is_not_isolated_and_its_direction_is_named() -> No
     x = SX.sym("x", 3)
     nlp = program_of(x, (x[0] * x[1] - 1) ** 2, Sense.MIN, [(0.1, 4), (0.1, 4), (-1, 1)])
     evidence = examine(nlp, np.array([1.0, 1.0, 0.3]))
-    assert evidence.kind is Kind.NOT_ISOLATED
+    assert evidence.kind is PointKind.NOT_ISOLATED
     directions = [dict(direction) for direction in evidence.flat]
     assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
     tangent = next(direction for direction in directions if "v0" in direction)
@@ -139,7 +139,7 @@ def test_a_quartic_minimum_is_not_called_flat() -> None:
     x = SX.sym("x", 1)
     nlp = program_of(x, x**4, Sense.MIN, [(-1, 1)])
     evidence = examine(nlp, np.array([0.0]))
-    assert evidence.kind is Kind.UNDECIDED
+    assert evidence.kind is PointKind.UNDECIDED
     assert evidence.flat == ()
 
 
@@ -147,7 +147,7 @@ def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
     x = SX.sym("x", 3)
     nlp = program_of(x, (x[0] - x[1]) ** 4, Sense.MIN, [(-1, 1), (-1, 1), (-1, 1)])
     evidence = examine(nlp, np.array([0.1, 0.1, 0.2]))
-    assert evidence.kind is Kind.NOT_ISOLATED
+    assert evidence.kind is PointKind.NOT_ISOLATED
     directions = [dict(direction) for direction in evidence.flat]
     assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
     along = next(direction for direction in directions if "v0" in direction)
@@ -157,7 +157,7 @@ def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
 def test_a_minimum_of_a_quartic_on_a_bound_is_no_maximum() -> None:
     x = SX.sym("x", 1)
     nlp = program_of(x, (1 + x**2) ** 2, Sense.MAX, [(0, 1)])
-    assert examine(nlp, np.array([0.0])).kind is Kind.SADDLE
+    assert examine(nlp, np.array([0.0])).kind is PointKind.SADDLE
 
 
 def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
@@ -166,7 +166,7 @@ def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
     nlp = program_of(x, x[0] - x[1] ** 2, Sense.MAX, [(-1, 1), (-1, 1)], [("again", x[0], -np.inf, 1.0)])
     evidence = examine(nlp, np.array([1.0, 0.0]))
     assert not evidence.licq
-    assert evidence.kind is Kind.STRICT_MAXIMUM
+    assert evidence.kind is PointKind.STRICT_MAXIMUM
     assert sum(side.multiplier for side in evidence.active) == pytest.approx(1)
 
 
@@ -174,7 +174,7 @@ def test_at_a_vertex_there_is_no_direction_left() -> None:
     x = SX.sym("x", 2)
     nlp = program_of(x, x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)])
     evidence = examine(nlp, np.array([1.0, 1.0]))
-    assert evidence.kind is Kind.STRICT_MAXIMUM
+    assert evidence.kind is PointKind.STRICT_MAXIMUM
     assert evidence.eigenvalues.size == 0
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from screwsynth.nlp import Kind, Solution, Status, load_case, solve
+from screwsynth.nlp import PointKind, Solution, Status, load_case, solve
 
 STARTS = 64
 
@@ -33,7 +33,7 @@ def test_every_start_finds_the_one_optimum(solved: dict[str, Solution], name: st
     assert pytest.approx(F, abs=5e-5) == solution.F
     assert [optimum.count for optimum in solution.optima] == [STARTS]
     assert solution.evidence is not None
-    assert solution.evidence.kind is Kind.STRICT_MAXIMUM
+    assert solution.evidence.kind is PointKind.STRICT_MAXIMUM
     assert solution.evidence.stationarity < 1e-12
     assert solution.evidence.feasibility == 0
     assert solution.state is not None
@@ -107,7 +107,7 @@ def test_rotation_of_section_4_2_has_f_0_on_equal_angles(solved: dict[str, Solut
 def test_flat_directions_of_section_4_2_are_named(solved: dict[str, Solution], name: str, flat: list[set[str]]) -> None:
     evidence = solved[name].evidence
     assert evidence is not None
-    assert evidence.kind is Kind.NOT_ISOLATED
+    assert evidence.kind is PointKind.NOT_ISOLATED
     assert sorted(map(sorted, evidence.flat)) == sorted(map(sorted, flat))
 
 

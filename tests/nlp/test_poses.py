@@ -15,12 +15,12 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
-from screwsynth.nlp import Case, CaseError, Kind, Status, case_from_tables, evaluate, formulate, result_of, solve
-from screwsynth.nlp.formulation import formulate_each
-from screwsynth.nlp.poses import along_screw, over_grid
-from screwsynth.nlp.result import compromise_of
-from screwsynth.nlp.tasks import solve_tasks
-from screwsynth.nlp.tolerance import BuiltRobot, tolerance_loss
+from screwsynth.nlp import Case, CaseError, PointKind, Status, case_from_tables, evaluate, formulate, result_of, solve
+from screwsynth.nlp.case.pose import along_screw, over_grid
+from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
+from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.results.data import compromise_of
+from screwsynth.nlp.solve.compromise import solve_tasks
 
 Array = NDArray[np.float64]
 Run = Any
@@ -193,7 +193,7 @@ def test_one_listed_pose_is_that_pose() -> None:
 
 
 def test_starting_points_lie_in_every_poses_ball() -> None:
-    from screwsynth.nlp.sampling import starting_points  # noqa: PLC0415
+    from screwsynth.nlp.program.sampling import starting_points  # noqa: PLC0415
 
     nlp = formulate(case_of(LISTED.replace("{ axis = [0, 1, 0], angle", "{ angle")))
     for name in ("pose1_q_x", "pose2_q_x"):
@@ -254,7 +254,7 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
 def test_an_optimum_over_poses_has_its_evidence() -> None:
     solution = solve(case_of(ALONG, "worst"))
     assert solution.evidence is not None
-    assert solution.evidence.kind is Kind.STRICT_MAXIMUM
+    assert solution.evidence.kind is PointKind.STRICT_MAXIMUM
     names = {side.name for side in solution.evidence.active}
     assert {"F pose 1", "F pose 3"} & names
     assert not any(side.name == "level" for side in solution.evidence.active)

@@ -9,8 +9,8 @@ from xml.etree import ElementTree  # what is parsed here was written here
 import pytest
 
 from screwsynth.nlp import load_case, shipped_cases
-from screwsynth.nlp.checkreport import checks_as_junit, checks_as_markdown
-from screwsynth.nlp.regress import CaseCheck, check_case, decimals_of
+from screwsynth.nlp.output.checks import checks_as_junit, checks_as_markdown
+from screwsynth.nlp.results.regression import CaseCheck, check_case, decimals_of
 
 ROOT = Path(__file__).parents[2]
 Run = Callable[..., tuple[int, str, str]]

@@ -20,25 +20,14 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from screwsynth.models import (
-    Body,
-    Closure,
-    Dimension,
-    Link,
-    Model,
-    Point,
-    PoseSymbols,
-    Scene,
-    Unknown,
-    force_along,
-)
+from screwsynth.models import Body, Closure, Dimension, Link, Model, Point, PoseSymbols, Scene, Unknown, force_along
 from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
-from screwsynth.nlp.pictures import judgement
-from screwsynth.nlp.pictures.charts import Curve, Spot, line_chart
-from screwsynth.nlp.pictures.frames import RATES
-from screwsynth.nlp.pictures.report import report_of
-from screwsynth.nlp.pictures.slices import planes_of, slices_of
-from screwsynth.nlp.pictures.webpage import page_of
+from screwsynth.nlp.output.report import judgement
+from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
+from screwsynth.nlp.output.report.frames import RATES
+from screwsynth.nlp.output.report.report import report_of
+from screwsynth.nlp.output.report.slices import planes_of, slices_of
+from screwsynth.nlp.output.report.webpage import page_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -452,7 +441,7 @@ def test_structure_is_accessible(page: Callable[..., Page]) -> None:
 
 
 def test_contrast() -> None:
-    style = (Path(__file__).parents[2] / "nlp" / "pictures" / "page" / "style.css").read_text(encoding="utf-8")
+    style = (Path(__file__).parents[2] / "nlp" / "output" / "report" / "page" / "style.css").read_text(encoding="utf-8")
     colours = dict(re.findall(r"--(ink|muted|blue|pale): (#[0-9a-f]{6})", style))
     (warning,) = re.findall(r"\.warning {[^}]*[^-]color: (#[0-9a-f]{6})", style)
 
@@ -467,12 +456,12 @@ def test_contrast() -> None:
 
 
 def test_colours_are_those_of_picture_files() -> None:
-    painting = pytest.importorskip("screwsynth.nlp.pictures.painting")
+    painting = pytest.importorskip("screwsynth.nlp.output.pictures.painting")
     assert painting.RATES == RATES
 
 
 def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.pictures.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("screwsynth.nlp.output.pictures.extras.find_spec", lambda _: None)
     code, out, err = cli("report", "paper-4.2", "--out", str(tmp_path / "page.html"))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
@@ -481,7 +470,7 @@ def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.solver.solve", lambda *_, **__: pytest.fail("it was solved"))
+    monkeypatch.setattr("screwsynth.nlp.solve.multistart.solve", lambda *_, **__: pytest.fail("it was solved"))
     code, _, err = cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html"))
     assert code == 2
     assert err.count("\n") == 1

@@ -29,8 +29,8 @@ from screwsynth.nlp import (
     Case,
     CaseError,
     Free,
-    Kind,
     Method,
+    PointKind,
     Rotation,
     Search,
     Status,
@@ -42,7 +42,7 @@ from screwsynth.nlp import (
     solve,
     solve_tasks,
 )
-from screwsynth.nlp.kkt import assembled, linearise
+from screwsynth.nlp.evidence.kkt import assembled, linearise
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -83,8 +83,8 @@ def test_a_minimum_at_a_weakly_active_bound_is_no_maximum() -> None:
         position=[0, 0, 30],
         tasks=[Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)],
     )
-    assert examine(formulate(case), np.array([0.0])).kind is Kind.SADDLE
-    assert examine(formulate(case), np.array([math.radians(30)])).kind is Kind.STRICT_MAXIMUM
+    assert examine(formulate(case), np.array([0.0])).kind is PointKind.SADDLE
+    assert examine(formulate(case), np.array([math.radians(30)])).kind is PointKind.STRICT_MAXIMUM
 
 
 def turned_case(degrees: float) -> Case:

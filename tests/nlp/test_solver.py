@@ -22,7 +22,7 @@ from screwsynth.nlp import (
     result_of,
     solve,
 )
-from screwsynth.nlp.sampling import starting_points
+from screwsynth.nlp.program.sampling import starting_points
 
 
 def random_case(seed: int, sense: str) -> Case:

@@ -18,8 +18,8 @@ from screwsynth.nlp import (
     CaseError,
     Compromise,
     Free,
-    Kind,
     Method,
+    PointKind,
     Rotation,
     Status,
     Task,
@@ -27,7 +27,7 @@ from screwsynth.nlp import (
     solve,
     solve_tasks,
 )
-from screwsynth.nlp.values import Value
+from screwsynth.nlp.case.pose import Value
 
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]
@@ -319,7 +319,7 @@ def test_an_average_that_turns_too_little_is_reported() -> None:
     assert state.angle < 0.3 - 1e-3
     assert found.status is Status.INFEASIBLE
     assert found.violated == ("angle",)
-    assert all(outcome.evidence.kind is Kind.INFEASIBLE for outcome in found.outcomes)
+    assert all(outcome.evidence.kind is PointKind.INFEASIBLE for outcome in found.outcomes)
 
 
 PARK: dict[str, Any] = {
@@ -354,7 +354,7 @@ def test_averaging_breaks_orthogonality_and_that_is_reported() -> None:
         total = np.sum([outcome.x[own] for outcome in found.outcomes], axis=0)
         np.testing.assert_allclose(mean, total / np.linalg.norm(total), atol=1e-14)
     for outcome in found.outcomes:
-        assert outcome.evidence.kind is Kind.INFEASIBLE
+        assert outcome.evidence.kind is PointKind.INFEASIBLE
         assert outcome.state is not None
         assert math.isfinite(outcome.loss)
 

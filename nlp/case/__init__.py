@@ -1,0 +1,1 @@
+"""A case: what is asked, as values, and from a file."""

@@ -1,0 +1,98 @@
+"""Faults that pydantic finds in a case file, as sentences."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from ..errors import CaseError
+
+#: What pydantic puts into the path of a fault for the branch of a union; no key of a file.
+_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
+
+
+def _case_error(fault: ErrorDetails) -> CaseError:
+    context = fault.get("ctx", {})
+    location = [*fault["loc"], *([context["key"]] if "key" in context else [])]
+    value = fault["input"]
+    shown = value if isinstance(value, str | int | float | bool) and "key" not in context else None
+    return CaseError(dotted_key(location), _sentence(fault, context), shown)
+
+
+def dotted_key(location: list[int | str]) -> str:
+    """``robot.parameters.x4.min`` or ``pose.position[0]`` from a path into the document."""
+
+    def parts() -> Iterator[str]:
+        for part in location:
+            if isinstance(part, int):
+                yield f"[{part}]"
+            elif part not in _TAGS:
+                yield f".{part}"
+
+    return "".join(parts()).lstrip(".") or "the file"
+
+
+_KINDS = {
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "string_type": "must be text in quotes",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "float_type": "must be a number",
+    "finite_number": "must be finite",
+    "string_too_short": "must not be empty",
+}
+
+
+#: What stands at keys whose type alone would say too little.
+_FORMS = {
+    "axis": "must be a list of 3 numbers",
+    "point": "must be a list of 3 numbers",
+    "twist": "must be a list of 6 numbers",
+    "position": "must be a list of 3, each a number or { min, max }",
+    "task": "must be a list of tables: write [[task]], with two brackets",
+    "published": "must be a list of tables: write [[published]], with two brackets",
+}
+
+
+def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
+    """What pydantic found, as the second half of a sentence whose first half is the key."""
+    key = str(fault["loc"][-1]) if fault["loc"] else ""
+    match fault["type"]:
+        case "unknown_key" | "reason":
+            sentence = str(context["fault"])
+        case "literal_error" if key == "<word>":
+            sentence = f"must be {context['expected']}, a list of 3 numbers, or a list of such lists"
+        case "literal_error":
+            sentence = f"must be one of {context['expected']}"
+        case "list_type" if key in _FORMS:
+            sentence = _FORMS[key]
+        case "float_type":
+            sentence = _number_wanted(fault)
+        case "missing":
+            sentence = _missing(key, fault["input"])
+        case "too_short" | "too_long" as kind:
+            limit = context["min_length"] if kind == "too_short" else context["max_length"]
+            few = "at least " if kind == "too_short" and limit == 1 else ""
+            sentence = f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
+        case kind:
+            sentence = _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
+    return sentence
+
+
+def _missing(key: str, table: object) -> str:
+    close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
+    return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
+
+
+def _number_wanted(fault: ErrorDetails) -> str:
+    location = fault["loc"]
+    if location[-1] == "pitch":
+        return "must be a number, or inf without quotes"
+    if location[-1] != "<number>":
+        return "must be a number"
+    return "must be a number or a list of numbers" if location[0] == "published" else "must be a number or { min, max }"

@@ -1,0 +1,1 @@
+"""Limits of a case: what a design must keep to be built."""

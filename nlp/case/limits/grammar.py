@@ -1,0 +1,232 @@
+"""Relations between the numbers of a case, as people write them: ``x1 - 1.5*x2 >= 0``.
+
+The language is small: numbers, names, ``+ - * / ^``, brackets, the functions ``sqrt``, ``sin``, ``cos`` and ``abs``,
+and one relation ``>=``, ``<=`` or ``==``. ``^`` binds tighter than a sign and to the right, as in mathematics.
+Nothing is ever handed to Python's own interpreter: a sentence becomes a tree, and a tree a CasADi expression.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import casadi as ca
+from casadi import SX
+
+from ...errors import nearest
+
+#: A sentence is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
+LONGEST = 400
+_DEEPEST = 40
+
+_FUNCTIONS: dict[str, Callable[[SX], SX]] = {"sqrt": ca.sqrt, "sin": ca.sin, "cos": ca.cos, "abs": ca.fabs}
+_OPERATIONS: dict[str, Callable[[SX, SX], SX]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "^": lambda a, b: a**b,
+}
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*)|(?P<sign>>=|<=|==|[-+*/^()]))"
+)
+
+
+class SentenceError(ValueError):
+    """A sentence that cannot be understood; the message shows where."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number as it stands."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A number of the case, by name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of one argument; ``-`` is the change of sign."""
+
+    function: str
+    argument: Tree
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Two trees and what is done with them."""
+
+    sign: str
+    left: Tree
+    right: Tree
+
+
+Tree: TypeAlias = Number | Name | Call | Operation
+
+
+@dataclass(frozen=True)
+class Relation:
+    """``left >= right`` and the like."""
+
+    left: Tree
+    sign: Literal[">=", "<=", "=="]
+    right: Tree
+
+
+@dataclass(frozen=True)
+class _Token:
+    kind: str
+    text: str
+    place: int
+
+
+def parse(text: str, names: Collection[str]) -> Relation:
+    """The relation that a sentence says.
+
+    Args:
+        text: the sentence.
+        names: what may be named in it.
+
+    Raises:
+        SentenceError: it is no such sentence; the message has the offending token and its place.
+    """
+    if len(text) > LONGEST:
+        raise SentenceError(f"is longer than {LONGEST} characters")
+    reader = _Reader(text, names)
+    left = reader.sum()
+    token = reader.next()
+    if token.text not in (">=", "<=", "=="):
+        raise reader.wrong(token, "expected an operator or one of >=, <=, ==")
+    right = reader.sum()
+    last = reader.next()
+    if last.kind != "end":
+        raise reader.wrong(last, "expected an operator or the end")
+    sign: Literal[">=", "<=", "=="] = ">=" if token.text == ">=" else "<=" if token.text == "<=" else "=="
+    return Relation(left, sign, right)
+
+
+def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
+    """A tree as an expression of the values of its names; ``sin`` and ``cos`` take angles in units of ``angle`` rad."""
+    match tree:
+        case Number(value):
+            return SX(value)
+        case Name(name):
+            return values[name]
+        case Call("-", argument):
+            return -expression(argument, values, angle)
+        case Call(function, argument):
+            inner = expression(argument, values, angle)
+            return _FUNCTIONS[function](inner * angle if function in ("sin", "cos") else inner)
+        case Operation("^", left, Number(power)) if power == int(power):
+            return expression(left, values, angle) ** int(power)
+        case Operation(sign, left, right):
+            return _OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle))
+
+
+class _Reader:
+    """Recursive descent over the tokens of a sentence."""
+
+    def __init__(self, text: str, names: Collection[str]) -> None:
+        self._text, self._names = text, names
+        self._tokens = list(self._split())
+        self._at = self._depth = 0
+
+    def wrong(self, token: _Token, expected: str) -> SentenceError:
+        """The fault at a token, with what stands before it."""
+        found = "the sentence ends" if token.kind == "end" else f"{token.text!r} stands"
+        return SentenceError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
+
+    def next(self) -> _Token:
+        token = self._tokens[self._at]
+        self._at = min(self._at + 1, len(self._tokens) - 1)
+        return token
+
+    def sum(self) -> Tree:
+        """``product (+|- product)*``."""
+        tree = self._product()
+        while self._tokens[self._at].text in ("+", "-"):
+            tree = Operation(self.next().text, tree, self._product())
+        return tree
+
+    def _product(self) -> Tree:
+        """``signed (*|/ signed)*``."""
+        tree = self._signed()
+        while self._tokens[self._at].text in ("*", "/"):
+            tree = Operation(self.next().text, tree, self._signed())
+        return tree
+
+    def _signed(self) -> Tree:
+        """``(+|-)* power``."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise SentenceError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
+        if self._tokens[self._at].text in ("+", "-"):
+            sign = self.next().text
+            tree = self._signed()
+            tree = Call("-", tree) if sign == "-" else tree
+        else:
+            tree = self._power()
+        self._depth -= 1
+        return tree
+
+    def _power(self) -> Tree:
+        """``atom (^ signed)?``."""
+        base = self._atom()
+        if self._tokens[self._at].text != "^":
+            return base
+        self.next()
+        return Operation("^", base, self._signed())
+
+    def _atom(self) -> Tree:
+        """A number, a name, a function's value, or something in brackets."""
+        token = self.next()
+        if token.kind == "number":
+            value = float(token.text)
+            if math.isinf(value):
+                raise self.wrong(token, "expected a finite number")
+            return Number(value)
+        if token.text == "(":
+            return self._closed(token)
+        if token.kind != "name":
+            raise self.wrong(token, "expected a number, a name or a bracket")
+        if token.text in self._names:
+            return Name(token.text)
+        if token.text in _FUNCTIONS:
+            bracket = self.next()
+            if bracket.text != "(":
+                raise self.wrong(bracket, f"expected a bracket after {token.text}")
+            return Call(token.text, self._closed(bracket))
+        hint = nearest(token.text, [*self._names, *_FUNCTIONS])
+        raise SentenceError(f"{token.text!r} at position {token.place + 1} is no number of this case; {hint}")
+
+    def _closed(self, opened: _Token) -> Tree:
+        tree = self.sum()
+        token = self.next()
+        if token.text != ")":
+            raise self.wrong(token, f"expected an operator or the bracket that closes position {opened.place + 1}")
+        return tree
+
+    def _split(self) -> Iterator[_Token]:
+        at = 0
+        while at < len(self._text.rstrip()):
+            found = _TOKEN.match(self._text, at)
+            if found is None:
+                at += len(self._text[at:]) - len(self._text[at:].lstrip())
+                raise SentenceError(f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}")
+            kind = str(found.lastgroup)
+            yield _Token(kind, found[kind], found.start(kind))
+            at = found.end()
+        yield _Token("end", "", len(self._text.rstrip()))
+
+    def _pointed(self, place: int) -> str:
+        """The sentence with the place marked."""
+        return f"{self._text[:place]}»{self._text[place:]}"

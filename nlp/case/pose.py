@@ -1,0 +1,143 @@
+"""Poses of a case: numbers that are fixed or free, rotations, displacements. Angles are radians."""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from ...models import FloatArray, axis_from_screw, frozen_array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+#: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
+MAX_FREE_ROTATION = math.radians(179)
+
+
+#: No number of a case may be larger, and no twist smaller than its inverse: squares and fourth powers stay finite.
+LARGEST = 1e30
+
+
+@dataclass(frozen=True)
+class Free:
+    """A number that the solver chooses between two bounds.
+
+    Attributes:
+        lower, upper: finite bounds, ``lower < upper``.
+        start: where the first search begins; the middle when left out.
+    """
+
+    lower: float
+    upper: float
+    start: float | None = None
+
+    @property
+    def first(self) -> float:
+        """Where the first search begins."""
+        return (self.lower + self.upper) / 2 if self.start is None else self.start
+
+
+Value: TypeAlias = float | Free
+
+
+def sizes_of_turn(angle: Value) -> tuple[float, float]:
+    """Smallest and largest size, radians, of a rotation whose axis is free, where an angle's sign means nothing."""
+    if not isinstance(angle, Free):
+        return abs(angle), abs(angle)
+    sizes = sorted((abs(angle.lower), abs(angle.upper)))
+    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
+
+    Attributes:
+        axis: (3,) held axis, any length but zero; None leaves the axis free.
+        angle: radians. With the axis free the sign of an angle means nothing: ``Free(-0.5, 0.5)`` allows every rotation
+            by at most 0.5, about any axis; its start is about z.
+    """
+
+    axis: ArrayLike | None = (0.0, 0.0, 1.0)
+    angle: Value = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A displacement of the platform in the world frame: a pose ``(R, p)`` goes to ``(Q R, Q p + t)``.
+
+    Attributes:
+        rotation: (3, 3) ``Q``.
+        translation: (3,) ``t``, length.
+    """
+
+    rotation: FloatArray
+    translation: FloatArray
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether it leaves every pose where it is."""
+        return bool(np.array_equal(self.rotation, np.eye(3)) and not self.translation.any())
+
+
+def _step(rotation: FloatArray, translation: FloatArray) -> Step:
+    return Step(frozen_array(rotation, (3, 3)), frozen_array(translation, (3,)))
+
+
+#: No displacement.
+HERE = _step(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A pose of the platform, and the poses that follow from it.
+
+    Attributes:
+        position: origin of the platform frame in the world frame, length.
+        rotation: orientation of the platform.
+        steps: displacements of this pose, one for each pose that the robot takes.
+    """
+
+    position: Sequence[Value]
+    rotation: Rotation = field(default_factory=Rotation)
+    steps: tuple[Step, ...] = (HERE,)
+
+
+class OverPoses(enum.Enum):
+    """What F is over several poses."""
+
+    SUM = "sum"
+    MEAN = "mean"
+    WORST = "worst"
+
+
+def along_screw(twist: ArrayLike, amounts: Sequence[float]) -> tuple[Step, ...]:
+    """Displacements along the finite screw motion ``exp(t [chi])`` of a twist.
+
+    Args:
+        twist: (6,) ``chi``, of any size but zero: only its axis and pitch count.
+        amounts: how far each goes: radians about the axis, or a length for a pure translation.
+    """
+    screw = axis_from_screw(twist)
+    s = np.asarray(screw.axis)
+    if math.isinf(screw.pitch):
+        return tuple(_step(np.eye(3), amount * s) for amount in amounts)
+    point, cross = np.asarray(screw.point), np.cross(np.eye(3), s)
+    steps = []
+    for amount in amounts:
+        # Rodrigues' formula.
+        Q = np.eye(3) + math.sin(amount) * cross + (1 - math.cos(amount)) * (cross @ cross)
+        steps.append(_step(Q, point - Q @ point + screw.pitch * amount * s) if amount else HERE)
+    return tuple(steps)
+
+
+def over_grid(offsets: Sequence[Sequence[float]]) -> tuple[Step, ...]:
+    """Displacements without rotation to every combination of offsets along x, y and z."""
+    return tuple(_step(np.eye(3), np.array(offset, dtype=np.float64)) for offset in itertools.product(*offsets))

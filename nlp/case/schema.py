@@ -1,0 +1,216 @@
+"""A case file as it is written: the tables and keys, and nothing else than these.
+
+The classes mirror the file, in the user's units and words. They check what can be checked without knowing the robot:
+keys, types, finite numbers. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from .faults import _case_error
+from .limits.buildtables import AlongTable, GridTable, LimitsTable, ToleranceTable
+from .table import Table, Vector
+
+
+class Range(Table):
+    """A number that is free between its bounds."""
+
+    min: FiniteFloat = Field(description="lower bound")
+    max: FiniteFloat = Field(description="upper bound, above min")
+    start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
+
+
+def _number_or_range(value: object) -> str:
+    return "<range>" if isinstance(value, dict | Range) else "<number>"
+
+
+def _value_or_list(value: object) -> str:
+    return "<list>" if isinstance(value, list | tuple) else _number_or_range(value)
+
+
+Value = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_number_or_range)
+]
+
+
+Numbers = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
+]
+
+
+VectorOrValue = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
+    Discriminator(_value_or_list),
+]
+
+
+class UnitsTable(Table):
+    """Units of every number in the file."""
+
+    length: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)] = Field(
+        default="m", description="label of the length unit"
+    )
+    angle: Literal["deg", "rad"] = Field(default="deg", description="unit of angles")
+
+
+class RobotTable(Table):
+    """The robot: its model, the model's own options, and its dimensions."""
+
+    model_config = ConfigDict(extra="allow")
+
+    model: str = Field(description="name of the robot; `screwsynth models` lists them")
+    parameters: dict[str, VectorOrValue] = Field(
+        default_factory=dict, description="a number or { min, max } for each parameter; a list of three for a point"
+    )
+    characteristic_length: FiniteFloat = Field(
+        default=1.0, gt=0, description="length by which unit couples are made comparable with unit forces"
+    )
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The model's own options."""
+        return dict(self.model_extra or {})
+
+
+class RotationTable(Table):
+    """Rotation of the platform about an axis of the world frame."""
+
+    axis: Vector | None = Field(default=None, description="held axis; left out, the axis is free")
+    angle: Value = Field(description="angle, fixed or free")
+
+
+class PoseTable(Table):
+    """Pose of the platform in the world frame."""
+
+    position: Annotated[list[Value], Field(min_length=3, max_length=3)] = Field(
+        description="origin of the platform frame"
+    )
+    rotation: RotationTable | None = Field(default=None, description="left out: no rotation")
+    along_task: AlongTable | None = Field(default=None, description="poses along a task's screw motion from this one")
+    grid: GridTable | None = Field(default=None, description="poses over a box about this one")
+
+
+Poses = Annotated[
+    Annotated[PoseTable, Tag("<pose>")] | Annotated[list[PoseTable], Field(min_length=1), Tag("<poses>")],
+    Discriminator(lambda value: "<poses>" if isinstance(value, list) else "<pose>"),
+]
+
+
+class TaskTable(Table):
+    """A motion that the platform must make: axis, point and pitch, or the six numbers of a twist."""
+
+    name: str | None = Field(default=None, min_length=1, description="a few words")
+    sense: Literal["max", "min"] = Field(description="maximise or minimise F")
+    axis: Vector | None = Field(default=None, description="direction of the screw axis, any length but zero")
+    point: Vector | None = Field(default=None, description="any point on the axis")
+    pitch: float | None = Field(
+        default=None, description="translation per radian; inf is a pure translation along the axis"
+    )
+    weight: FiniteFloat = Field(default=1.0, gt=0, description="what the task counts for beside others")
+    twist: Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)] | None = Field(
+        default=None, description="angular velocity and velocity at the world origin, instead of axis, point and pitch"
+    )
+
+
+class CombineTable(Table):
+    """How several tasks are brought together, and several poses."""
+
+    method: Literal["average", "weighted-sum", "worst-case"] | None = Field(
+        default=None,
+        description="average of the tasks' optima (equation 15), best weighted sum, or best worst task",
+    )
+    over_poses: Literal["sum", "mean", "worst"] | None = Field(
+        default=None, description="what F is over several poses; the sum if left out"
+    )
+
+
+class SolveTable(Table):
+    """How the solver searches."""
+
+    starts: int = Field(default=32, ge=1, le=100_000, description="number of starting points")
+    seed: int = Field(default=0, ge=0, description="seed of the random ones")
+    max_iterations: int = Field(default=500, ge=1, le=1_000_000, description="limit for each start")
+
+
+class ExpectedValueTable(Table):
+    """A number of the result that a regression holds the case to."""
+
+    quantity: str = Field(min_length=1, description="dotted path in the JSON result, such as pose.angle")
+    value: FiniteFloat = Field(description="what it must be, in the case's units")
+    within: FiniteFloat = Field(gt=0, description="how far it may be off")
+
+
+class ExpectTable(Table):
+    """What a regression holds the case to."""
+
+    F: FiniteFloat | None = Field(default=None, ge=0, description="objective at the optimum")
+    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="relative; absolute where F is 0")
+    singular: bool | None = Field(default=None, description="whether J is rank deficient at the optimum")
+    value: list[ExpectedValueTable] = Field(default_factory=list, description="other numbers of the result")
+
+
+class PublishedTable(Table):
+    """A number that the literature prints."""
+
+    quantity: str = Field(min_length=1, description="dotted path in the JSON result, or gain (percent, with over)")
+    value: Numbers = Field(description="as printed")
+    source: str = Field(min_length=1, description="where")
+    reproduced: bool = Field(description="whether this program reproduces it")
+    because: str = Field(default="", description="the reason, where it does not")
+    decimals: int | None = Field(default=None, ge=0, le=15, description="printed decimals, if the value hides zeros")
+    over: str | None = Field(default=None, description="the case that a gain is over")
+
+    @model_validator(mode="after")
+    def _reason_given(self) -> PublishedTable:
+        if not self.reproduced and not self.because:
+            raise PydanticCustomError(
+                "reason", "{fault}", {"key": "because", "fault": "is missing: say why the number is not reproduced"}
+            )
+        if (self.quantity == "gain") != (self.over is not None):
+            fault = 'belongs to quantity = "gain", and that to it'
+            raise PydanticCustomError("reason", "{fault}", {"key": "over", "fault": fault})
+        return self
+
+
+class Document(Table):
+    """A whole case file."""
+
+    model_config = ConfigDict(title="screwsynth case file")
+
+    title: str = Field(default="", description="one line for people")
+    units: UnitsTable = UnitsTable()
+    robot: RobotTable
+    pose: Poses
+    task: Annotated[list[TaskTable], Field(min_length=1)]
+    combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
+    limits: LimitsTable | None = Field(default=None, description="what can be built")
+    tolerance: ToleranceTable | None = Field(default=None, description="what it may cost to build inexactly")
+    solve: SolveTable = SolveTable()
+    expect: ExpectTable = ExpectTable()
+    published: list[PublishedTable] = Field(default_factory=list)
+
+
+def parse_document(tables: dict[str, Any]) -> Document:
+    """The document, or its first fault as a sentence.
+
+    Raises:
+        CaseError: with the dotted key of the fault.
+    """
+    try:
+        return Document.model_validate(tables)
+    except ValidationError as error:
+        raise _case_error(error.errors(include_url=False)[0]) from None

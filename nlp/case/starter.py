@@ -1,0 +1,97 @@
+"""A commented case file to begin with, for any robot."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+
+from ...models import Dimension, Model, Parameter
+from ..units import Units
+
+_UNITS = Units("cm", "deg")
+
+#: A starter's free dimensions lie within this part of their typical values.
+_SPREAD = 0.25
+
+
+def starter_case(model: Model) -> str:
+    """Text of a case file for a robot at its typical dimensions, with the pose and one dimension free.
+
+    It solves as it is, and says in comments what may be changed.
+    """
+    z = model.home[2]
+    reach = _SPREAD * abs(z) or 1.0
+    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items()]
+    lines = [
+        f'title = "My {model.name}"',
+        "",
+        "[units]",
+        f'length = "{_UNITS.length}"               # a label, carried to every output; nothing is converted',
+        f'angle = "{_UNITS.angle}"               # or "rad"',
+        "",
+        "[robot]",
+        f'model = "{model.name}"',
+        *options,
+        *(
+            ["characteristic_length = 1   # by which unit couples count beside unit forces"]
+            if model.has_couples
+            else []
+        ),
+        "",
+        "# A number is fixed; { min = a, max = b } is free between its bounds, with an optional start.",
+        "[robot.parameters]",
+        *(_line(parameter, freed=index == 0) for index, parameter in enumerate(model.parameters)),
+        "",
+        "[pose]                        # of the platform in the base's frame, z along the base's normal",
+        f"position = [{_free(0, reach)}, {_free(0, reach)}, {_free(z, reach)}]",
+        "rotation = { angle = { min = -20, max = 20 } }                        # any axis, at most 20 deg",
+        "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
+        "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
+        "",
+        "[[task]]                      # the motion that the platform must make",
+        'name = "my task"',
+        'sense = "max"                 # or "min": much or little work rate into this motion',
+        "axis = [0, 1, 2]              # direction of the screw axis, any length but zero",
+        f"point = [0, 0, {z:g}]            # any point on it",
+        "pitch = 2                     # translation per radian; 0: a rotation; inf: a translation along the axis",
+        "",
+        "# [limits]                    # what can be built; see the documentation for all of them",
+        *(
+            [
+                f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",
+                "# base_joint_angle = 45       # half angle of each joint's cone about the base's normal",
+                f"# leg_clearance = {{ min = {0.02 * z:g} }}",
+            ]
+            if model.legs
+            else ["# rate_share = { max = 0.5 }"]
+        ),
+        "",
+        "[solve]",
+        "starts = 32                   # starting points; more find the best of several optima more surely",
+        "seed = 0",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _line(parameter: Parameter, *, freed: bool) -> str:
+    values = [_UNITS.shown(value, parameter.dimension) for value in parameter.typical]
+    width = _SPREAD * max(abs(value) for value in values) or 1.0
+    domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
+    texts = [_free(value, width, domain) if freed else f"{value:.10g}" for value in values]
+    text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+    return f"{parameter.name} = {text}   # {parameter.description}, {_measure(parameter.dimension)}"
+
+
+def _free(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
+    lower, upper = max(middle - width, domain[0]), min(middle + width, domain[1])
+    return f"{{ min = {lower:g}, max = {upper:g} }}" if lower < upper else f"{middle:g}"
+
+
+def toml_value(value: object) -> str:
+    """A robot's option as TOML writes it."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, default=str)
+
+
+def _measure(dimension: Dimension) -> str:
+    return _UNITS.label(dimension) or "a plain number"

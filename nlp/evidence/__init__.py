@@ -1,0 +1,1 @@
+"""What holds at a point, recomputed from the program and the point alone."""

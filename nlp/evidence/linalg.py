@@ -1,0 +1,71 @@
+"""Two pieces of linear algebra that NumPy lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...models import FloatArray
+
+#: An entry of a basis below this part of the largest is rounding error.
+_TRACE = 1e-9
+
+
+def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
+    """``argmin |A y - b|`` over ``y >= 0`` by the active-set method of Lawson and Hanson (1974, chapter 23).
+
+    Args:
+        A: (n, k) matrix, possibly rank deficient.
+        b: (n,) vector.
+    """
+    k = A.shape[1]
+    # Mostly the columns are independent and the unconstrained solution is the answer.
+    whole, _, rank, _ = np.linalg.lstsq(A, b, rcond=None)
+    if rank == k and whole.min(initial=0.0) >= 0:
+        return np.asarray(whole, dtype=np.float64)
+    y, passive = np.zeros(k), np.zeros(k, dtype=bool)
+    tolerance = 1e-14 * max(1.0, float(np.linalg.norm(b)))
+    for _ in range(3 * k + 3):
+        drive = A.T @ (b - A @ y)
+        drive[passive] = -np.inf
+        if passive.all() or drive.max() <= tolerance:
+            break
+        passive[int(np.argmax(drive))] = True
+        while True:
+            trial = np.zeros(k)
+            trial[passive] = np.linalg.lstsq(A[:, passive], b, rcond=None)[0]
+            blocked = passive & (trial <= 0)
+            if not blocked.any():
+                break
+            step = float(np.min(y[blocked] / np.maximum(y[blocked] - trial[blocked], 1e-300)))
+            y = y + step * (trial - y)
+            passive &= y > 1e-15
+            y[~passive] = 0.0
+        y = trial
+    return y
+
+
+def plain_basis(vectors: FloatArray) -> FloatArray:
+    """A basis of the same span with as few entries in each vector as elimination gives.
+
+    Args:
+        vectors: (k, n) rows, none of them nearly zero.
+
+    Returns:
+        (rank, n) rows in reduced echelon form, each with its largest entry 1 and rounding errors cleared.
+    """
+    rows = vectors.copy()
+    done = 0
+    for _ in range(len(rows)):
+        rest = np.abs(rows[done:])
+        if rest.max() <= _TRACE:
+            break
+        i, j = divmod(int(np.argmax(rest)), rows.shape[1])
+        rows[[done, done + i]] = rows[[done + i, done]]
+        rows[done] /= rows[done, j]
+        for other in range(len(rows)):
+            if other != done:
+                rows[other] -= rows[other, j] * rows[done]
+        done += 1
+    rows = rows[:done]
+    rows = np.array([row / row[int(np.argmax(np.abs(row)))] for row in rows]).reshape(done, vectors.shape[1])
+    return np.where(np.abs(rows) > _TRACE, rows, 0.0)

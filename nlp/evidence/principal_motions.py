@@ -1,0 +1,73 @@
+"""Which motions a robot resists least and most at a fixed point (the task analysis of Wolf and Shoham).
+
+F is a quadratic form in the twist, ``F = |M omega + N v|^2`` with moments ``M`` and forces ``N`` of J.
+Among all twists of unit rotation it has no maximum, since any translation may be added; what is well defined are
+its stationary values under ``|omega| = 1``, the finite part of the generalised eigenproblem
+
+    D J' J D chi = F diag(1, 1, 1, 0, 0, 0) chi
+
+whose three solutions are eigenvectors of the Schur complement ``M' (I - N N^+) M``, each with the translation that
+makes F least for it. The pure translations, with ``|v| = 1``, are eigenvectors of ``N' N``.
+
+Source: A. Wolf and M. Shoham, *Investigation of parallel manipulators using linear complex approximation*, Journal of
+Mechanical Design 125 (2003), reference [4] of the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...models import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalMotion:
+    """A motion at which F is stationary.
+
+    Attributes:
+        twist: (6,) with ``|omega| = 1``, or ``|v| = 1`` for a translation.
+        F: objective for it.
+    """
+
+    twist: FloatArray
+    F: float
+
+
+@dataclass(frozen=True, eq=False)
+class TaskAnalysis:
+    """The principal motions of a robot at one point, each three by ascending F.
+
+    Attributes:
+        rotations: among twists of unit rotation; the first is the least resisted of all of them.
+        translations: among pure translations of unit speed.
+    """
+
+    rotations: tuple[PrincipalMotion, ...]
+    translations: tuple[PrincipalMotion, ...]
+
+
+def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
+    """Principal motions for a Jacobian (m, 6) with rows force, then moment about the world origin."""
+    N, M = jacobian[:, :3], jacobian[:, 3:]
+    least_squares = np.linalg.pinv(N, rcond=1e-10)
+    projected = M - N @ (least_squares @ M)
+    rotations = []
+    for axis in _ascending(projected):
+        twist = np.concatenate([axis, -least_squares @ (M @ axis)])
+        rotations.append(_motion(jacobian, twist))
+    translations = [_motion(jacobian, np.concatenate([np.zeros(3), axis])) for axis in _ascending(N)]
+    return TaskAnalysis(tuple(rotations), tuple(translations))
+
+
+def _ascending(matrix: FloatArray) -> FloatArray:
+    """Right singular vectors as rows, the smallest singular value first, largest component positive."""
+    rows = np.linalg.svd(matrix)[2][::-1]
+    lead = rows[np.arange(3), np.argmax(np.abs(rows), axis=1)]
+    return np.asarray(rows * np.sign(lead)[:, None], dtype=np.float64)
+
+
+def _motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
+    rates = jacobian[:, 3:] @ twist[:3] + jacobian[:, :3] @ twist[3:]
+    return PrincipalMotion(frozen_array(twist, (6,)), float(rates @ rates))

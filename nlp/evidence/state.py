@@ -1,0 +1,171 @@
+"""The robot at one point, in numbers: pose, Jacobian, rates, F, and what singularity there is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from ...models import FloatArray, axis_angle_from_matrix, frozen_array, vanished
+from ..case.case import Case
+from ..case.pose import Free, Pose, Step
+from ..errors import EvaluationError
+from ..program.nlp import Nlp
+from .linalg import plain_basis
+
+#: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
+ZERO_F = 1e-12
+#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. It is
+#: the square root of the double precision's rounding unit: a point known to rounding error gives no better.
+ZERO_SINGULAR_VALUE = 1.5e-8
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """The robot at one point.
+
+    Attributes:
+        parameters: components of each parameter, by parameter name; radians for angles.
+        position: (3,) ``p``, length.
+        rotation: (3, 3) ``R``.
+        axis, angle: the rotation as a unit axis (3,) and radians; the held axis with a signed angle where there is one.
+        jacobian: (m, 6) unit wrenches, force then moment about the world origin.
+        rates: (m,) ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
+        F: ``sum(rates^2)``.
+        size: what F would be without cancellation; F is zero when it is small beside this.
+        singular_values: (min(m, 6),) of the Jacobian as it stands, largest first.
+        rank: of the Jacobian with moments about the platform's origin, divided by their longest arm.
+        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in plain terms.
+        quantities: the model's named measures, each (n,); radians for angles.
+    """
+
+    parameters: Mapping[str, FloatArray]
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+    jacobian: FloatArray
+    rates: FloatArray
+    F: float
+    size: float
+    singular_values: FloatArray
+    rank: int
+    free_twists: FloatArray
+    quantities: Mapping[str, FloatArray]
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether F is zero: the platform can make the task's motion with every actuator locked."""
+        return ZERO_F * self.size >= self.F
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether some motion of the platform meets no resistance."""
+        return self.rank < 6
+
+
+@dataclass(frozen=True, eq=False)
+class StatedPose:
+    """A pose that a case states: ``p`` (3,), ``R`` (3, 3), and the rotation as a unit axis (3,) and radians."""
+
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+
+
+def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
+    """The robot at a point of the program.
+
+    Args:
+        nlp: the program.
+        x: (n,) values of its free variables.
+        pose: index of the pose, of a case with several.
+
+    Returns:
+        The robot with the rates of the program's task; of its first, where it combines several.
+
+    Raises:
+        EvaluationError: a number is not finite there, as when a limb has zero length.
+    """
+    model, case = nlp.program.model, nlp.case
+    where = f"{case.source}: " if case.source else ""
+    outputs = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
+    for row, square in zip(model.wrenches, squares.ravel(), strict=True):
+        if not square > 0:
+            raise EvaluationError(f"{where}{vanished(row)}, at this point")
+    if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
+        raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
+    axis, angle = axis_angle_from_matrix(rotation)
+    prefix, stated, step = _stated(case)[pose]
+    if step.is_identity:
+        axis, angle = _turn(nlp, x, prefix, stated, rotation)
+    rank, free_twists = _rank(jacobian, position.ravel())
+    singular_values = np.linalg.svd(jacobian, compute_uv=False)
+    sizes = [len(parameter.typical) for parameter in model.parameters]
+    parts = np.split(components.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
+    return RobotState(
+        parameters=MappingProxyType(
+            {item.name: frozen_array(part, part.shape) for item, part in zip(model.parameters, parts, strict=True)}
+        ),
+        position=frozen_array(position.ravel(), (3,)),
+        rotation=frozen_array(rotation, (3, 3)),
+        axis=axis,
+        angle=angle,
+        jacobian=frozen_array(jacobian, jacobian.shape),
+        rates=frozen_array(rates[:, 0], (len(model.wrenches),)),
+        F=float(F[0, 0]),
+        size=float(size[0, 0]),
+        singular_values=frozen_array(singular_values, singular_values.shape),
+        rank=rank,
+        free_twists=frozen_array(free_twists, free_twists.shape),
+        quantities=MappingProxyType(
+            {
+                item.name: frozen_array(values.ravel(), (len(item.owners),))
+                for item, values in zip(model.quantities, quantities, strict=True)
+            }
+        ),
+    )
+
+
+def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
+    """The poses that a case states, at a point (n,), before their displacements."""
+    found: dict[str, StatedPose] = {}
+    for k, (prefix, stated, step) in enumerate(_stated(nlp.case)):
+        if prefix not in found:
+            outputs = nlp.program.kernels.robot_states[k](x, nlp.arguments)
+            rotation, position = step.rotation.T @ outputs[1], step.rotation.T @ (outputs[2].ravel() - step.translation)
+            axis, angle = _turn(nlp, x, prefix, stated, rotation)
+            found[prefix] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
+    return list(found.values())
+
+
+def _turn(nlp: Nlp, x: FloatArray, prefix: str, stated: Pose, rotation: FloatArray) -> tuple[FloatArray, float]:
+    """A stated pose's rotation as axis and angle: the held axis with a signed angle where there is one."""
+    if stated.rotation.axis is None:
+        return axis_angle_from_matrix(rotation)
+    held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
+    return axis, float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
+
+
+def _stated(case: Case) -> list[tuple[str, Pose, Step]]:
+    """The stated pose that each pose comes from: what its names begin with, the pose, and the displacement."""
+    return [
+        (prefix, pose, step) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True) for step in pose.steps
+    ]
+
+
+def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
+    """Rank and free twists of J with its moments about the platform's origin, divided by their longest arm."""
+    moments = jacobian[:, 3:] - np.cross(centre, jacobian[:, :3])
+    arm = float(np.max(np.linalg.norm(moments, axis=1))) or 1.0
+    # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
+    resistance = np.hstack([moments / arm, jacobian[:, :3]])
+    _, values, rows = np.linalg.svd(resistance)
+    rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
+    null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
+    null[:, 3:] -= np.cross(null[:, :3], centre)
+    return rank, plain_basis(null) if len(null) else np.zeros((0, 6))

@@ -1,0 +1,1 @@
+"""Output: terminal, files, pictures and reports."""

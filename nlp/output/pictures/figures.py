@@ -1,0 +1,145 @@
+"""Pictures of robots as files: png, svg and pdf, the same bytes for the same robot and versions."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+import warnings
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from ...units import rate_unit
+from .painting import INK, MUTED, RATES, Panel
+from .scene import Drawing
+from .view import View, clearest_view
+
+#: Everything that would make two files of one picture differ, or depend on the user's own settings.
+_SETTINGS: dict[Any, Any] = {
+    "svg.hashsalt": "screwsynth",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+    "font.family": "DejaVu Sans",
+    "axes.unicode_minus": True,
+    "savefig.dpi": 130,
+    "figure.dpi": 100,
+}
+_METADATA: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": "screwsynth"},
+    ".pdf": {"CreationDate": None, "Creator": "screwsynth", "Producer": None},
+}
+#: Size of a panel, and of what stands above, below and beside it, in inches.
+_WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
+
+
+def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = None) -> bytes:
+    """The content of a picture file.
+
+    Args:
+        drawings: one robot, or the same robot with several tasks, which stand side by side.
+        ending: ``.png``, ``.svg`` or ``.pdf``.
+        view: from where; the clearest for the first drawing when left out.
+    """
+    content = io.BytesIO()
+    with mpl.rc_context({**mpl.rcParamsDefault, **_SETTINGS}), warnings.catch_warnings():
+        # A title may have letters that the font lacks: they show as boxes.
+        warnings.simplefilter("ignore")
+        figure = figure_of(drawings, view=view)
+        figure.savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
+    return content.getvalue()
+
+
+def ending_of(target: str) -> str:
+    """Ending of a file's name, in small letters."""
+    return PurePath(target).suffix.lower()
+
+
+def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figure:
+    """The picture as a Matplotlib figure; arguments as for :func:`picture`.
+
+    Every artist that shows a part of the robot carries its name as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
+    ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
+    """
+    view = view or clearest_view(drawings[0])
+    count = len(drawings)
+    side = _SIDE if drawings[0].rows else 0.2
+    width, height = count * (_WIDTH + side), _HEIGHT + _TOP + _BOTTOM
+    figure = Figure(figsize=(width, height), facecolor="white")
+    canvas = FigureCanvasAgg(figure)
+    for k, drawing in enumerate(drawings):
+        left = k * (_WIDTH + side)
+        place = (left / width, _BOTTOM / height, _WIDTH / width, _HEIGHT / height)
+        axes = figure.add_axes(place)
+        panel = Panel(axes, view, drawing)
+        panel.paint()
+        if drawing.rows:
+            _colour_bar(figure, (left + _WIDTH + 0.1) / width, 0.22, 0.16 / width, 0.5, drawing, panel.largest)
+        panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
+        _legend(figure, (left + 0.25) / width, 0.02, panel)
+        top = 1 - 0.3 / height
+        for text, size, colour, bold in _heading(drawing):
+            lines = textwrap.wrap(text, int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
+            figure.text(
+                (left + 0.25) / width,
+                top,
+                "\n".join(lines),
+                fontsize=size,
+                color=colour,
+                fontweight="bold" if bold else "normal",
+                va="top",
+                parse_math=False,
+            )
+            top -= (1.35 * size / 72 * len(lines)) / height
+    return figure
+
+
+def _heading(drawing: Drawing) -> list[tuple[str, float, str, bool]]:
+    title = drawing.model.name if drawing.case is None else drawing.case.title or drawing.case.name
+    rows = [(title, 12.0, INK, True)]
+    if drawing.headline:
+        rows.append((drawing.headline, 10.0, MUTED if drawing.is_answer else "#a3250f", not drawing.is_answer))
+    return rows
+
+
+def rate_colours() -> LinearSegmentedColormap:
+    """Blue for what shortens, grey for what stays, orange for what lengthens: told apart with any colour blindness."""
+    return LinearSegmentedColormap.from_list("rates", RATES)
+
+
+def _colour_bar(
+    figure: Figure, left: float, bottom: float, width: float, height: float, drawing: Drawing, largest: float
+) -> None:
+    axes = figure.add_axes((left, bottom, width, height))
+    scale = ScalarMappable(Normalize(-largest, largest), rate_colours())
+    bar = figure.colorbar(scale, cax=axes)
+    unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
+    bar.set_label(f"rate of each limb, {unit}", color=INK, fontsize=9, parse_math=False)
+    bar.ax.tick_params(labelsize=8, colors=INK)
+    bar.outline.set_edgecolor(MUTED)
+    rates = [row.rate for row in drawing.rows]
+    bar.ax.hlines(rates, 0, 1, color=INK, linewidth=1.0, gid="rates")
+
+
+def _legend(figure: Figure, left: float, bottom: float, panel: Panel) -> None:
+    entries = panel.legend
+    if entries:
+        figure.legend(
+            handles=[handle for handle, _ in entries],
+            labels=[text for _, text in entries],
+            loc="lower left",
+            bbox_to_anchor=(left, bottom),
+            frameon=False,
+            fontsize=8.5,
+            ncols=1,
+            labelcolor=INK,
+            borderaxespad=0,
+            handlelength=2.2,
+            columnspacing=2.0,
+        )

@@ -1,0 +1,41 @@
+"""From what was found to its drawings: one of a solution, one for each task of a compromise."""
+
+from __future__ import annotations
+
+from ...case.task import Sense
+from ...solve.compromise import Compromise
+from ...solve.multistart import Solution, Status
+from .scene import Drawing, drawing_of
+
+
+def drawings_of(found: Solution | Compromise) -> list[Drawing]:
+    """The robot with its task, or at the combined point with each of several tasks; at the first of several poses.
+
+    Raises:
+        EvaluationError: the robot does not exist at the point reached.
+    """
+    if isinstance(found, Solution):
+        said = _headline(found)
+        return [drawing_of(found.nlp, found.x, found.state, headline=said, is_answer=found.status.is_answer)]
+    drawings = []
+    for task, outcome in enumerate(found.outcomes):
+        if found.is_made:
+            said = f"{outcome.task.name}: F = {outcome.F:.7g}, {found.method.value} of {len(found.outcomes)} tasks"
+        else:
+            said = f"{found.status.value}: this is not what was asked for"
+        drawing = drawing_of(
+            outcome.own.nlp, found.x, outcome.state, task, headline=said, is_answer=found.status.is_answer
+        )
+        drawings.append(drawing)
+    return drawings
+
+
+def _headline(solution: Solution) -> str:
+    """What was found, in a line."""
+    if not solution.status.is_answer:
+        return f"{solution.status.value}: this is not an optimum"
+    value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F
+    if solution.status is not Status.OPTIMAL:
+        return f"F = {value:.7g}"
+    word = "largest" if solution.nlp.sense is Sense.MAX else "smallest"
+    return f"{word} F = {value:.7g}"

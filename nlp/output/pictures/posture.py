@@ -1,0 +1,127 @@
+"""The robot's drawing in numbers: where everything is at one pose, and after the platform has moved along a twist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import FloatArray, Model, WrenchKind, displacement, frozen_array
+from ...program.kernel import Kernel
+
+#: Newton's steps on the loops after a small motion, and the residual that ends them: what rounding leaves.
+_STEPS = 20
+_ROUNDING = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """Where everything of the drawing is, in the order of the model's scene; world coordinates, length.
+
+    Attributes:
+        rotation: (3, 3) ``R``.
+        position: (3,) ``p``.
+        unknowns: values of the model's internal unknowns.
+        points: (n, 3).
+        circles: (c, 3, 3) centre, point and normal of each circle.
+        directions: (d, 2, 3) origin and unit vector of each direction.
+        marks: points of each mark, (k, 3) each.
+        jacobian: (m, 6) unit wrenches, couple rows scaled by the characteristic length.
+        quantities: each of the model's quantities, radians for angles.
+    """
+
+    rotation: FloatArray
+    position: FloatArray
+    unknowns: FloatArray
+    points: FloatArray
+    circles: FloatArray
+    directions: FloatArray
+    marks: tuple[FloatArray, ...]
+    jacobian: FloatArray
+    quantities: tuple[FloatArray, ...]
+
+
+class Linkage:
+    """A robot with its dimensions, whose platform can be put anywhere.
+
+    Args:
+        model: the robot.
+        parameters: components of all parameters in the model's order; radians for angles.
+        characteristic_length: what one unit couple counts for beside unit forces, length.
+    """
+
+    def __init__(self, model: Model, parameters: FloatArray, characteristic_length: float = 1.0) -> None:
+        self.model = model
+        self._parameters = parameters
+        self._scales = np.array(
+            [characteristic_length if row.kind is WrenchKind.COUPLE else 1.0 for row in model.wrenches]
+        )
+        unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns])
+        symbols = [
+            ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
+            unknowns,
+            model.pose.rotation,
+            model.pose.position,
+        ]
+        outputs = [
+            ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
+            ca.horzcat(*[ca.vertcat(row.force, row.moment) / ca.sqrt(row.square) for row in model.wrenches]),
+            *[quantity.values for quantity in model.quantities],
+        ]
+        self._drawing = Kernel(ca.Function("drawing", symbols, [ca.densify(each) for each in outputs]))
+        closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
+        slopes = ca.jacobian(closure, unknowns)
+        self._loops = Kernel(ca.Function("loops", symbols, [ca.densify(closure), ca.densify(slopes)]))
+
+    def at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
+        """The drawing with the platform at a pose.
+
+        Args:
+            rotation: (3, 3) ``R``.
+            position: (3,) ``p``, length.
+            unknowns: values of the model's internal unknowns, which must close its loops.
+        """
+        scene = self.model.scene
+        arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
+        columns, rows, *quantities = self._drawing(*arguments)
+        counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions)]
+        points, circles, directions, marks = np.split(columns.T, np.cumsum(counts))
+        directions = directions.reshape(-1, 2, 3)
+        directions[:, 1] /= np.linalg.norm(directions[:, 1], axis=1, keepdims=True)
+        ends = np.cumsum([mark.kind.size for mark in scene.marks])[:-1]
+        return Posture(
+            rotation=frozen_array(rotation, (3, 3)),
+            position=frozen_array(position, (3,)),
+            unknowns=frozen_array(unknowns, (len(self.model.unknowns),)),
+            points=frozen_array(points, points.shape),
+            circles=frozen_array(circles.reshape(-1, 3, 3), (len(scene.circles), 3, 3)),
+            directions=frozen_array(directions, directions.shape),
+            marks=tuple(frozen_array(part, part.shape) for part in np.split(marks, ends)) if scene.marks else (),
+            jacobian=frozen_array(self._scales[:, None] * rows.T, (len(self.model.wrenches), 6)),
+            quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
+        )
+
+    def moved(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
+        """The drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
+
+        Internal unknowns follow by Newton's method on the loops, so the step should be small where there are some.
+
+        Returns:
+            None where the loops do not close, or a limb has zero length there.
+        """
+        turn, shift = displacement(twist, t)
+        rotation, position = turn @ start.rotation, turn @ start.position + shift
+        unknowns = np.array(start.unknowns)
+        for _ in range(_STEPS if len(unknowns) else 0):
+            residual, slopes = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
+            if not np.isfinite(residual).all() or np.max(np.abs(residual)) <= _ROUNDING:
+                break
+            unknowns = unknowns - np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
+        moved = self.at(rotation, position, unknowns)
+        if len(unknowns):
+            residual, _ = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
+            if not np.max(np.abs(residual)) <= np.sqrt(_ROUNDING):
+                return None
+        return moved if np.isfinite(moved.jacobian).all() else None

@@ -1,0 +1,103 @@
+"""Looking at a robot: a parallel projection, which keeps proportions, and what lies before what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....models import FloatArray
+from .scene import Drawing
+
+#: Directions that are tried for a view, in degrees.
+_AZIMUTHS = range(-170, 190, 10)
+_ELEVATION = 18.0
+#: Two lines that cross on paper within this part of their lengths of an end are joined, not crossing.
+_JOINED = 0.02
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection along a direction, z upwards on paper.
+
+    Attributes:
+        azimuth: of the eye about z, from x towards y, degrees.
+        elevation: of the eye above the plane of x and y, degrees.
+    """
+
+    azimuth: float
+    elevation: float = _ELEVATION
+
+    @property
+    def axes(self) -> FloatArray:
+        """(3, 3) rows: the direction to the right on paper, upwards on paper, and towards the eye."""
+        a, e = math.radians(self.azimuth), math.radians(self.elevation)
+        return np.array(
+            [
+                [-math.sin(a), math.cos(a), 0.0],
+                [-math.sin(e) * math.cos(a), -math.sin(e) * math.sin(a), math.cos(e)],
+                [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)],
+            ]
+        )
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """(..., 2) place on paper of points (..., 3), in the points' own unit."""
+        return np.asarray(points @ self.axes[:2].T)
+
+    def depth(self, points: FloatArray) -> FloatArray:
+        """How far points (..., 3) are towards the eye."""
+        return np.asarray(points @ self.axes[2])
+
+
+def clearest_view(drawing: Drawing) -> View:
+    """The direction from which limbs stand apart on paper and the task's axis is seen at its length."""
+    return max((View(float(azimuth)) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
+
+
+def _clearness(view: View, drawing: Drawing) -> float:
+    """Least and mean distance on paper between the middles of limbs, and how much of the axis is seen."""
+    points = drawing.posture.points
+    middles = [
+        view.project(points[start] + part * (points[end] - points[start]))
+        for start, end, link in drawing.links
+        if link.limb is not None
+        for part in (0.35, 0.65)
+    ]
+    apart = [float(np.linalg.norm(a - b)) for i, a in enumerate(middles) for b in middles[:i]]
+    shown = min(apart, default=0.0) / drawing.size + 0.2 * float(np.mean(apart or [0.0])) / drawing.size
+    if drawing.motion is not None:
+        seen = np.linalg.norm(view.project(drawing.motion.axis))
+        shown += 0.5 * float(seen)
+    return shown
+
+
+def painting_order(view: View, lines: Sequence[FloatArray]) -> list[int]:
+    """The order in which straight lines, (2, 3) each, are painted: the nearer of two that cross covers the other."""
+    depths = [float(np.mean(view.depth(line))) for line in lines]
+    order = sorted(range(len(lines)), key=lambda i: depths[i])
+    for _ in lines:
+        # A line that must come before one already placed is moved ahead of it; as many rounds as there are lines do.
+        for place, i in enumerate(order):
+            later = [k for k in order[:place] if _covers(view, lines[k], lines[i])]
+            if later:
+                order.remove(i)
+                order.insert(order.index(later[0]), i)
+                break
+        else:
+            break
+    return order
+
+
+def _covers(view: View, one: FloatArray, other: FloatArray) -> bool:
+    """Whether two lines cross on paper, and the first is nearer to the eye there."""
+    (a, b), (c, d) = view.project(one), view.project(other)
+    matrix = np.column_stack([b - a, c - d])
+    if abs(np.linalg.det(matrix)) <= 1e-12 * float(np.abs(matrix).max()) ** 2:
+        return False
+    s, t = np.linalg.solve(matrix, c - a)
+    if not (_JOINED < s < 1 - _JOINED and _JOINED < t < 1 - _JOINED):
+        return False
+    near, far = view.depth(one), view.depth(other)
+    return bool(near[0] + s * (near[1] - near[0]) > far[0] + t * (far[1] - far[0]))

@@ -1,0 +1,1 @@
+"""A solved case as one page of HTML."""

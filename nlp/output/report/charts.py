@@ -1,0 +1,161 @@
+"""Small line charts as SVG within a page: they need no script, scale with the page, and print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .markup import Markup, joined, tag
+
+#: Size of a chart in its own units, and what its axes take.
+_WIDTH, _HEIGHT = 320.0, 190.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 12.0, 10.0, 38.0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line of a chart.
+
+    Attributes:
+        x, y: its points; it is broken where ``y`` is not finite.
+        kind: the class that the page's style gives it.
+        steps: whether it stays level up to each point.
+    """
+
+    x: Sequence[float]
+    y: Sequence[float]
+    kind: str
+    steps: bool = False
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A marked point of a chart."""
+
+    x: float
+    y: float
+    kind: str
+    words: str
+
+
+def line_chart(
+    curves: Sequence[Curve],
+    spots: Sequence[Spot],
+    *,
+    words: str,
+    labels: tuple[str, str],
+    bounds: Sequence[float] = (),
+) -> Markup:
+    """Lines over one axis.
+
+    Args:
+        curves: at least one.
+        spots: marked points.
+        words: what it shows, in a sentence: its text alternative.
+        labels: of the horizontal and the vertical axis.
+        bounds: values on the horizontal axis marked by a line each.
+    """
+    xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
+    ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
+    if not ys:
+        return tag("p", f"{words} Nothing to draw: F has no value here.")
+    scale = _Scale(_widened(min(xs), max(xs), 0.03), _widened(min(ys), max(ys), 0.08))
+    parts: list[object] = [*_axes(scale, labels)]
+    parts += [tag("path", d=f"M{scale.x(x):.1f} {_TOP:g}V{_HEIGHT - _BOTTOM:g}", class_="bound") for x in bounds]
+    parts += [tag("path", d=_path(scale, curve), class_=curve.kind) for curve in curves]
+    for spot in spots:
+        place = {"cx": f"{scale.x(spot.x):.1f}", "cy": f"{scale.y(spot.y):.1f}", "r": "4.5"}
+        parts.append(tag("circle", tag("title", spot.words), class_=spot.kind, **place))
+    return _svg(parts, words)
+
+
+def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tuple[str, str]) -> Markup:
+    """How often each value was found, as a stem each."""
+    ys = [value for value, _ in values]
+    scale = _Scale(_widened(min(ys), max(ys), 0.12), (0.0, 1.12 * max(count for _, count in values)))
+    parts: list[object] = [*_axes(scale, labels)]
+    for k, (value, count) in enumerate(values):
+        x, y = scale.x(value), scale.y(count)
+        kind = "spot" if k == 0 else "other"
+        parts.append(tag("path", d=f"M{x:.1f} {scale.y(0):.1f}V{y:.1f}", class_=f"stem {kind}"))
+        found = f"{count} at F = {value:.7g}"
+        parts.append(tag("circle", tag("title", found), cx=f"{x:.1f}", cy=f"{y:.1f}", r="5", class_=kind))
+    return _svg(parts, words)
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """From values to places in a chart."""
+
+    across: tuple[float, float]
+    up: tuple[float, float]
+
+    def x(self, value: float) -> float:
+        low, high = self.across
+        return _LEFT + (value - low) / (high - low) * (_WIDTH - _LEFT - _RIGHT)
+
+    def y(self, value: float) -> float:
+        low, high = self.up
+        return _HEIGHT - _BOTTOM - (value - low) / (high - low) * (_HEIGHT - _TOP - _BOTTOM)
+
+
+def _svg(parts: Sequence[object], words: str) -> Markup:
+    return tag(
+        "svg", joined(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
+    )
+
+
+def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
+    floor, right = _HEIGHT - _BOTTOM, _WIDTH - _RIGHT
+    parts = []
+    for value in _ticks(*scale.across, 5):
+        x = f"{scale.x(value):.1f}"
+        parts.append(tag("text", _shown(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
+    for value in _ticks(*scale.up, 5):
+        y = scale.y(value)
+        parts.append(tag("path", d=f"M{_LEFT:g} {y:.1f}H{right:g}", class_="rule"))
+        parts.append(tag("text", _shown(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
+    parts.append(tag("path", d=f"M{_LEFT:g} {_TOP:g}V{floor:g}H{right:g}", class_="axis"))
+    middle = (_LEFT + right) / 2
+    parts.append(tag("text", labels[0], x=f"{middle:g}", y=f"{_HEIGHT - 6:g}", class_="label middle"))
+    height = (_TOP + floor) / 2
+    turned = f"rotate(-90 12 {height:g})"
+    parts.append(tag("text", labels[1], x="12", y=f"{height:g}", transform=turned, class_="label middle"))
+    return parts
+
+
+def _path(scale: _Scale, curve: Curve) -> str:
+    parts: list[str] = []
+    pen_up, last = True, 0.0
+    for x, y in zip(curve.x, curve.y, strict=True):
+        if not math.isfinite(y):
+            pen_up = True
+            continue
+        at = f"{scale.x(x):.1f} {scale.y(y):.1f}"
+        level = f"L{scale.x(x):.1f} {scale.y(last):.1f}" if curve.steps and not pen_up else ""
+        parts.append(f"M{at}" if pen_up else f"{level}L{at}")
+        pen_up, last = False, y
+    return "".join(parts) or "M0 0"
+
+
+def _widened(low: float, high: float, part: float) -> tuple[float, float]:
+    """A range with room at its ends; one of no width gets some."""
+    # Differences that doubles barely hold would show as noise over the whole height.
+    width = high - low
+    if width <= 1e-6 * max(abs(low), abs(high)):
+        width = 0.1 * max(abs(low), abs(high)) or 1.0
+        low, high = (low + high) / 2 - width, (low + high) / 2 + width
+    return low - part * width, high + part * width
+
+
+def _ticks(low: float, high: float, about: int) -> list[float]:
+    """Round values within a range."""
+    step = 10.0 ** math.floor(math.log10((high - low) / about))
+    step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (factor * step) <= about)
+    first = math.ceil(low / step - 1e-9)
+    return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def _shown(value: float) -> str:
+    return f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")

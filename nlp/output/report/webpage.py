@@ -1,0 +1,51 @@
+"""A report as one page of HTML that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from string import Template
+
+from .markup import Markup, joined, script_json, tag
+from .report import Report
+from .sections import answer, sections
+
+
+def page_of(report: Report) -> str:
+    """The whole page.
+
+    Words and tables come first and need no script. The library for the 3-D view stands at the end as text, and is
+    started after the page is first painted.
+    """
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only a report needs it
+
+    found = sections(report)
+    title = report.case.title or report.case.name
+    contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
+    body = joined(
+        tag(
+            "section",
+            tag("h2", heading, id=f"{anchor}-heading"),
+            content,
+            id=anchor,
+            aria_labelledby=f"{anchor}-heading",
+        )
+        for anchor, heading, content in found
+    )
+    parts = {
+        "title": tag("title", f"{title} - screwsynth"),
+        "heading": tag("h1", title),
+        "subtitle": tag("p", f"{report.case.name}, robot {report.case.model.name}", class_="subtitle"),
+        "answer": answer(report),
+        "contents": contents,
+        "body": body,
+        "style": Markup(_file("style.css")),
+        "script": Markup(_file("page.js")),
+        "data": script_json(report.as_data()),
+        # Within a script element nothing but its own end tag has a meaning.
+        "plotly": Markup(get_plotlyjs().replace("</script", "<\\/script").replace("<!--", "<\\!--")),
+    }
+    return Template(_file("report.html.in")).substitute(parts)
+
+
+def _file(name: str) -> str:
+    return (files("screwsynth.nlp.output.report") / "page" / name).read_text(encoding="utf-8")

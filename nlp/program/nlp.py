@@ -1,0 +1,155 @@
+"""The nonlinear program with its numbers: bounds, arguments, scale and the sides of every constraint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ...models import FloatArray
+from ..case.case import Case
+from ..case.limits.constraint import BoundedConstraint
+from ..case.task import Sense
+from .program import MAGNITUDE, Program
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+#: Multiples of the golden section, modulo 1, spread evenly.
+_GOLDEN = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a bound or constraint.
+
+    Attributes:
+        name: the variable or constraint.
+        bound: which side of it.
+        variable: index of the variable, or None for a constraint.
+        constraint: index of the constraint, or None for a variable's bound.
+    """
+
+    name: str
+    bound: Literal["min", "max", "equal"]
+    variable: int | None = None
+    constraint: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Every side of a program, variables' bounds first, and what arithmetic over all of them needs.
+
+    Attributes:
+        sides: the sides.
+        place: (k,) index of each side's expression among the variables and then the constraints.
+        sign: (k,) direction, along that expression, that leaves the feasible side; +1 for an equation.
+        limit: (k,) limit of each side, in the program's terms.
+        equal: (k,) whether it is an equation.
+    """
+
+    sides: tuple[Side, ...]
+    place: NDArray[np.intp]
+    sign: FloatArray
+    limit: FloatArray
+    equal: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A program with its numbers: what every solver, certificate and report reads.
+
+    Attributes:
+        program: the symbols.
+        case: where the numbers come from, for names and units.
+        sense: whether the objective is maximised or minimised.
+        arguments: (k,) values of the program's arguments.
+        lower, upper: (n,) bounds of the variables, ``lower < upper``.
+        start: (n,) first starting point.
+        g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
+        met: limits of the case that hold whatever is chosen, and so are no constraints of the program.
+        size: size of the objective, where it is not made of the robot's F.
+    """
+
+    program: Program
+    case: Case
+    sense: Sense
+    arguments: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    start: FloatArray
+    g_lower: FloatArray
+    g_upper: FloatArray
+    met: tuple[BoundedConstraint, ...] = ()
+    size: float | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of free variables."""
+        return len(self.program.variables)
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """(n,) half of each variable's range: a step of 1 in scaled variables goes from the middle to a bound."""
+        return (self.upper - self.lower) / 2
+
+    @property
+    def centre(self) -> FloatArray:
+        """(n,) middle of the box."""
+        return (self.upper + self.lower) / 2
+
+    @property
+    def sign(self) -> float:
+        """What makes the objective one to be minimised: -1 for a maximum."""
+        return -1.0 if self.sense is Sense.MAX else 1.0
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Every side of every bound and constraint."""
+        sides: list[Side] = []
+        limits: list[float] = []
+        for index, variable in enumerate(self.program.variables):
+            sides += [Side(variable.name, "min", variable=index), Side(variable.name, "max", variable=index)]
+            limits += [float(self.lower[index]), float(self.upper[index])]
+        for index, constraint in enumerate(self.program.constraints):
+            lower, upper = float(self.g_lower[index]), float(self.g_upper[index])
+            if lower == upper:
+                sides.append(Side(constraint.name, "equal", constraint=index))
+                limits.append(lower)
+                continue
+            for bound, limit in (("min", lower), ("max", upper)):
+                if np.isfinite(limit):
+                    sides.append(Side(constraint.name, "min" if bound == "min" else "max", constraint=index))
+                    limits.append(limit)
+        place = [side.variable if side.variable is not None else self.n + (side.constraint or 0) for side in sides]
+        return Sides(
+            sides=tuple(sides),
+            place=np.array(place, dtype=np.intp),
+            sign=np.array([-1.0 if side.bound == "min" else 1.0 for side in sides]),
+            limit=np.array(limits, dtype=np.float64),
+            equal=np.array([side.bound == "equal" for side in sides], dtype=bool),
+        )
+
+    def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Objective and constraints, (c,), at a point (n,)."""
+        F, g = self.program.kernels.values(x, self.arguments)
+        return float(F[0, 0]), g.ravel()
+
+    @cached_property
+    def objective_scale(self) -> float:
+        """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0.
+
+        Where the robot is not defined there, as with limbs of zero length, it is taken at the first of a few points
+        around the middle where it is.
+        """
+        if self.size is not None:
+            return self.size
+        around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
+        for x in (self.start, *(self.centre + self.scale * each for each in around)):
+            size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[MAGNITUDE]))
+            if np.isfinite(size) and size > 0:
+                return size
+        return 1.0

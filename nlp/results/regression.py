@@ -1,0 +1,249 @@
+"""Cases held to what they must compute, and to what the literature prints.
+
+Three kinds of value are kept apart: what this program **computes**, what it must compute (**expected**, with a
+tolerance of the case's own), and what the literature prints (**published**). A published number is *reproduced* by one
+of two rules, and no other:
+
+* ``digits``: the computed number is within half a unit of the last printed digit, in every component;
+* ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
+  and its neighbours held as printed: where F is flat, or best on a whole set, an argument says less than its digits.
+
+A number that a case marks reproduced and is not, or the other way round, is *newly changed*, and fails the check.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...models import component_names
+from ..case.case import Case
+from ..case.reader import load_case
+from ..case.settings import Published, Search
+from ..errors import CaseError, EvaluationError, InputError
+from ..program.formulation import formulate_each
+from ..solve.compromise import solve_tasks
+from ..solve.multistart import Status, solve, solve_nlp
+from .data import compromise_of, result_of
+
+#: Relative difference of F within which an argument of a flat optimum counts as reproduced.
+FLAT = 1e-5
+#: Starting points for the search over a single argument.
+_STARTS = 8
+
+
+@dataclass(frozen=True)
+class ExpectedCheck:
+    """A computed number beside what it must be."""
+
+    quantity: str
+    expected: float | bool | str
+    computed: float | bool | str | None
+    tolerance: float
+    passed: bool
+
+
+@dataclass(frozen=True)
+class PublishedCheck:
+    """A published number beside the computed one.
+
+    Attributes:
+        published: what is printed, and how the case marks it.
+        computed: components of the computed number, empty when there is none.
+        reproduced: what the rules find.
+        rule: the rule that decided, with its figures.
+    """
+
+    published: Published
+    computed: tuple[float, ...]
+    reproduced: bool
+    rule: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the case marks it as it is."""
+        return self.reproduced == self.published.reproduced
+
+    @property
+    def verdict(self) -> str:
+        """``reproduced``, ``not reproduced``, or ``newly changed``."""
+        if not self.passed:
+            return "newly changed"
+        return "reproduced" if self.reproduced else "not reproduced"
+
+
+@dataclass(frozen=True)
+class CaseCheck:
+    """A case's checks."""
+
+    name: str
+    title: str
+    expected: tuple[ExpectedCheck, ...]
+    published: tuple[PublishedCheck, ...]
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything holds."""
+        return all(row.passed for row in self.expected) and all(row.passed for row in self.published)
+
+
+def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> CaseCheck:
+    """Solve a case and check it.
+
+    Args:
+        name: path of a case file, or the bare name of a shipped case.
+        solved: results of cases by name, for those that refer to each other; added to.
+
+    Raises:
+        InputError: the case, or one that it refers to, cannot be read.
+    """
+    began = time.perf_counter()
+    solved = {} if solved is None else solved
+    case = load_case(name)
+    result = _solved(name, solved, case)
+    return CaseCheck(
+        name=case.name,
+        title=case.title,
+        expected=tuple(_expected(case, result)),
+        published=tuple(_published(name, case, row, result, solved) for row in case.published),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _solved(name: str, solved: dict[str, dict[str, Any]], case: Case | None = None) -> dict[str, Any]:
+    """Result of a case by name, solved once; the case itself, where it is read already."""
+    if name not in solved:
+        case = case or load_case(name)
+        solved[name] = compromise_of(solve_tasks(case)) if len(case.tasks) > 1 else result_of(solve(case))
+    return solved[name]
+
+
+def _expected(case: Case, result: Mapping[str, Any]) -> list[ExpectedCheck]:
+    expect = case.expect
+    rows = [ExpectedCheck("status", "an answer", str(result["status"]), 0.0, _is_answer(result))]
+    if expect.F is not None:
+        F = _lookup(result, "F")
+        off = math.inf if F is None else abs(float(F) - expect.F)
+        rows.append(ExpectedCheck("F", expect.F, F, expect.tolerance, off <= expect.tolerance * (abs(expect.F) or 1.0)))
+    if expect.singular is not None:
+        singular = _lookup(result, "singular" if "F" in result else "combined.singular")
+        rows.append(ExpectedCheck("singular", expect.singular, singular, 0.0, singular == expect.singular))
+    for row in expect.values:
+        value = _lookup(result, row.quantity)
+        near = isinstance(value, float | int) and abs(value - row.value) <= row.within
+        rows.append(ExpectedCheck(row.quantity, row.value, value, row.within, near))
+    return rows
+
+
+def _is_answer(result: Mapping[str, Any]) -> bool:
+    return Status(result["status"]).is_answer
+
+
+def _lookup(result: Any, path: str) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    """What stands at a dotted path of a result, numbers meaning places in lists; None when nothing does."""
+    found = result
+    for part in path.split("."):
+        if isinstance(found, Mapping):
+            found = found.get(part)
+        elif isinstance(found, Sequence) and not isinstance(found, str) and part.isdigit() and int(part) < len(found):
+            found = found[int(part)]
+        else:
+            return None
+    return found
+
+
+def _published(
+    name: str, case: Case, row: Published, result: Mapping[str, Any], solved: dict[str, dict[str, Any]]
+) -> PublishedCheck:
+    if row.over is not None:
+        over, F = _lookup(_solved(row.over, solved), "F"), _lookup(result, "F")
+        found = 100 * (F - over) / over if F is not None and over else None
+    else:
+        found = _lookup(result, row.quantity)
+    computed = tuple(float(each) for each in found) if isinstance(found, list) else ()
+    if isinstance(found, float | int):
+        computed = (float(found),)
+    if not _is_answer(result):
+        return PublishedCheck(row, (), False, f"the case has no answer: it is {result['status']}")
+    if len(computed) != len(row.value):
+        source = case.source or name
+        fault = f"is no number of this result with {len(row.value)} components"
+        raise CaseError(f"published: {row.quantity}", fault, source=source)
+    halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
+    off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))
+    if off <= 1 + 1e-9:
+        return PublishedCheck(row, computed, True, "digits")
+    flat = _flat_difference(name, case, row, result)
+    if flat is None:
+        return PublishedCheck(row, computed, False, "digits")
+    return PublishedCheck(row, computed, flat <= FLAT, f"flat: F is off its best by {flat:.1e}")
+
+
+def decimals_of(value: float) -> int:
+    """Digits behind the point of the shortest text of a number."""
+    text = f"{value:.15g}"
+    if "e" in text:
+        return 15
+    return len(text.partition(".")[2])
+
+
+def _flat_difference(name: str, case: Case, row: Published, result: Mapping[str, Any]) -> float | None:
+    """Relative difference of F between the printed point and the best with this argument free.
+
+    None when the number is no argument of F, or the printed point is no robot.
+    """
+    printed: dict[str, Any] = {}
+    for each in case.published:
+        printed |= _setting(case, each.quantity, each.value)
+    own = _setting(case, row.quantity, row.value)
+    if not own:
+        return None
+    settings = {**_own_settings(case, result), **printed}
+    try:
+        at_printed = _objectives(load_case(name, settings))
+        best = _objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
+    except (InputError, EvaluationError):
+        return None
+    differences = []
+    for (F, size), (G, _) in zip(at_printed, best, strict=True):
+        zero = max(F, G) <= FLAT**2 * size
+        differences.append(0.0 if zero else abs(F - G) / max(F, G))
+    return max(differences)
+
+
+def _setting(case: Case, quantity: str, value: Sequence[float]) -> dict[str, Any]:
+    """An argument of F as settings of the case; empty for anything else."""
+    path = quantity.removeprefix("combined.")
+    if path == "pose.position":
+        return dict(zip(component_names("p", 3), value, strict=True))
+    if path in ("pose.angle", "pose.axis"):
+        return {path.removeprefix("pose."): list(value) if path == "pose.axis" else value[0]}
+    name = path.removeprefix("parameters.")
+    if path.startswith("parameters.") and name in case.parameters:
+        return {name: value[0] if len(value) == 1 else list(value)}
+    return {}
+
+
+def _own_settings(case: Case, result: Mapping[str, Any]) -> dict[str, Any]:
+    """The computed point as settings of the case."""
+    point = result if "parameters" in result else result["combined"]
+    settings: dict[str, Any] = dict(point["parameters"])
+    settings |= dict(zip(component_names("p", 3), point["pose"]["position"], strict=True))
+    settings["angle"] = point["pose"]["angle"]
+    settings["axis"] = point["pose"]["axis"] if case.axis is None else case.axis.tolist()
+    return settings
+
+
+def _objectives(case: Case) -> list[tuple[float, float]]:
+    """Best F of each task over what is still free, and its size without cancellation."""
+    values = []
+    for nlp in formulate_each(case):
+        solution = solve_nlp(nlp, Search(starts=_STARTS))
+        if solution.state is None or not solution.status.is_answer:
+            raise EvaluationError(f"no optimum: {solution.status.value}")
+        values.append((solution.F, solution.state.size))
+    return values

@@ -1,0 +1,1 @@
+"""Search: Ipopt from many starts, several tasks, certified solves."""

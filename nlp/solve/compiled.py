@@ -1,0 +1,76 @@
+"""C compiled into shared libraries, kept by what is in them.
+
+A library is made once for its text, compiler and flags, under the user's cache folder (``XDG_CACHE_HOME``, or
+``~/.cache``), and found there the next time.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..errors import InputError
+
+_FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+
+
+def shared_library(source: str) -> Path:
+    """The shared library that a C text becomes.
+
+    Raises:
+        InputError: there is no C compiler, or it fails.
+    """
+    import hashlib
+    import tempfile
+
+    compiler = _compiler()
+    version = _run([compiler, "--version"])
+    key = hashlib.sha256("\0".join([source, compiler, version, *_FLAGS]).encode()).hexdigest()
+    folder = _folder()
+    library = folder / f"{key[:32]}.so"
+    if library.exists():
+        return library
+    with tempfile.TemporaryDirectory(dir=folder) as making:
+        text, made = Path(making) / "source.c", Path(making) / "made.so"
+        text.write_text(source, encoding="utf-8")
+        _run([compiler, *_FLAGS, str(text), "-lm", "-o", str(made)])
+        # Whole or not at all, also when two programs make it at once.
+        made.replace(library)
+    return library
+
+
+def _compiler() -> str:
+    import shutil
+
+    wanted = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
+    for name in wanted:
+        found = shutil.which(name)
+        if found:
+            return found
+    raise InputError(f"compiling needs a C compiler, and none was found: {' or '.join(wanted)}; CC names another one")
+
+
+def _run(words: list[str]) -> str:
+    import subprocess
+
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False)  # noqa: S603 - the user's own compiler
+    except OSError as error:
+        raise InputError(f"{words[0]}: cannot be run: {error.strerror or error}") from None
+    if done.returncode:
+        said = (done.stderr or done.stdout).strip().splitlines() or [f"exit status {done.returncode}"]
+        raise InputError(f"{words[0]}: the C compiler failed: {said[0]}")
+    return done.stdout
+
+
+def _folder() -> Path:
+    """The user's cache; a fresh folder where there can be none."""
+    import tempfile
+
+    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    try:
+        folder = Path(base).expanduser() / "screwsynth"
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except (OSError, RuntimeError):
+        return Path(tempfile.mkdtemp(prefix="screwsynth."))
+    return folder if os.access(folder, os.W_OK) else Path(tempfile.mkdtemp(prefix="screwsynth."))
