@@ -27,7 +27,6 @@ from casadi import SX
 
 from ...models import (
     Dimension,
-    FloatArray,
     LegInstance,
     Model,
     Parameter,
@@ -42,7 +41,7 @@ from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
 from ..case.pose import Free, OverPoses, Pose, Step, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
-from .buildable import distinct, limits_of
+from .limits import ProgramNumbers, limit_constraints
 from .program import Scalar
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
@@ -164,8 +163,11 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
             for index, equation in enumerate(model.closure)
         ]
     constraints = _varying(case, constraints, sheet)
-    limits, met = _limits(case, robots, sheet) if case.limits else ([], [])
-    return Layout(case, sheet, tuple(robots), (*constraints, *limits), tuple(met))
+    names = [scalar.name for scalar in (*sheet.variables, *sheet.arguments)]
+    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
+    numbers = ProgramNumbers(x, p, sheet.bounds, sheet.values)
+    limits = limit_constraints(case, robots, dict(zip(names, (*sheet.x, *sheet.p), strict=True)), numbers)
+    return Layout(case, sheet, tuple(robots), (*constraints, *limits.varying), limits.constant)
 
 
 def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
@@ -174,32 +176,6 @@ def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
         return rotation, position
     Q, t = SX(step.rotation.tolist()), SX(step.translation.tolist())
     return Q @ rotation, Q @ position + t
-
-
-def _limits(
-    case: Case, robots: Sequence[RobotInstance], sheet: SymbolTable
-) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
-    """The case's limits: those that the variables can change or that do not hold, and those that hold anyway."""
-    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
-    names = [scalar.name for scalar in (*sheet.variables, *sheet.arguments)]
-    limits = limits_of(case, robots, dict(zip(names, (*sheet.x, *sheet.p), strict=True)))
-    limits = distinct(limits, x, p, sheet.values, _somewhere(sheet.bounds))
-    expressions = ca.vertcat(*[item.constraint.expression for item in limits])
-    free = ca.which_depends(expressions, x, 1, True) if len(sheet.x) else [False] * len(limits)
-    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(_somewhere(sheet.bounds)[0], sheet.values)
-    varying: list[BoundedConstraint] = []
-    met: list[BoundedConstraint] = []
-    for item, varies, value in zip(limits, free, values.full().ravel(), strict=True):
-        holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
-        (met if holds and not varies else varying).append(item)
-    return varying, met
-
-
-def _somewhere(bounds: Sequence[Free]) -> FloatArray:
-    """(3, n) points of the box that no symmetry singles out."""
-    parts = np.modf(np.outer(np.arange(1, 4), np.sqrt(2.0 + np.arange(len(bounds)))))[0]
-    lower, upper = np.array([[bound.lower, bound.upper] for bound in bounds]).reshape(-1, 2).T
-    return np.asarray(lower + (0.1 + 0.8 * parts) * (upper - lower), dtype=np.float64)
 
 
 def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:
