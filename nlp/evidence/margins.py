@@ -1,4 +1,4 @@
-"""How far a point is inside each of the case's limits, and what each limit costs.
+"""Margins of a point in each of the case's limits, and the cost of each limit.
 
 The cost of a limit is the derivative of the optimal F by the number that stands in the case, from the multipliers: with
 the Lagrangian ``phi + sum_j mu_j (g_j - c_j)`` of :mod:`.kkt`, ``d phi* / d c_j = -mu_j``. A number that
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -48,7 +48,7 @@ class Margin:
 
     @property
     def margin(self) -> float:
-        """How far inside; negative outside."""
+        """Distance to the limit, positive inside."""
         if self.bound == "equal":
             return -abs(self.value - self.limit)
         return self.limit - self.value if self.bound == "max" else self.value - self.limit
@@ -117,16 +117,21 @@ def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     ]
 
 
-def _sides(item: BoundedConstraint) -> list[tuple[Literal["min", "max", "equal"], str, float]]:
+class _LimitSide(NamedTuple):
+    """A side of a constraint with the key of its number, and its bound in the program's terms."""
+
+    bound: Literal["min", "max", "equal"]
+    key: str
+    limit: float
+
+
+def _sides(item: BoundedConstraint) -> list[_LimitSide]:
+    """Return the sides of a constraint that are limits of the case."""
     low, high = item.constraint.keys
     if item.lower == item.upper:
-        return [("equal", low, item.lower)]
-    sides: list[tuple[Literal["min", "max", "equal"], str, float]] = []
-    if low:
-        sides.append(("min", low, item.lower))
-    if high:
-        sides.append(("max", high, item.upper))
-    return sides
+        return [_LimitSide("equal", low, item.lower)]
+    sides = [_LimitSide("min", low, item.lower), _LimitSide("max", high, item.upper)]
+    return [side for side in sides if side.key]
 
 
 def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values: FloatArray) -> list[float]:

@@ -12,42 +12,25 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
-from ..table import Table
 from .constraint import BoundedConstraint, Reading, between
-from .interval import AtLeast
-from .limit import Limit, LimitedCase, PosedRobot, Written
+from .interval import LowerLimit
+from .limit import PosedRobot
 from .segments import squared_distance
 
 
 @dataclass(frozen=True)
-class LegClearance(Limit[AtLeast]):
+class LegClearance(LowerLimit):
     """Smallest distance between two legs, as line segments between their joints."""
 
-    min: float
-
     key: ClassVar[str] = "leg_clearance"
-    table: ClassVar[type[Table]] = AtLeast
     description: ClassVar[str] = "between legs as line segments"
     needs_legs: ClassVar[bool] = True
-
-    @classmethod
-    def from_table(cls, written: Written[AtLeast]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.min)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a distance that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("leg_clearance.min", self.min)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return a smooth function of the distance of each pair of legs, with the distance itself."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from dataclasses import KW_ONLY, dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 from pydantic import Field, FiniteFloat
 
@@ -33,6 +33,32 @@ class AtMost(Table):
     max: FiniteFloat = Field(description="largest value")
 
 
+@dataclass(frozen=True)
+class LowerLimit(Limit[AtLeast], abc.ABC):
+    """A positive limit from below on a length.
+
+    Attributes:
+        min: smallest value, length.
+    """
+
+    min: float
+
+    table: ClassVar[type[Table]] = AtLeast
+
+    @classmethod
+    def from_table(cls, written: Written[AtLeast]) -> Self:
+        """Return the limit that a case file writes."""
+        return cls(written.value.min)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a value that is not positive.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        case.check_number(f"{self.key}.min", self.min)
+
+
 class Sides(NamedTuple):
     """The smallest and the largest value of an interval; None where a side is not limited."""
 
@@ -47,6 +73,8 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     Attributes:
         min: smallest value; None where there is none.
         max: largest value; None where there is none.
+        measured: dimension of both.
+        above: both must be larger than this.
     """
 
     _: KW_ONLY
@@ -54,12 +82,18 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     max: float | None = None
 
     table: ClassVar[type[Table]] = IntervalTable
-    #: Both sides must be larger than this.
+    measured: ClassVar[Dimension] = Dimension.LENGTH
     above: ClassVar[float] = 0.0
 
-    @abc.abstractmethod
-    def dimension(self, model: Model) -> Dimension:
-        """Return what is measured."""
+    @classmethod
+    def from_table(cls, written: Written[IntervalTable]) -> Self:
+        """Return the limit that a case file writes."""
+        smallest, largest = sides(written, cls.measured)
+        return cls(min=smallest, max=largest)
+
+    def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
+        """Return what is measured on a robot."""
+        return self.measured
 
     def check(self, case: LimitedCase) -> None:
         """Refuse an interval without sides, with a side out of its range, or with crossed sides.

@@ -15,11 +15,11 @@ from typing import ClassVar, Self
 import casadi as ca
 from pydantic import Field, FiniteFloat
 
-from ....models import Dimension, Model
+from ....models import Model
 from ...errors import CaseError
 from ..table import Table
 from .constraint import LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
-from .interval import IntervalLimit, IntervalTable, sides
+from .interval import IntervalLimit
 from .limit import Design, Limit, LimitedCase, PosedRobot, Written
 from .quantity import QuantityLimit, quantity_named
 
@@ -31,16 +31,6 @@ class LegLength(IntervalLimit):
     key: ClassVar[str] = "leg_length"
     description: ClassVar[str] = "of every leg at every pose"
     needs_legs: ClassVar[bool] = True
-
-    @classmethod
-    def from_table(cls, written: Written[IntervalTable]) -> Self:
-        """Return the limit that a case file writes."""
-        shortest, longest = sides(written, _dimension(written.model))
-        return cls(min=shortest, max=longest)
-
-    def dimension(self, model: Model) -> Dimension:
-        """Return what is measured."""
-        return _dimension(model)
 
     def exists_for(self, model: Model) -> bool:
         """Return whether a robot has legs, or a measure of this name without them."""
@@ -54,11 +44,6 @@ class LegLength(IntervalLimit):
         for leg in pose.robot.legs:
             name = f"leg_length limb {leg.name}{pose.where}"
             yield between(name, ca.sumsqr(leg.span), SQUARED_LENGTH, "leg_length", lower=self.min, upper=self.max)
-
-
-def _dimension(model: Model) -> Dimension:
-    quantity = quantity_named("leg_length", model)
-    return Dimension.LENGTH if quantity is None else quantity.dimension
 
 
 class ActuatorTable(Table):

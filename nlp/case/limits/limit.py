@@ -34,8 +34,7 @@ class TableField(NamedTuple):
     info: Any
 
 
-@dataclass(frozen=True, eq=False)
-class Written(Generic[TableT]):
+class Written(NamedTuple, Generic[TableT]):
     """A limit as a case file writes it, in the file's units.
 
     Attributes:
@@ -57,8 +56,7 @@ class Written(Generic[TableT]):
         return self.units.to_internal(number, dimension)
 
 
-@dataclass(frozen=True, eq=False)
-class LimitedCase:
+class LimitedCase(NamedTuple):
     """A case as far as its limits read it.
 
     Attributes:
@@ -108,16 +106,14 @@ class PlateJoint(NamedTuple):
     centre: SX
 
 
-@dataclass(frozen=True, eq=False)
-class Plate:
+class Plate(NamedTuple):
     """The joint centres of the base or of the platform, in its own frame; no pose changes them."""
 
     name: Literal["base", "platform"]
     joints: tuple[PlateJoint, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+class Design(NamedTuple):
     """A whole case as expressions of the program's variables and arguments.
 
     Attributes:
@@ -131,8 +127,7 @@ class Design:
     numbers: Mapping[str, SX]
 
 
-@dataclass(frozen=True, eq=False)
-class PosedRobot:
+class PosedRobot(NamedTuple):
     """The robot at one pose, as expressions of the program's variables and arguments.
 
     Attributes:

@@ -15,37 +15,21 @@ import casadi as ca
 from casadi import SX
 from pydantic import Field, FiniteFloat
 
-from ....models import Dimension, Model
+from ....models import Dimension
 from ...errors import CaseError
 from ..table import Table
 from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, between, bounded
-from .interval import AtLeast, IntervalLimit, IntervalTable, sides
+from .interval import IntervalLimit, LowerLimit
 from .limit import Design, Limit, LimitedCase, Plate, Written
 
 
 @dataclass(frozen=True)
-class JointSpacing(Limit[AtLeast]):
+class JointSpacing(LowerLimit):
     """Smallest distance between two joint centres of one plate."""
 
-    min: float
-
     key: ClassVar[str] = "joint_spacing"
-    table: ClassVar[type[Table]] = AtLeast
     description: ClassVar[str] = "between joint centres of one plate"
     needs_legs: ClassVar[bool] = True
-
-    @classmethod
-    def from_table(cls, written: Written[AtLeast]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.min)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a distance that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("joint_spacing.min", self.min)
 
     def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
         """Return the squared distance of each pair of joints."""
@@ -107,16 +91,7 @@ class RadiusRatio(IntervalLimit):
     key: ClassVar[str] = "radius_ratio"
     description: ClassVar[str] = "platform's radius over base's"
     needs_legs: ClassVar[bool] = True
-
-    @classmethod
-    def from_table(cls, written: Written[IntervalTable]) -> Self:
-        """Return the limit that a case file writes."""
-        smallest, largest = sides(written, Dimension.NUMBER)
-        return cls(min=smallest, max=largest)
-
-    def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - the same for every robot
-        """Return what is measured."""
-        return Dimension.NUMBER
+    measured: ClassVar[Dimension] = Dimension.NUMBER
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
         """Return the squared ratio."""

@@ -61,7 +61,7 @@ class QuantityLimit(IntervalLimit):
         return self.measure
 
     def dimension(self, model: Model) -> Dimension:
-        """Return what the measure measures."""
+        """Return what is measured on a robot."""
         quantity = quantity_named(self.measure, model)
         return Dimension.NUMBER if quantity is None else quantity.dimension
 
