@@ -1,13 +1,21 @@
 """Programs over the robots of :mod:`screwsynth.models`: the public names, and where each is."""
 
 from .case.case import Case as Case
-from .case.limits.limits import Actuator as Actuator
-from .case.limits.limits import Cone as Cone
-from .case.limits.limits import Footprint as Footprint
-from .case.limits.limits import Homogenised as Homogenised
-from .case.limits.limits import Interval as Interval
+from .case.limits.clearance import LegClearance as LegClearance
+from .case.limits.joints import BaseJointAngle as BaseJointAngle
+from .case.limits.joints import MountingPose as MountingPose
+from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
+from .case.limits.legs import Actuator as Actuator
+from .case.limits.legs import LegLength as LegLength
 from .case.limits.limits import Limits as Limits
-from .case.limits.limits import MountingPose as MountingPose
+from .case.limits.plates import Footprint as Footprint
+from .case.limits.plates import JointSpacing as JointSpacing
+from .case.limits.plates import RadiusRatio as RadiusRatio
+from .case.limits.quantity import QuantityLimit as QuantityLimit
+from .case.limits.rate_share import RateShare as RateShare
+from .case.limits.relation import Relations as Relations
+from .case.limits.singular_values import ConditionNumber as ConditionNumber
+from .case.limits.singular_values import SmallestSingularValue as SmallestSingularValue
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
 from .case.pose import Pose as Pose
@@ -65,20 +73,22 @@ from .units import Units as Units
 __all__ = [
     "ActiveSide",
     "Actuator",
+    "BaseJointAngle",
     "Case",
     "CaseError",
     "Certificate",
     "CertificateStatus",
     "Compromise",
-    "Cone",
+    "ConditionNumber",
     "EvaluationError",
     "Evidence",
     "Expectation",
     "Footprint",
     "Free",
-    "Homogenised",
     "InputError",
-    "Interval",
+    "JointSpacing",
+    "LegClearance",
+    "LegLength",
     "Limits",
     "Margin",
     "Method",
@@ -86,16 +96,22 @@ __all__ = [
     "Nlp",
     "Optimum",
     "OverPoses",
+    "PlatformJointAngle",
     "PointKind",
     "Pose",
     "Program",
     "Published",
+    "QuantityLimit",
+    "RadiusRatio",
+    "RateShare",
+    "Relations",
     "RobotState",
     "Rotation",
     "ScrewsynthError",
     "Search",
     "Sense",
     "Sensitivity",
+    "SmallestSingularValue",
     "Solution",
     "Start",
     "StartStatus",

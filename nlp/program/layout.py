@@ -18,7 +18,7 @@ trajectory or a grid follow from it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,7 +28,6 @@ from casadi import SX
 
 from ...models import (
     Dimension,
-    FloatArray,
     Parameter,
     RobotInstance,
     Substitution,
@@ -41,7 +40,7 @@ from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
 from ..case.pose import Free, Pose, Step, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
-from .buildable import distinct, limits_of
+from .limits import ProgramNumbers, limit_constraints
 from .places import FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
@@ -133,8 +132,11 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         ]
     constraints = _varying(case, constraints, table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
-    limits, met = (
-        _limits(case, robots, table, dict(zip(case.scalars, numbers, strict=True))) if case.limits else ([], [])
+    limits = limit_constraints(
+        case,
+        robots,
+        dict(zip(case.scalars, numbers, strict=True)),
+        ProgramNumbers(table.variables_vector, table.arguments_vector, table.bounds, table.values),
     )
     places = Places(
         numbers=(
@@ -151,7 +153,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
             for x, y, z in [placed.places]
         ),
     )
-    return Layout(case, table, places, tuple(robots), (*constraints, *limits), tuple(met))
+    return Layout(case, table, places, tuple(robots), (*constraints, *limits.varying), limits.constant)
 
 
 def _pose_marks(case: Case) -> list[str]:
@@ -166,31 +168,6 @@ def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
         return rotation, position
     Q, t = SX(step.rotation.tolist()), SX(step.translation.tolist())
     return Q @ rotation, Q @ position + t
-
-
-def _limits(
-    case: Case, robots: Sequence[RobotInstance], table: SymbolTable, numbers: Mapping[str, SX]
-) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
-    """The case's limits: those that the variables can change or that do not hold, and those that hold anyway."""
-    x, p = table.variables_vector, table.arguments_vector
-    limits = limits_of(case, robots, numbers)
-    limits = distinct(limits, x, p, table.values, _somewhere(table.bounds))
-    expressions = ca.vertcat(*[item.constraint.expression for item in limits])
-    free = ca.which_depends(expressions, x, 1, True) if len(table.x) else [False] * len(limits)
-    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(_somewhere(table.bounds)[0], table.values)
-    varying: list[BoundedConstraint] = []
-    met: list[BoundedConstraint] = []
-    for item, varies, value in zip(limits, free, values.full().ravel(), strict=True):
-        holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
-        (met if holds and not varies else varying).append(item)
-    return varying, met
-
-
-def _somewhere(bounds: Sequence[Free]) -> FloatArray:
-    """(3, n) points of the box that no symmetry singles out."""
-    parts = np.modf(np.outer(np.arange(1, 4), np.sqrt(2.0 + np.arange(len(bounds)))))[0]
-    lower, upper = np.array([[bound.lower, bound.upper] for bound in bounds]).reshape(-1, 2).T
-    return np.asarray(lower + (0.1 + 0.8 * parts) * (upper - lower), dtype=np.float64)
 
 
 def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:

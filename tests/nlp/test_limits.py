@@ -21,8 +21,23 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from screwsynth.models import Model, hexapod, stewart_gough, three_upu
-from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
-from screwsynth.nlp.case.limits.limits import Cone, Interval, Limits
+from screwsynth.nlp import (
+    BaseJointAngle,
+    Case,
+    CaseError,
+    Free,
+    JointSpacing,
+    LegClearance,
+    LegLength,
+    Limits,
+    QuantityLimit,
+    Relations,
+    Solution,
+    Status,
+    Task,
+    case_from_tables,
+    result_of,
+)
 from screwsynth.nlp.case.limits.segments import squared_distance
 from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eigenvalue
 from screwsynth.nlp.case.settings import Search
@@ -320,15 +335,41 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
     parameters = {item.name: item.typical for item in bare.parameters}
     common: dict[str, Any] = {"model": bare, "parameters": parameters, "position": [Free(-9, 9), 0, 35]}
     task = Task.screw("max", axis=[1, 2, 3], point=[0, 0, 9], pitch=1)
-    for limits in (Limits(leg_clearance=1.0), Limits(joint_spacing=1.0), Limits(base_joint_angle=Cone(1.0))):
+    for limit in (LegClearance(1.0), JointSpacing(1.0), BaseJointAngle(1.0)):
         with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
-            Case(**common, tasks=[task], limits=limits)
+            Case(**common, tasks=[task], limits=Limits(limit))
     with pytest.raises(CaseError, match=r"tolerance\.joint_centre"):
         Case(**common, tasks=[task], joint_centre_tolerance=0.1)
-    limited = Case(**common, tasks=[task], limits=Limits(quantities={"leg_length": Interval(max=37.0)}))
-    solution = solved(limited)
-    assert solution.state is not None
-    assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+    for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
+        limited = Case(**common, tasks=[task], limits=Limits(limit))
+        solution = solved(limited)
+        assert solution.state is not None
+        assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+
+
+def test_limits_in_python_are_those_of_a_file() -> None:
+    written = case_with(
+        {
+            "custom": ["x1 - 2*x2 >= 0", "cos(x3) <= 0.95"],
+            "leg_clearance": {"min": 2},
+            "leg_length": {"max": 45},
+            "base_joint_angle": {"max": 20, "about": [0, 0, 1]},
+        }
+    ).limits
+    built = Limits(
+        Relations("x1 - 2*x2 >= 0", "cos(x3) <= 0.95"),
+        BaseJointAngle(math.radians(20), about=((0.0, 0.0, 1.0),)),
+        LegClearance(2.0),
+        LegLength(max=45.0),
+    )
+    assert built == written
+    assert [limit.name for limit in built] == ["leg_length", "base_joint_angle", "leg_clearance", "custom"]
+    assert len(built) == 4
+    assert built.of(LegClearance) == LegClearance(2.0)
+    assert built.of(JointSpacing) is None
+    assert not Limits()
+    with pytest.raises(CaseError, match=r"limits\.leg_length: is given more than once"):
+        Limits(LegLength(max=45.0), LegLength(min=20.0))
 
 
 def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
@@ -413,7 +454,7 @@ def test_a_starter_case_with_its_limits_is_solved_from_every_start(model: Model)
         r"^# (\[limits\]|leg_length|base_joint_angle|leg_clearance)", r"\1", starter_case(model), flags=re.MULTILINE
     )
     case = case_with({}, text)
-    assert case.limits.leg_clearance
+    assert case.limits.of(LegClearance)
     solution = solved(case, starts=16)
     assert solution.status is Status.OPTIMAL
     assert all(start.status is StartStatus.CONVERGED for start in solution.starts)

@@ -13,6 +13,7 @@ from screwsynth.nlp import Nlp, PointKind, examine, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.evidence.linalg import nonnegative_least_squares, plain_basis
+from screwsynth.nlp.program.places import Places
 from screwsynth.nlp.program.program import Program, Scalar
 
 
@@ -32,8 +33,9 @@ def program_of(
         p=SX.sym("unused"),
         objective=objective,
         constraints=tuple(Constraint(name, g, Reading(Dimension.NUMBER)) for name, g, _, _ in rows),
-        robot=donor.program.robot,
+        robots=donor.program.robots,
         model=donor.program.model,
+        places=Places((), (), (), ()),
     )
     nlp = Nlp(
         program=program,
