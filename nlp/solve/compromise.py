@@ -29,8 +29,10 @@ from ..case.case import Case
 from ..case.task import Method, Sense, Task
 from ..evidence.kkt import FEASIBLE, correct, linearise
 from ..evidence.optimality import PointKind, examine
-from ..program.formulation import formulate_weighted, formulate_worst, near
+from ..program.epigraph import formulate_worst, level_of_tasks
+from ..program.formulation import formulate_weighted, with_proximity_term
 from ..program.nlp import Nlp
+from ..program.places import FreeRotation
 from .multistart import SAME_VALUE, ProgramSolution, Status, state_or_none
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
@@ -153,7 +155,7 @@ def _solve_combined(
     if case.method is Method.WEIGHTED_SUM:
         return solve_one(case.method.value, formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
-    levels = [_level(case, nlps, weights, best, x) for x in first]
+    levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
     # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
@@ -162,20 +164,6 @@ def _solve_combined(
     bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
     starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
     return solve_one(case.method.value, nlp, starts)
-
-
-def _level(case: Case, nlps: Sequence[Nlp], weights: Sequence[float], best: Sequence[float], x: FloatArray) -> float:
-    """Return the level of :func:`formulate_worst` that a point keeps."""
-    values = [nlp.evaluate(x)[0] for nlp in nlps]
-    senses = {task.sense for task in case.tasks}
-    if senses == {Sense.MAX}:
-        return min(F / w for F, w in zip(values, weights, strict=True))
-    if senses == {Sense.MIN}:
-        return max(w * F for F, w in zip(values, weights, strict=True))
-    return max(
-        w * (b - F if task.sense is Sense.MAX else F - b)
-        for F, w, b, task in zip(values, weights, best, case.tasks, strict=True)
-    )
 
 
 class _Members(NamedTuple):
@@ -246,7 +234,7 @@ def _nearest_member(
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]
     for weight in _DISTANCE_WEIGHTS:
-        found = polish(near(nlp, target, weight), first=points)
+        found = polish(with_proximity_term(nlp, target, weight), first=points)
         points = [found.x]
         for start in found.starts:
             back = correct(nlp, start.x, linearise(nlp, start.x).active())
@@ -260,13 +248,14 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
     """Return ``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
     shares = np.array(weights) / len(weights)
     Q = shares @ np.array(points)
-    for triple in nlp.program.directions:
+    for triple in nlp.program.places.directions:
         size = float(np.linalg.norm(Q[list(triple)]))
         if size > 0:
             Q[list(triple)] /= size
-    names = [variable.name for variable in nlp.program.variables]
-    for at in (names.index(f"{prefix}q_x") for prefix in nlp.case.pose_prefixes if f"{prefix}q_x" in names):
-        Q[at : at + 3] = _mean_rotation([point[at : at + 3] for point in points], shares)
+    for rotation in nlp.program.places.rotations:
+        if isinstance(rotation, FreeRotation):
+            q = list(rotation.q)
+            Q[q] = _mean_rotation([point[q] for point in points], shares)
     return np.asarray(Q, dtype=np.float64)
 
 

@@ -223,8 +223,7 @@ def motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
 def _posture(nlp: Nlp, x: FloatArray, state: RobotState) -> tuple[Linkage, Posture]:
     model = nlp.program.model
     parameters = np.array([value for item in model.parameters for value in state.parameters[item.name]])
-    first = "at1_" if len(nlp.program.robots) > 1 else ""
-    unknowns = np.array([x[nlp.program.index(f"{first}{item.name}")] for item in model.unknowns])
+    unknowns = x[list(nlp.program.places.unknowns[0])]
     linkage = Linkage(model, parameters, nlp.case.characteristic_length)
     return linkage, linkage.at(state.rotation, state.position, unknowns)
 

@@ -9,16 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE
+from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
 
-#: The variable that a program over its worst pose has beside those of the robot.
-LEVEL = "level"
 #: Points along a line, and along each side of a plane: odd, so that the middle is one.
 _LINE, _PLANE = 121, 41
 #: A component of a unit vector whose others are smaller than this has no direction to move in.
@@ -101,13 +98,14 @@ def has_loops(nlp: Nlp) -> bool:
 
 def _movable(nlp: Nlp) -> list[int]:
     """Indices of the variables but the worst pose's level, which follows from the others."""
-    return [k for k, variable in enumerate(nlp.program.variables) if variable.name != LEVEL]
+    epigraph = nlp.program.places.epigraph
+    return [k for k in range(nlp.n) if epigraph is None or k != epigraph.level]
 
 
 def _range(nlp: Nlp, k: int, count: int, x: FloatArray) -> FloatArray:
     """Values from bound to bound, the point's own among them."""
     lower, upper = nlp.lower[k], nlp.upper[k]
-    if any(k in direction for direction in nlp.program.directions):
+    if any(k in direction for direction in nlp.program.places.directions):
         lower, upper = max(lower, -1.0), min(upper, 1.0)
     return np.unique(np.append(np.linspace(lower, upper, count), np.clip(x[k], lower, upper)))
 
@@ -116,7 +114,7 @@ def _moved(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) 
     """(n, k) points with some variables replaced, unit vectors kept at unit length; nan where that cannot be."""
     points = np.repeat(x[:, None], values.shape[1], axis=1)
     points[list(changed)] = values
-    for direction in nlp.program.directions:
+    for direction in nlp.program.places.directions:
         moved = [k for k in direction if k in changed]
         rest = [k for k in direction if k not in changed]
         if not moved:
@@ -134,11 +132,9 @@ def _moved(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) 
 
 def _values(nlp: Nlp, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """F (k,) at points (n, k), and whether every limit is kept there (k,)."""
-    level = [k for k, variable in enumerate(nlp.program.variables) if variable.name == LEVEL]
-    if level and len(nlp.program.robots) > 1:
-        extreme = ca.mmin if nlp.sense is Sense.MAX else ca.mmax
-        worst = extreme(ca.vertcat(*[robot.F[0] for robot in nlp.program.robots]))
-        points[level] = ca.Function("worst", [nlp.program.x, nlp.program.p], [worst])(points, nlp.arguments).full()
+    epigraph = nlp.program.places.epigraph
+    if epigraph is not None and len(nlp.program.robots) > 1:
+        points[epigraph.level] = exact_levels(nlp, points)
     F, g = (each.full() for each in nlp.program.values(points, nlp.arguments))
     size = np.maximum(1.0, np.maximum(np.abs(_finite(nlp.g_lower)), np.abs(_finite(nlp.g_upper))))
     with np.errstate(invalid="ignore"):
