@@ -30,9 +30,10 @@ from ..case.task import Method, Sense, Task
 from ..evidence.kkt import FEASIBLE, correct, linearise
 from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
-from ..program.formulation import formulate_weighted, with_proximity_term
+from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation
+from ..program.program import Program
 from .multistart import SAME_VALUE, ProgramSolution, Status, state_or_none
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
@@ -185,12 +186,13 @@ def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish:
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
+    extended = proximity_program(nlps[0].program)  # one program serves all tasks: they differ by their numbers
     for _ in range(_ROUNDS if notices else 0):
         following = list(points)
         for j in range(len(own)):
             if not unique[j]:
                 target = np.mean([point for k, point in enumerate(points) if k != j], axis=0)
-                following[j] = _nearest_member(nlps[j], own[j], members[j], target, polish)
+                following[j] = _nearest_member(nlps[j], own[j], members[j], target, extended, polish)
         moved = max(float(np.max(np.abs(a - b) / nlps[0].scale)) for a, b in zip(following, points, strict=True))
         points = following
         if moved <= _STILL:
@@ -221,7 +223,12 @@ def _known_members(solution: ProgramSolution) -> list[FloatArray]:
 
 
 def _nearest_member(
-    nlp: Nlp, solution: ProgramSolution, members: Sequence[FloatArray], target: FloatArray, polish: Polish
+    nlp: Nlp,
+    solution: ProgramSolution,
+    members: Sequence[FloatArray],
+    target: FloatArray,
+    extended: Program,
+    polish: Polish,
 ) -> FloatArray:
     """Return the member of a task's optimal set nearest to a point (n,), as far as the known members lead to it."""
 
@@ -234,7 +241,7 @@ def _nearest_member(
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]
     for weight in _DISTANCE_WEIGHTS:
-        found = polish(with_proximity_term(nlp, target, weight), first=points)
+        found = polish(with_proximity_term(nlp, extended, target, weight), first=points)
         points = [found.x]
         for start in found.starts:
             back = correct(nlp, start.x, linearise(nlp, start.x).active())
