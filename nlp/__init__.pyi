@@ -33,9 +33,10 @@ from .case.settings import Search as Search
 from .case.task import Method as Method
 from .case.task import Sense as Sense
 from .case.task import Task as Task
-from .certificate.branchandbound import certify as certify
+from .certificate.branchandbound import certify_program as certify_program
 from .certificate.certificate import Certificate as Certificate
 from .certificate.certificate import CertificateStatus as CertificateStatus
+from .embedding.codegen import generate_c as generate_c
 from .errors import CaseError as CaseError
 from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
@@ -55,89 +56,27 @@ from .evidence.state import RobotState as RobotState
 from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
+from .output.pictures.plot import plot as plot
+from .output.report.html import report as report
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
 from .results.data import result_of as result_of
-from .solve.compromise import Compromise as Compromise
-from .solve.compromise import TaskOutcome as TaskOutcome
-from .solve.compromise import solve_tasks as solve_tasks
-from .solve.ipopt import Start as Start
-from .solve.ipopt import StartStatus as StartStatus
+from .results.regression import CaseCheck as CaseCheck
+from .results.regression import check as check
+from .solve.certified import Certified as Certified
+from .solve.certified import certify as certify
 from .solve.multistart import Optimum as Optimum
-from .solve.multistart import Solution as Solution
+from .solve.multistart import ProgramSolution as ProgramSolution
 from .solve.multistart import Status as Status
-from .solve.multistart import solve as solve
+from .solve.multistart import solve_program as solve_program
+from .solve.solution import Combination as Combination
+from .solve.solution import Solution as Solution
+from .solve.solution import TaskOutcome as TaskOutcome
+from .solve.solve import solve as solve
+from .solve.solver import Solver as Solver
+from .solve.solver import SolverResult as SolverResult
+from .solve.solver import StopReason as StopReason
+from .solve.starts import Start as Start
+from .solve.starts import StartStatus as StartStatus
 from .units import Units as Units
-
-__all__ = [
-    "ActiveSide",
-    "Actuator",
-    "BaseJointAngle",
-    "Case",
-    "CaseError",
-    "Certificate",
-    "CertificateStatus",
-    "Compromise",
-    "ConditionNumber",
-    "EvaluationError",
-    "Evidence",
-    "Expectation",
-    "Footprint",
-    "Free",
-    "InputError",
-    "JointSpacing",
-    "LegClearance",
-    "LegLength",
-    "Limits",
-    "Margin",
-    "Method",
-    "MountingPose",
-    "Nlp",
-    "Optimum",
-    "OverPoses",
-    "PlatformJointAngle",
-    "PointKind",
-    "Pose",
-    "Program",
-    "Published",
-    "QuantityLimit",
-    "RadiusRatio",
-    "RateShare",
-    "Relations",
-    "RobotState",
-    "Rotation",
-    "ScrewsynthError",
-    "Search",
-    "Sense",
-    "Sensitivity",
-    "SmallestSingularValue",
-    "Solution",
-    "Start",
-    "StartStatus",
-    "Status",
-    "Step",
-    "Task",
-    "TaskAnalysis",
-    "TaskOutcome",
-    "ToleranceLoss",
-    "UncoveredError",
-    "Units",
-    "along_screw",
-    "analyse_tasks",
-    "build_model",
-    "case_from_tables",
-    "certify",
-    "evaluate",
-    "examine",
-    "formulate",
-    "load_case",
-    "margins_of",
-    "over_grid",
-    "result_of",
-    "sensitivities",
-    "shipped_cases",
-    "solve",
-    "solve_tasks",
-    "tolerance_loss",
-]

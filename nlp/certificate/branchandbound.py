@@ -68,7 +68,7 @@ class Recorder(Protocol):
         """
 
 
-def certify(
+def certify_program(
     nlp: Nlp,
     x: FloatArray | None = None,
     *,

@@ -24,7 +24,7 @@ from ..errors import CaseError, InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from ..solve.multistart import Status, solve_nlp
+from ..solve.multistart import Status, solve_program
 from .ctext import comment, identifier, integers, matrix, numbers, texts
 from .staged import Staged, stage
 
@@ -46,16 +46,17 @@ _TRIALS = 30
 #: Points of the self-test, and the seed that they are drawn with.
 _POINTS = 8
 _SEED = 1
+_NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 
 
-def generate_c(case: Case, source: str) -> dict[str, str]:
+def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """The files of a case's C folder.
 
     The task whose twist is the default is the case's first; the twist is a run-time argument like everything fixed.
 
     Args:
         case: the case.
-        source: text of its case file, which goes into the folder.
+        source: text of its case file, which goes into the folder as ``case.toml``.
 
     Returns:
         Text by file name.
@@ -97,7 +98,7 @@ def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
     prefix = identifier(case.name)
     size = len(prefix) + len("_CASADI_")
     functions = staged.all
-    solution = solve_nlp(nlp, case.search)
+    solution = solve_program(nlp, case.search)
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)

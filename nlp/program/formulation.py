@@ -26,6 +26,7 @@ from .epigraph import total_over_poses, worst_pose
 from .layout import lay_out
 from .nlp import Nlp
 from .places import Scalar
+from .program import Program
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
@@ -83,24 +84,29 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
     return assemble(layout, sum((symbol * F[j] for j, symbol in enumerate(symbols)), SX(0)), sense)
 
 
-def with_proximity_term(nlp: Nlp, target: FloatArray, strength: float) -> Nlp:
-    """Return a program whose objective also rewards nearness to a point.
+def proximity_program(program: Program) -> Program:
+    """Return a program whose objective also rewards nearness to a point; see :func:`with_proximity_term`."""
+    n = len(program.variables)
+    t, scale, cost = SX.sym("target", n), SX.sym("scale", n), SX.sym("cost")
+    return replace(
+        program,
+        objective=program.objective + cost * ca.sumsqr((program.x - t) / scale),
+        p=ca.vertcat(program.p, t, scale, cost),
+        arguments=(*program.arguments, *(Scalar(f"near{i}", Dimension.NUMBER) for i in range(2 * n + 1))),
+    )
+
+
+def with_proximity_term(nlp: Nlp, extended: Program, target: FloatArray, strength: float) -> Nlp:
+    """Put numbers into a program whose objective also rewards nearness to a point.
 
     Where the optima of the original form a set, the optimum of this program tends to the set's nearest point as the
     strength tends to zero (distances in half ranges).
 
     Args:
         nlp: the original.
+        extended: :func:`proximity_program` of the original's program, built once for all points and strengths.
         target: (n,) the point.
         strength: cost of a distance of 1, in parts of the objective's scale.
     """
-    program = nlp.program
-    t, scale, cost = SX.sym("target", nlp.n), SX.sym("scale", nlp.n), SX.sym("cost")
-    extended = replace(
-        program,
-        objective=program.objective + cost * ca.sumsqr((program.x - t) / scale),
-        p=ca.vertcat(program.p, t, scale, cost),
-        arguments=(*program.arguments, *(Scalar(f"near{i}", Dimension.NUMBER) for i in range(2 * nlp.n + 1))),
-    )
     values = [*nlp.arguments, *target, *nlp.scale, nlp.sign * strength * nlp.objective_scale]
     return replace(nlp, program=extended, arguments=frozen_vector(values))

@@ -24,9 +24,9 @@ from ..evidence.optimality import Evidence
 from ..evidence.principal_motions import analyse_tasks
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
-from ..solve.compromise import Compromise, TaskOutcome
-from ..solve.ipopt import StartStatus
-from ..solve.multistart import Solution
+from ..solve.multistart import ProgramSolution
+from ..solve.solution import Solution, TaskOutcome
+from ..solve.starts import StartStatus
 from ..units import Units
 from .design import NO_MARGINS, margins_in, relaxation_in, sensitivity_in
 
@@ -38,14 +38,18 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-def result_of(solution: Solution, task: int = 0, certificate: Certificate | None = None) -> dict[str, Any]:
-    """The whole result of a solve, ready for JSON.
+def result_of(found: Solution | Certified) -> dict[str, Any]:
+    """Return the whole result of a solve, with its certificates where there are any, ready for JSON."""
+    certified = None if isinstance(found, Solution) else found
+    solution = found if isinstance(found, Solution) else found.solution
+    certificates = () if certified is None else certified.tasks
+    if solution.combination is None:
+        return _result_of_task(solution.outcomes[0].own, 0, certificates[0] if certificates else None)
+    return _result_of_several(solution, certificates, None if certified is None else certified.combined)
 
-    Args:
-        solution: of one task.
-        task: index of that task in the case.
-        certificate: what is proved of it.
-    """
+
+def _result_of_task(solution: ProgramSolution, task: int, certificate: Certificate | None) -> dict[str, Any]:
+    """Return the result of the program of a task, by its index in the case."""
     case = solution.nlp.case
     answer = solution.status.is_answer
     state = solution.state
@@ -70,41 +74,38 @@ def result_of(solution: Solution, task: int = 0, certificate: Certificate | None
     }
 
 
-def compromise_of(
-    compromise: Compromise, certificates: Sequence[Certificate] = (), combined_certificate: Certificate | None = None
+def _result_of_several(
+    solution: Solution, certificates: Sequence[Certificate], combined_certificate: Certificate | None
 ) -> dict[str, Any]:
-    """The whole result of bringing several tasks together, ready for JSON.
-
-    Args:
-        compromise: the tasks brought together.
-        certificates: what is proved of each task by itself, where that was asked for.
-        combined_certificate: what is proved of the combined program.
-    """
-    case, outcomes = compromise.case, compromise.outcomes
-    state, combined = outcomes[0].state, compromise.combined
+    """Return the result of several tasks, with the certificates of each task and of the combined program."""
+    case, outcomes, combination = solution.case, solution.outcomes, solution.combination
+    if combination is None:
+        raise ValueError("the solution is that of one task")
+    state, combined = outcomes[0].state, combination.combined
     robot = {} if state is None else state_of(case, state)
     if state is not None:
-        robot |= poses_of(outcomes[0].own.nlp, compromise.x)
+        robot |= poses_of(outcomes[0].own.nlp, solution.x)
         # Where one program brought the tasks together, a limit has a cost: of that program's value.
-        nlp, x = (outcomes[0].own.nlp, compromise.x) if combined is None else (combined.nlp, combined.x)
-        robot |= margins_in(nlp, x, optimal=combined is not None and compromise.is_made)
+        nlp, x = (outcomes[0].own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
+        robot |= margins_in(nlp, x, optimal=combined is not None and solution.is_made)
     for of_a_task in ("task", "rates", "task_is_free"):
         robot.pop(of_a_task, None)
-    if not compromise.is_made:
+    if not solution.is_made:
         robot = {"reached": robot}
     return {
         **_head(case),
-        "status": compromise.status.value,
+        "status": solution.status.value,
         "tasks": [
-            result_of(outcome.own, j, certificates[j] if certificates else None) for j, outcome in enumerate(outcomes)
+            _result_of_task(outcome.own, j, certificates[j] if certificates else None)
+            for j, outcome in enumerate(outcomes)
         ],
         "combined": {
-            "method": compromise.method.value,
-            "value": compromise.value,
+            "method": combination.method.value,
+            "value": combination.value,
             **robot,
-            "tasks": [_outcome(outcome, answered=compromise.is_made) for outcome in outcomes],
-            "violated": list(compromise.violated),
-            "notices": list(compromise.notices),
+            "tasks": [_outcome(outcome, answered=solution.is_made) for outcome in outcomes],
+            "violated": list(combination.violated),
+            "notices": list(combination.notices),
             "optimality": None
             if combined is None or combined.evidence is None
             else _optimality(combined.nlp, combined.evidence),
@@ -112,7 +113,7 @@ def compromise_of(
             "certificate": None if combined_certificate is None else combined_certificate.as_data(),
         },
         "versions": versions(),
-        "seconds": compromise.seconds,
+        "seconds": solution.seconds,
     }
 
 
@@ -175,7 +176,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
     }
 
 
-def _objective(solution: Solution) -> float:
+def _objective(solution: ProgramSolution) -> float:
     """F of the solution; over several poses, their sum, mean or worst."""
     state, nlp = solution.state, solution.nlp
     return nlp.evaluate(solution.x)[0] if state is None or len(nlp.program.robots) > 1 else state.F
@@ -240,7 +241,7 @@ def _outcome(outcome: TaskOutcome, *, answered: bool) -> dict[str, Any]:
         "loss": _finite(loss),
         "relative_loss": _finite(loss / best) if best else None,
         "unique": outcome.unique,
-        "verdict": outcome.evidence.kind.value,
+        "verdict": None if outcome.evidence is None else outcome.evidence.kind.value,
         "rates": None if state is None else state.rates.tolist(),
     }
 
@@ -302,7 +303,7 @@ def versions() -> dict[str, str]:
     }
 
 
-def _reached(solution: Solution) -> dict[str, Any]:
+def _reached(solution: ProgramSolution) -> dict[str, Any]:
     nlp = solution.nlp
     return {"F": _finite(nlp.evaluate(solution.x)[0]), "violated": violations(nlp, solution.x)}
 
@@ -368,7 +369,7 @@ def _flat(direction: Mapping[str, float], dimensions: Mapping[str, Dimension], u
     return {name: rate / largest for name, rate in rates.items()}
 
 
-def _starts(solution: Solution) -> dict[str, Any]:
+def _starts(solution: ProgramSolution) -> dict[str, Any]:
     ended = Counter(start.status for start in solution.starts)
     return {
         "run": len(solution.starts),

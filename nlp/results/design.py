@@ -9,7 +9,7 @@ from ..evidence.margins import costs_of, margins_as_data, margins_of
 from ..evidence.sensitivity import sensitivities
 from ..evidence.tolerance import tolerance_loss
 from ..program.nlp import Nlp
-from ..solve.multistart import Solution
+from ..solve.multistart import ProgramSolution
 
 #: What stands in a result where the robot is not defined.
 NO_MARGINS: dict[str, Any] = {"margins": [], "limits": []}
@@ -21,7 +21,7 @@ def margins_in(nlp: Nlp, x: FloatArray, *, optimal: bool) -> dict[str, Any]:
     return {"margins": margins, "limits": costs_of(margins)}
 
 
-def relaxation_in(solution: Solution) -> list[dict[str, Any]]:
+def relaxation_in(solution: ProgramSolution) -> list[dict[str, Any]]:
     """The numbers of the case that must be moved for it to be feasible, all of these at once."""
     units = solution.nlp.case.units
     return [
@@ -35,7 +35,7 @@ def relaxation_in(solution: Solution) -> list[dict[str, Any]]:
     ]
 
 
-def sensitivity_in(solution: Solution) -> dict[str, Any]:
+def sensitivity_in(solution: ProgramSolution) -> dict[str, Any]:
     """What F owes to what is fixed, and what inexact joint centres may cost."""
     nlp, case = solution.nlp, solution.nlp.case
     rows = [

@@ -21,13 +21,13 @@ from typing import Any
 
 from ...models import component_names
 from ..case.case import Case
-from ..case.reader import load_case
+from ..case.reader import load_case, shipped_cases
 from ..case.settings import Published, Search
 from ..errors import CaseError, EvaluationError, InputError
 from ..program.formulation import formulate_each
-from ..solve.compromise import solve_tasks
-from ..solve.multistart import Status, solve, solve_nlp
-from .data import compromise_of, result_of
+from ..solve.multistart import Status, solve_program
+from ..solve.solve import solve
+from .data import result_of
 
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
 FLAT = 1e-5
@@ -91,6 +91,19 @@ class CaseCheck:
         return all(row.passed for row in self.expected) and all(row.passed for row in self.published)
 
 
+def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
+    """Solve cases and check their expected and published values; a case that others refer to is solved once.
+
+    Args:
+        names: paths of case files, or bare names of shipped cases; left out, all shipped cases.
+
+    Raises:
+        InputError: a case, or one that it refers to, cannot be read.
+    """
+    solved: dict[str, dict[str, Any]] = {}
+    return [check_case(name, solved) for name in names or shipped_cases()]
+
+
 def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> CaseCheck:
     """Solve a case and check it.
 
@@ -118,7 +131,7 @@ def _solved(name: str, solved: dict[str, dict[str, Any]], case: Case | None = No
     """Result of a case by name, solved once; the case itself, where it is read already."""
     if name not in solved:
         case = case or load_case(name)
-        solved[name] = compromise_of(solve_tasks(case)) if len(case.tasks) > 1 else result_of(solve(case))
+        solved[name] = result_of(solve(case))
     return solved[name]
 
 
@@ -242,7 +255,7 @@ def _objectives(case: Case) -> list[tuple[float, float]]:
     """Best F of each task over what is still free, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):
-        solution = solve_nlp(nlp, Search(starts=_STARTS))
+        solution = solve_program(nlp, Search(starts=_STARTS))
         if solution.state is None or not solution.status.is_answer:
             raise EvaluationError(f"no optimum: {solution.status.value}")
         values.append((solution.F, solution.state.size))

@@ -1,6 +1,6 @@
 """Several tasks for one robot: equation 15, the best weighted sum, and the best worst task.
 
-Every task is first solved by itself. Then they are brought together:
+Every task is first solved by itself. Then the tasks are combined:
 
 * ``average`` (equation 15): ``Q = (1/n) sum_j w_j q_j`` of the tasks' own optima ``q_j``. As printed this is a mean
   only when the weights sum to ``n``; they are scaled so, with a notice. Lengths and angles average linearly, a rotation
@@ -8,192 +8,134 @@ Every task is first solved by itself. Then they are brought together:
   to hold there, because they are convex.
 * ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
 
-Each way says what it costs: every task's F, rates and verdict at the combined point, its loss against its own optimum,
+Each method states its cost: every task's F, rates and verdict at the combined point, its loss against its own optimum,
 and every limit that is violated.
 
-Where a task's optimum is not unique, its ``q_j`` is arbitrary. It is then settled by the rule *nearest to the others*:
-the member of the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once,
-again and again until none moves: the order of the tasks means nothing.
+Where a task's optimum is not unique, its ``q_j`` is arbitrary. The rule is then *nearest to the others*: the member of
+the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once, repeated until
+no point moves, so that the order of the tasks means nothing.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
-from ..case.settings import Search
 from ..case.task import Method, Sense, Task
-from ..errors import CaseError
 from ..evidence.kkt import FEASIBLE, correct, linearise
-from ..evidence.optimality import Evidence, PointKind, examine
-from ..evidence.state import RobotState
+from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
-from ..program.formulation import formulate_each, formulate_weighted, with_proximity_term
+from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation
-from .ipopt import StartStatus
-from .multistart import SAME_VALUE, Progress, Solution, Status, solve_nlp, state_or_none
+from ..program.program import Program
+from .multistart import SAME_VALUE, ProgramSolution, Status, state_or_none
+from .solution import Combination, Solution, TaskOutcome
+from .starts import StartStatus
 
-#: How strongly an optimum that is not isolated is drawn to the other tasks', in parts of F's scale, weaker and weaker:
-#: the point tends to the nearest of the optimal set, and the correction that follows takes the rest off.
-_DRAWN = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-#: Rounds of settling, and the movement in half ranges that ends it.
+#: Weights of the distance to the other tasks' points, in parts of F's scale, smaller and smaller, with which the
+#: nearest member of an optimal set is searched for: the point tends to that member, and the correction that follows
+#: removes the rest.
+_DISTANCE_WEIGHTS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+#: Most rounds of choosing members, and the movement in half ranges that ends them.
 _ROUNDS = 20
-_SETTLED = 1e-9
+_STILL = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class TaskOutcome:
-    """What a compromise means for one task.
+class SolveOne(Protocol):
+    """A solve of one program, with the settings of the whole solve."""
 
-    Attributes:
-        task: the task, its weight as used.
-        own: what the task could have by itself.
-        unique: whether its own optimum is the only one.
-        x: (n,) the member of its optimal set that was used.
-        state: the robot at the combined point, with this task's rates; None where it does not exist. At the first
-            pose, where there are several.
-        F: the task's objective at the combined point; NaN where it does not exist.
-        evidence: what the combined point is for this task alone.
-        loss: how much worse its F is than its own optimum; negative where the combined search came upon a better one.
-    """
-
-    task: Task
-    own: Solution
-    unique: bool
-    x: FloatArray
-    state: RobotState | None
-    F: float
-    evidence: Evidence
-    loss: float
+    def __call__(self, name: str, nlp: Nlp, first: Sequence[FloatArray] = ()) -> ProgramSolution:
+        """Solve a program, shown by a name, from points (n,) and from sampled ones."""
+        ...
 
 
-@dataclass(frozen=True, eq=False)
-class Compromise:
-    """Several tasks brought together.
+class Polish(Protocol):
+    """A search of one program that starts close to its solution."""
 
-    Attributes:
-        status: how it ended; ``averaged`` is the average where it keeps every limit.
-        method: how they were brought together.
-        case: the case.
-        x: (n,) the combined point, in the variables of a single task's program.
-        value: of the combined objective: the weighted sum, or the level that every task keeps; None for an average.
-        outcomes: one for each task.
-        violated: names of the limits that the combined point lies outside of.
-        notices: what the user should know of the way there.
-        combined: the solution of the combined program; None for an average.
-        seconds: wall time.
-    """
-
-    status: Status
-    method: Method
-    case: Case
-    x: FloatArray
-    value: float | None
-    outcomes: tuple[TaskOutcome, ...]
-    violated: tuple[str, ...]
-    notices: tuple[str, ...]
-    combined: Solution | None
-    seconds: float
-
-    @property
-    def is_made(self) -> bool:
-        """Whether the point is what the method yields, be it within the limits or not."""
-        alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
-        return alone and (self.combined is None or self.combined.status.is_answer)
+    def __call__(self, nlp: Nlp, *, first: Sequence[FloatArray]) -> ProgramSolution:
+        """Solve a program from points (n,) and few others."""
+        ...
 
 
-TaskProgress = Callable[[str, int, int, float | None], None]
+def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
+    """Return the solution of a case whose only task is solved."""
+    F = own.nlp.evaluate(own.x)[0]
+    outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0)
+    return Solution(case, own.status, own.x, (outcome,), None, own.seconds)
 
 
-def solve_tasks(
-    case: Case,
-    *,
-    starts: int | None = None,
-    seed: int | None = None,
-    jobs: int | None = None,
-    compiled: bool = False,
-    progress: TaskProgress | None = None,
-) -> Compromise:
-    """Solve a case with several tasks by the method that it names.
+def combine(
+    case: Case, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], solve_one: SolveOne, polish: Polish
+) -> Solution:
+    """Combine several tasks, each solved by itself, by the method that the case names.
 
     Args:
         case: a case with at least two tasks and something free.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
-        jobs: number of threads.
-        compiled: whether Ipopt calls the objective as compiled C.
-        progress: called with what is being solved, the starts done, all starts, and the best objective so far.
+        nlps: the program of each task.
+        own: the solution of each task's program.
+        solve_one: solves the combined program.
+        polish: searches for the nearest member of an optimal set.
 
-    Raises:
-        CaseError: the case has one task only, nothing is free, or it contradicts itself.
+    Returns:
+        The solution, with no seconds yet.
     """
-    began = time.perf_counter()
-    search = case.search.but(starts, seed, compiled=compiled)
-    nlps = formulate_each(case)
-    if len(nlps) < 2:
-        raise CaseError("task", "is one: several are needed to bring them together", source=case.source)
-    if nlps[0].n == 0:
-        raise CaseError("robot", "has nothing free, so there is nothing to bring together", source=case.source)
-
-    def told(what: str) -> Progress | None:
-        return None if progress is None else lambda done, total, best: progress(what, done, total, best)
-
-    own = [
-        solve_nlp(nlp, search, jobs=jobs, progress=told(task.name)) for nlp, task in zip(nlps, case.tasks, strict=True)
-    ]
-    weights, notices = _weights(case)
-    points, unique, told_of = _settled(nlps, own, search)
-    notices += told_of
-    combined: Solution | None = None
+    weights, scaling_notices = _scaled_weights(case)
+    points, unique, notices = _choose_members(nlps, own, polish)
+    notices = [*scaling_notices, *notices]
+    combined: ProgramSolution | None = None
     if not all(solution.status.is_answer for solution in own):
         x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
         notices.append("a task has no optimum by itself, so there is nothing to bring together")
     elif case.method is Method.AVERAGE:
         x, status, value = _average(nlps[0], points, weights), Status.AVERAGED, None
     else:
-        combined = _combined(case, nlps, own, points, weights, search, jobs, told(case.method.value))
+        combined = _solve_combined(case, nlps, own, points, weights, solve_one)
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
     at = linearise(nlps[0], x)
     violated = tuple(dict.fromkeys(at.sides[j].name for j in np.flatnonzero(at.slack < -FEASIBLE)))
     if violated and status.is_answer:
         status = Status.INFEASIBLE
-    return Compromise(
-        status=status,
-        method=case.method,
+    return Solution(
         case=case,
+        status=status,
         x=frozen_array(x, (nlps[0].n,)),
-        value=value,
         outcomes=tuple(
             _outcome(nlp, replace(task, weight=weight), solution, alone, point, x)
             for nlp, task, weight, solution, alone, point in zip(
                 nlps, case.tasks, weights, own, unique, points, strict=True
             )
         ),
-        violated=violated,
-        notices=tuple(notices),
-        combined=combined,
-        seconds=time.perf_counter() - began,
+        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined),
+        seconds=0.0,
     )
 
 
-def _weights(case: Case) -> tuple[list[float], list[str]]:
-    """Weights that sum to the number of tasks, as equation 15 needs them."""
+class _Weights(NamedTuple):
+    values: list[float]
+    notices: list[str]
+
+
+def _scaled_weights(case: Case) -> _Weights:
+    """Return weights that sum to the number of tasks, as equation 15 needs them."""
     given = [task.weight for task in case.tasks]
     total, n = sum(given), len(given)
     if abs(total - n) <= 1e-12 * n:
-        return given, []
+        return _Weights(given, [])
     scaled = [weight * n / total for weight in given]
     shown = ", ".join(f"{weight:g}" for weight in scaled)
-    return scaled, [f"the weights sum to {total:g} and were scaled to sum to {n}, the number of tasks: {shown}"]
+    return _Weights(
+        scaled, [f"the weights sum to {total:g} and were scaled to sum to {n}, the number of tasks: {shown}"]
+    )
 
 
-def _outcome(nlp: Nlp, task: Task, own: Solution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
+def _outcome(nlp: Nlp, task: Task, own: ProgramSolution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
+    """Return the outcome of a task at the combined point (n,)."""
     state = state_or_none(nlp, x)
     F = float("nan") if state is None else nlp.evaluate(x)[0]
     best = nlp.evaluate(own.x)[0]
@@ -201,20 +143,18 @@ def _outcome(nlp: Nlp, task: Task, own: Solution, unique: bool, point: FloatArra
     return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss)
 
 
-def _combined(
+def _solve_combined(
     case: Case,
     nlps: Sequence[Nlp],
-    own: Sequence[Solution],
+    own: Sequence[ProgramSolution],
     points: Sequence[FloatArray],
     weights: Sequence[float],
-    search: Search,
-    jobs: int | None,
-    progress: Progress | None,
-) -> Solution:
-    """The combined program solved, from the tasks' own optima, their average, and the search's starts."""
+    solve_one: SolveOne,
+) -> ProgramSolution:
+    """Solve the combined program from the tasks' own optima, their average, and the search's starts."""
     first = [*points, _average(nlps[0], points, weights)]
     if case.method is Method.WEIGHTED_SUM:
-        return solve_nlp(formulate_weighted(case, weights), search, first=first, jobs=jobs, progress=progress)
+        return solve_one(case.method.value, formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
     levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
     # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
@@ -224,41 +164,54 @@ def _combined(
     nlp = formulate_worst(case, weights, best, max(ceiling, floor))
     bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
     starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
-    return solve_nlp(nlp, search, first=starts, jobs=jobs, progress=progress)
+    return solve_one(case.method.value, nlp, starts)
 
 
-def _settled(
-    nlps: Sequence[Nlp], own: Sequence[Solution], search: Search
-) -> tuple[list[FloatArray], list[bool], list[str]]:
+class _Members(NamedTuple):
     """A point of each task's optimal set, whether it is the only one, and notices about those that are not."""
+
+    points: list[FloatArray]
+    unique: list[bool]
+    notices: list[str]
+
+
+def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish) -> _Members:
+    """Choose the point of each task's optimal set that is nearest to the other tasks' points."""
     points = [np.array(solution.x) for solution in own]
-    members = [_members(solution) for solution in own]
-    unique = [len(each) == 1 and not _is_set(solution) for each, solution in zip(members, own, strict=True)]
+    members = [_known_members(solution) for solution in own]
+    unique = [_is_unique(solution) for solution in own]
     notices = [
         f"the optimum of {solution.nlp.case.tasks[j].name!r} is not unique: "
         "the one nearest to the other tasks' optima was used"
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
+    extended = proximity_program(nlps[0].program)  # one program serves all tasks: they differ by their numbers
     for _ in range(_ROUNDS if notices else 0):
         following = list(points)
         for j in range(len(own)):
             if not unique[j]:
                 target = np.mean([point for k, point in enumerate(points) if k != j], axis=0)
-                following[j] = _nearest(nlps[j], own[j], members[j], target, search)
+                following[j] = _nearest_member(nlps[j], own[j], members[j], target, extended, polish)
         moved = max(float(np.max(np.abs(a - b) / nlps[0].scale)) for a, b in zip(following, points, strict=True))
         points = following
-        if moved <= _SETTLED:
+        if moved <= _STILL:
             break
-    return points, unique, notices
+    return _Members(points, unique, notices)
 
 
-def _is_set(solution: Solution) -> bool:
+def _is_set(solution: ProgramSolution) -> bool:
+    """Return whether the optimum may belong to a connected set of optima."""
     return solution.evidence is not None and solution.evidence.kind in (PointKind.NOT_ISOLATED, PointKind.UNDECIDED)
 
 
-def _members(solution: Solution) -> list[FloatArray]:
-    """Known members of a solution's optimal set: one of each isolated optimum, every start's point on a set of them."""
+def _is_unique(solution: ProgramSolution) -> bool:
+    """Return whether no other optimum with the same F is known."""
+    return len(_known_members(solution)) == 1 and not _is_set(solution)
+
+
+def _known_members(solution: ProgramSolution) -> list[FloatArray]:
+    """Return known members of an optimal set: one of each isolated optimum, every start's point on a connected set."""
     if not solution.optima:
         return [np.array(solution.x)]
     tolerance = SAME_VALUE * solution.nlp.objective_scale
@@ -269,10 +222,15 @@ def _members(solution: Solution) -> list[FloatArray]:
     return [optimum.x for optimum in solution.optima if abs(optimum.F - best) <= tolerance]
 
 
-def _nearest(
-    nlp: Nlp, solution: Solution, members: Sequence[FloatArray], target: FloatArray, search: Search
+def _nearest_member(
+    nlp: Nlp,
+    solution: ProgramSolution,
+    members: Sequence[FloatArray],
+    target: FloatArray,
+    extended: Program,
+    polish: Polish,
 ) -> FloatArray:
-    """The member of a task's optimal set nearest to a point, as far as it can be found from the known members."""
+    """Return the member of a task's optimal set nearest to a point (n,), as far as the known members lead to it."""
 
     def distance(x: FloatArray) -> float:
         return float(np.linalg.norm((x - target) / nlp.scale))
@@ -282,10 +240,10 @@ def _nearest(
         return closest
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]
-    for strength in _DRAWN:
-        drawn = solve_nlp(with_proximity_term(nlp, target, strength), replace(search, starts=1), first=points, jobs=1)
-        points = [drawn.x]
-        for start in drawn.starts:
+    for weight in _DISTANCE_WEIGHTS:
+        found = polish(with_proximity_term(nlp, extended, target, weight), first=points)
+        points = [found.x]
+        for start in found.starts:
             back = correct(nlp, start.x, linearise(nlp, start.x).active())
             kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
             if kept and distance(back.x) < distance(closest):
@@ -294,7 +252,7 @@ def _nearest(
 
 
 def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -> FloatArray:
-    """``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
+    """Return ``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
     shares = np.array(weights) / len(weights)
     Q = shares @ np.array(points)
     for triple in nlp.program.places.directions:
@@ -309,7 +267,7 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
 
 
 def _mean_rotation(vectors: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
-    """Quaternion vector of the weighted chordal mean of rotations given by theirs.
+    """Return the quaternion vector (3,) of the weighted chordal mean of rotations given by theirs.
 
     The chordal mean of matrices is that of unit quaternions without their signs: the eigenvector of ``sum w q q'`` with
     the largest eigenvalue (F. L. Markley et al., *Averaging Quaternions*, J. Guidance 30 (2007)).

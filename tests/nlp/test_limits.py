@@ -43,8 +43,9 @@ from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eig
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.solve.ipopt import StartStatus
-from screwsynth.nlp.solve.multistart import solve_nlp
+from screwsynth.nlp.solve.compromise import solution_of_one_task
+from screwsynth.nlp.solve.multistart import solve_program
+from screwsynth.nlp.solve.starts import StartStatus
 
 Array = NDArray[np.float64]
 Run = Any
@@ -102,7 +103,8 @@ def case_with(limits: dict[str, Any], text: str = HEXAPOD) -> Case:
 
 
 def solved(case: Case, *first: Array, starts: int = 4) -> Solution:
-    return solve_nlp(formulate(case), Search(starts=1 if first else starts), first=first)
+    search = Search(starts=1 if first else starts)
+    return solution_of_one_task(case, solve_program(formulate(case), search, first=first))
 
 
 def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:

@@ -18,7 +18,8 @@ from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, 
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
-from screwsynth.nlp.solve.multistart import solve_nlp
+from screwsynth.nlp.solve.compromise import solution_of_one_task
+from screwsynth.nlp.solve.multistart import solve_program
 
 Array = NDArray[np.float64]
 Run = Any
@@ -45,7 +46,8 @@ def limited() -> Solution:
 
 
 def again(tables: dict[str, Any], near: Solution) -> Solution:
-    return solve_nlp(formulate(case_of(tables)), Search(starts=1), first=[near.x])
+    case = case_of(tables)
+    return solution_of_one_task(case, solve_program(formulate(case), Search(starts=1), first=[near.x]))
 
 
 def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:

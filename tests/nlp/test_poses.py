@@ -19,8 +19,6 @@ from screwsynth.nlp import Case, CaseError, PointKind, Status, case_from_tables,
 from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program.formulation import formulate_each
-from screwsynth.nlp.results.data import compromise_of
-from screwsynth.nlp.solve.compromise import solve_tasks
 
 Array = NDArray[np.float64]
 Run = Any
@@ -215,9 +213,10 @@ def test_several_tasks_over_several_poses_are_brought_together() -> None:
         + TASK.replace("SENSE", "max")
     )
     tables = tomllib.loads(text.replace("count = 3", 'count = 3\ntask = "drive"'))
-    compromise = solve_tasks(case_from_tables(tables, name="two", source="two.toml"))
+    compromise = solve(case_from_tables(tables, name="two", source="two.toml"))
     assert compromise.is_made
-    assert compromise.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
+    assert compromise.combination is not None
+    assert compromise.combination.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
     states = [evaluate(compromise.outcomes[0].own.nlp, compromise.x, k).F for k in range(3)]
     assert pytest.approx(np.mean(states), rel=1e-9) == compromise.outcomes[0].F
 
@@ -242,7 +241,7 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
         second = first.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
         text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + second + first
         tables = tomllib.loads(f"{text}\n[limits]\nleg_length = {{ max = {longest} }}\n")
-        result: dict[str, Any] = compromise_of(solve_tasks(case_from_tables(tables, name="two", source="two.toml")))
+        result: dict[str, Any] = result_of(solve(case_from_tables(tables, name="two", source="two.toml")))
         return result["combined"]
 
     (row,) = together(40.0)["limits"]

@@ -40,7 +40,6 @@ from screwsynth.nlp import (
     load_case,
     result_of,
     solve,
-    solve_tasks,
 )
 from screwsynth.nlp.evidence.kkt import assembled, linearise
 
@@ -114,10 +113,9 @@ def test_the_angle_bears_the_whole_multiplier_when_the_axis_is_a_coordinate_axis
 def test_multipliers_of_the_worst_case_share_out_one() -> None:
     case = load_case("paper-4.1-helical")
     other = Task.screw("max", axis=[0, 1, 0], point=[5, 0, 30], pitch=2, name="p_x")
-    found = solve_tasks(replace(case, tasks=[case.tasks[0], other], method=Method.WORST_CASE), starts=8)
-    assert found.combined is not None
-    assert found.combined.evidence is not None
-    shares = {s.name: s.multiplier for s in found.combined.evidence.active if s.name.startswith("task ")}
+    found = solve(replace(case, tasks=[case.tasks[0], other], method=Method.WORST_CASE), starts=8)
+    assert found.evidence is not None
+    shares = {s.name: s.multiplier for s in found.evidence.active if s.name.startswith("task ")}
     assert sum(shares.values()) == pytest.approx(1, abs=1e-9)
     # A task may be called like a variable without taking its place.
     assert all(name != "p_x" for name in shares)

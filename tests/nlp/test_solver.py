@@ -166,7 +166,7 @@ def test_a_limb_that_cannot_have_a_length_is_refused() -> None:
 
 def test_progress_is_told_after_every_start() -> None:
     seen: list[tuple[int, int]] = []
-    solve(load_case("paper-4.3"), starts=3, progress=lambda done, total, _best: seen.append((done, total)))
+    solve(load_case("paper-4.3"), starts=3, progress=lambda _name, done, total, _best: seen.append((done, total)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from ...case.task import Sense
-from ...solve.compromise import Compromise
-from ...solve.multistart import Solution, Status
+from ...solve.multistart import ProgramSolution, Status
+from ...solve.solution import Solution
 from .scene import Drawing, drawing_of
 
 
-def drawings_of(found: Solution | Compromise) -> list[Drawing]:
+def drawings_of(found: Solution) -> list[Drawing]:
     """The robot with its task, or at the combined point with each of several tasks; at the first of several poses.
 
     Raises:
         EvaluationError: the robot does not exist at the point reached.
     """
-    if isinstance(found, Solution):
-        said = _headline(found)
+    if found.combination is None:
+        said = _headline(found.outcomes[0].own)
         return [drawing_of(found.nlp, found.x, found.state, headline=said, is_answer=found.status.is_answer)]
+    method = found.combination.method.value
     drawings = []
     for task, outcome in enumerate(found.outcomes):
         if found.is_made:
-            said = f"{outcome.task.name}: F = {outcome.F:.7g}, {found.method.value} of {len(found.outcomes)} tasks"
+            said = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
         else:
             said = f"{found.status.value}: this is not what was asked for"
         drawing = drawing_of(
@@ -30,7 +31,7 @@ def drawings_of(found: Solution | Compromise) -> list[Drawing]:
     return drawings
 
 
-def _headline(solution: Solution) -> str:
+def _headline(solution: ProgramSolution) -> str:
     """What was found, in a line."""
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...solve.ipopt import StartStatus
-from ...solve.multistart import Solution
+from ...solve.multistart import ProgramSolution
+from ...solve.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
 from .markup import Markup, grid, joined, paragraphs, tag
 from .report import Part, Report
@@ -33,7 +33,7 @@ def optima(report: Report) -> Markup:
     return joined(parts)
 
 
-def _optima_of(solution: Solution) -> Iterator[Markup]:
+def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)

@@ -16,8 +16,8 @@ from ...case.case import Case
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
 from ...results.regression import CaseCheck, check_case
-from ...solve.compromise import Compromise
-from ...solve.multistart import Solution
+from ...solve.multistart import ProgramSolution
+from ...solve.solution import Solution
 from ..pictures.scene import drawing_of
 from .frames import view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
@@ -44,7 +44,7 @@ class Part:
     name: str
     nlp: Nlp
     x: FloatArray
-    solution: Solution
+    solution: ProgramSolution
     view: dict[str, Any] | None
     slices: tuple[Slice, ...]
     planes: tuple[Plane, ...]
@@ -69,7 +69,7 @@ class Report:
     text: str
     result: dict[str, Any]
     parts: tuple[Part, ...]
-    combined: Solution | None
+    combined: ProgramSolution | None
     check: CaseCheck | None
     is_answer: bool
 
@@ -82,11 +82,11 @@ class Report:
         }
 
 
-def report_of(name: str, text: str, solution: Solution | Compromise, result: dict[str, Any]) -> Report:
+def report_of(name: str, text: str, solution: Solution, result: dict[str, Any]) -> Report:
     """Everything that a page shows of a solved case.
 
     Args:
-        name: by which the case was read.
+        name: by which the case was read; without one, published values are left out.
         text: the case as it is written in its file.
         solution: the solve.
         result: the same as plain data, with its certificates.
@@ -94,21 +94,18 @@ def report_of(name: str, text: str, solution: Solution | Compromise, result: dic
     Raises:
         InputError: a case that this one's published numbers refer to cannot be read.
     """
-    if isinstance(solution, Compromise):
-        case, combined, is_answer = solution.case, solution.combined, solution.status.is_answer
-        parts = tuple(
-            _part(outcome.own.nlp, solution.x, outcome.state, outcome.own, j, len(solution.outcomes), is_answer)
-            for j, outcome in enumerate(solution.outcomes)
-        )
-    else:
-        case, combined, is_answer = solution.nlp.case, None, solution.status.is_answer
-        parts = (_part(solution.nlp, solution.x, solution.state, solution, 0, 1, is_answer),)
-    check = check_case(name, {name: result}) if case.published else None
+    case, is_answer = solution.case, solution.status.is_answer
+    combined = None if solution.combination is None else solution.combination.combined
+    parts = tuple(
+        _part(outcome.own.nlp, solution.x, outcome.state, outcome.own, j, len(solution.outcomes), is_answer)
+        for j, outcome in enumerate(solution.outcomes)
+    )
+    check = check_case(name, {name: result}) if case.published and name else None
     return Report(case, text, result, parts, combined, check, is_answer)
 
 
 def _part(
-    nlp: Nlp, x: FloatArray, state: RobotState | None, own: Solution, task: int, tasks: int, is_answer: bool
+    nlp: Nlp, x: FloatArray, state: RobotState | None, own: ProgramSolution, task: int, tasks: int, is_answer: bool
 ) -> Part:
     view = None
     if state is not None:

@@ -1,0 +1,32 @@
+"""Pictures of solutions and robots as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ....models import Model
+from ...solve.solution import Solution
+from ..files import check_target, write_bytes
+from .extras import check_picture
+from .gallery import drawings_of
+from .scene import drawing_of_model
+
+
+def plot(found: Solution | Model, file: str | Path) -> None:
+    """Draw a solution's robot with its tasks, or a robot at its typical values, into a file.
+
+    Args:
+        found: a solution, or a robot.
+        file: name that ends in ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises:
+        InputError: the ending is another one, Matplotlib is not installed, or the file cannot be written.
+        EvaluationError: the robot does not exist at the point reached, or at its typical values.
+    """
+    target = str(file)
+    check_picture(target)
+    check_target(target)
+    from .figures import ending_of, picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
+
+    drawings = [drawing_of_model(found)] if isinstance(found, Model) else drawings_of(found)
+    write_bytes(target, picture(drawings, ending_of(target)))
