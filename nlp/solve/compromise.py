@@ -29,7 +29,7 @@ from ..case.case import Case
 from ..case.settings import Search
 from ..case.task import Method, Sense, Task
 from ..errors import CaseError
-from ..evidence.kkt import FEASIBLE, correct, linearise
+from ..evidence.kkt import FEASIBLE, correct_point, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState
 from ..program.epigraph import formulate_worst, level_of_tasks
@@ -286,7 +286,7 @@ def _nearest(
         drawn = solve_nlp(with_proximity_term(nlp, target, strength), replace(search, starts=1), first=points, jobs=1)
         points = [drawn.x]
         for start in drawn.starts:
-            back = correct(nlp, start.x, linearise(nlp, start.x).active())
+            back = correct_point(nlp, start.x, linearise(nlp, start.x).active())
             kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
             if kept and distance(back.x) < distance(closest):
                 closest = back.x

@@ -21,7 +21,7 @@ from casadi import SX
 
 from ...models import FloatArray
 from ..case.settings import Search
-from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct, linearise, multipliers
+from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers
 from ..program.nlp import Nlp
 from .compiled import shared_library
 
@@ -189,7 +189,7 @@ def _judged(nlp: Nlp, found: dict[str, FloatArray], ipopt_status: str) -> Start:
     raw = at = linearise(nlp, stopped)
     stationarity = multipliers(at, at.active())[1]
     for share in _SHARES if np.isfinite(raw.violation) else ():
-        corrected = correct(nlp, stopped, _held(nlp, raw, found["lam_x"], found["lam_g"], share))
+        corrected = correct_point(nlp, stopped, _held(nlp, raw, found["lam_x"], found["lam_g"], share))
         left = multipliers(corrected, corrected.active())[1]
         # A correction that makes F worse has gone to another stationary point.
         kept = corrected.phi <= raw.phi + _IPOPT_TOLERANCE or raw.violation > FEASIBLE

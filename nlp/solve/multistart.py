@@ -18,7 +18,7 @@ from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from ..program.relaxation import Relaxed, elastic, relaxed_limits, stretched_point
+from ..program.relaxation import RelaxedLimit, formulate_relaxation, relaxation_point, relaxed_limits
 from ..program.sampling import starting_points
 from .ipopt import SAME_POINT, Start, StartStatus, search_from
 
@@ -93,7 +93,7 @@ class Solution:
     optima: tuple[Optimum, ...]
     seed: int
     seconds: float
-    relaxation: tuple[Relaxed, ...] = ()
+    relaxation: tuple[RelaxedLimit, ...] = ()
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name
@@ -161,8 +161,8 @@ def solve_nlp(
     limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
     if solution.status is not Status.INFEASIBLE or not limited:
         return solution
-    stretched = elastic(nlp)
-    points = [stretched_point(nlp, x) for x in (solution.x, nlp.start)]
+    stretched = formulate_relaxation(nlp)
+    points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
     relaxed = _searched(stretched, replace(search, starts=min(search.starts, _ELASTIC_STARTS)), first=points, jobs=jobs)
     # An optimum of relaxations is often degenerate, with more limits active than it takes; what counts is that it is
     # feasible.
