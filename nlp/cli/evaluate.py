@@ -23,7 +23,7 @@ def evaluate(
     """
     from ..case.reader import load_case
     from ..evidence import state
-    from ..evidence.kkt import assembled
+    from ..evidence.kkt import close_equations
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
     from ..results.data import evaluation_of
@@ -31,7 +31,7 @@ def evaluate(
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     check_target(json_file)
     nlps = formulate_each(loaded)
-    x = with_exact_level(nlps[0], assembled(nlps[0], nlps[0].start))
+    x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         write_json(json_file, result)

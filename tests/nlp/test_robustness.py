@@ -41,7 +41,7 @@ from screwsynth.nlp import (
     result_of,
     solve,
 )
-from screwsynth.nlp.evidence.kkt import assembled, linearise
+from screwsynth.nlp.evidence.kkt import close_equations, linearise
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -154,7 +154,7 @@ def looped(*, a: float) -> Case:
 
 def test_a_robot_is_assembled_before_it_is_evaluated() -> None:
     nlp = formulate(looped(a=2))
-    x = assembled(nlp, nlp.start)
+    x = close_equations(nlp, nlp.start)
     assert x[0] == pytest.approx(2, abs=1e-12)
     assert pytest.approx(4 / 5) == solve(looped(a=2), starts=2).F
 
@@ -164,7 +164,7 @@ def test_a_robot_that_cannot_be_assembled_is_infeasible() -> None:
     assert solution.status is Status.INFEASIBLE
     assert [side["name"] for side in result_of(solution)["reached"]["violated"]] == ["loop"]
     nlp = formulate(looped(a=12))
-    assert linearise(nlp, assembled(nlp, nlp.start)).violation > 0.1
+    assert linearise(nlp, close_equations(nlp, nlp.start)).violation > 0.1
 
 
 def test_evaluate_puts_free_directions_on_the_sphere(cli: Run) -> None:
