@@ -50,7 +50,8 @@ from .evidence.tolerance import tolerance_loss as tolerance_loss
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
-from .results.data import result_of as result_of
+from .results.jsondata import json_data as json_data
+from .results.solution import result_of as result_of
 from .solve.compromise import Compromise as Compromise
 from .solve.compromise import TaskOutcome as TaskOutcome
 from .solve.compromise import solve_tasks as solve_tasks
@@ -115,6 +116,7 @@ __all__ = [
     "evaluate",
     "examine",
     "formulate",
+    "json_data",
     "load_case",
     "margins_of",
     "over_grid",

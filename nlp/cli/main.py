@@ -15,7 +15,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from threading import Thread
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..output.pictures.scene import Drawing
+    from ..results.data import CaseResult
+    from ..results.jsondata import Data
     from ..solve.certified import Certified, CertifyOptions
     from ..solve.compromise import Compromise
     from ..solve.multistart import Solution
@@ -83,7 +85,6 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
-    from ..solve.compromise import Compromise
 
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
@@ -100,9 +101,10 @@ def solve(
 
         _write_picture(plot, drawings_of(solution))
     if json_file != "-":
-        from ..output.terminal import print_compromise, print_solution
+        from ..output.terminal import show
+        from ..results.summary import case_summary
 
-        (print_compromise if isinstance(solution, Compromise) else print_solution)(_console(), loaded, result)
+        show(_console(), case_summary(loaded, result))
     raise typer.Exit(0 if solution.status.is_answer and proved else 1)
 
 
@@ -131,11 +133,13 @@ def report(
     check_library("plotly", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
+    from ..results.regression import check_case
 
     solution, result, proved = _solved(loaded, jobs, certify=certify)
-    write_text(out, page_of(report_of(case, text, solution, result)))
+    check = check_case(case, {case: result}) if loaded.published else None
+    write_text(out, page_of(report_of(text, solution, result, check)))
     if out != "-":
-        typer.echo(f"{out}: {result['status']}")
+        typer.echo(f"{out}: {result.status.value}")
     raise typer.Exit(0 if solution.status.is_answer and proved else 1)
 
 
@@ -158,7 +162,7 @@ def certify(
     from ..case.reader import find_case, load_case
     from ..errors import InputError
     from ..output.files import write_text
-    from ..results.data import certified_of
+    from ..results.certified import certified_of
     from ..solve.certified import CertifyOptions, proof_of
 
     if not 1e-10 <= gap < 1:
@@ -181,9 +185,10 @@ def certify(
     if json_file is not None:
         _write_json(json_file, result)
     if "-" not in (json_file, proof):
-        from ..output.terminal import print_certified
+        from ..output.terminal import show
+        from ..results.summary import certified_summary
 
-        print_certified(_console(), loaded, result)
+        show(_console(), certified_summary(loaded, result))
     raise typer.Exit(0 if certified.is_proved else 1)
 
 
@@ -238,8 +243,9 @@ def check(
     """Hold cases to their expected and published values."""
     from ..case.reader import shipped_cases
     from ..errors import InputError
-    from ..output import checks as checkreport
+    from ..output.checks import checks_as_junit, checks_as_markdown
     from ..output.files import write_text
+    from ..results.checks import checks_of
     from ..results.regression import check_case
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
@@ -247,18 +253,19 @@ def check(
     for target in (json_file, junit):
         _check_target(target)
     gc.enable()
-    solved: dict[str, dict[str, Any]] = {}
+    solved: dict[str, CaseResult] = {}
     checks = [check_case(name, solved) for name in cases or shipped_cases()]
     if json_file is not None:
-        _write_json(json_file, checkreport.checks_as_data(checks))
+        _write_json(json_file, checks_of(checks))
     if junit is not None:
-        write_text(junit, checkreport.checks_as_junit(checks))
+        write_text(junit, checks_as_junit(checks))
     if markdown:
-        typer.echo(checkreport.checks_as_markdown(checks), nl=False)
+        typer.echo(checks_as_markdown(checks), nl=False)
     elif "-" not in (json_file, junit):
-        from ..output.terminal import print_checks
+        from ..output.terminal import show
+        from ..results.checkwording import checks_summary
 
-        print_checks(_console(), checks)
+        show(_console(), checks_summary(checks))
     raise typer.Exit(0 if all(each.passed for each in checks) else 1)
 
 
@@ -279,7 +286,7 @@ def evaluate(
     from ..evidence import state as evaluation
     from ..evidence.kkt import assembled
     from ..program.formulation import formulate_each, levelled
-    from ..results.data import evaluation_of
+    from ..results.evaluation import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
@@ -289,10 +296,11 @@ def evaluate(
     if json_file is not None:
         _write_json(json_file, result)
     if json_file != "-":
-        from ..output.terminal import print_state
+        from ..output.terminal import show
+        from ..results.summary import evaluation_summary
 
-        print_state(_console(), loaded, result)
-    raise typer.Exit(1 if result["violated"] else 0)
+        show(_console(), evaluation_summary(loaded, result))
+    raise typer.Exit(1 if result.violated else 0)
 
 
 @app.command()
@@ -330,13 +338,14 @@ def models(
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
-    from ..output.terminal import print_model, print_models
+    from ..output.terminal import show
+    from ..results.robotwording import model_words, models_table
 
     _check_picture(plot)
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")
-        print_models(_console(), [(each, _description(each)) for each in model_names()])
+        show(_console(), [models_table((each, _description(each)) for each in model_names())])
         return
     options = model_options(name)
     needed = [option for option, _, default in options if default is None]
@@ -348,15 +357,23 @@ def models(
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
         _write_picture(plot, [drawing_of_model(model)])
-    print_model(_console(), name, model, options)
+    show(_console(), model_words(name, model, options))
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
+) -> None:
     """Print the JSON Schema of case files, with which editors complete and check."""
-    from ..case.schema import Document
+    if result:
+        from ..results.schema import result_schema
 
-    typer.echo(json.dumps(Document.model_json_schema(), indent=2))
+        found: object = result_schema()
+    else:
+        from ..case.schema import Document
+
+        found = Document.model_json_schema()
+    typer.echo(json.dumps(found, indent=2))
 
 
 @app.command()
@@ -428,9 +445,10 @@ def _description(model: str) -> str:
         return error.fault
 
 
-def _solved(case: Case, jobs: int | None, *, certify: bool) -> tuple[Solution | Compromise, dict[str, Any], bool]:
-    """A case solved, its result as plain data, and whether what was to be proved is."""
-    from ..results.data import compromise_of, result_of
+def _solved(case: Case, jobs: int | None, *, certify: bool) -> tuple[Solution | Compromise, CaseResult, bool]:
+    """A case solved, its result, and whether what was to be proved is."""
+    from ..results.compromise import compromise_of
+    from ..results.solution import result_of
     from ..solve.compromise import Compromise
 
     if certify:
@@ -528,10 +546,11 @@ def _write_picture(target: str, drawings: Sequence[Drawing]) -> None:
     write_bytes(target, picture(drawings, ending_of(target)))
 
 
-def _write_json(target: str, result: dict[str, Any]) -> None:
+def _write_json(target: str, result: Data) -> None:
     from ..output.files import write_text
+    from ..results.jsondata import json_data
 
-    write_text(target, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
 
 
 def _console() -> Console:

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 from ...models import component_names
 from ..case.case import Case
@@ -26,8 +26,17 @@ from ..case.settings import Published, Search
 from ..errors import CaseError, EvaluationError, InputError
 from ..program.formulation import formulate_each
 from ..solve.compromise import solve_tasks
-from ..solve.multistart import Status, solve, solve_nlp
-from .data import compromise_of, result_of
+from ..solve.multistart import solve, solve_nlp
+from .compromise import compromise_of
+from .data import CaseResult, CombinedResult
+from .jsondata import JsonValue, json_data
+from .parts import RobotData
+from .solution import result_of
+
+#: A result as JSON's own types.
+JsonData: TypeAlias = dict[str, JsonValue]
+#: Numbers of a case by name, in its file's units.
+Settings: TypeAlias = dict[str, float | list[float]]
 
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
 FLAT = 1e-5
@@ -41,7 +50,7 @@ class ExpectedCheck:
 
     quantity: str
     expected: float | bool | str
-    computed: float | bool | str | None
+    computed: JsonValue
     tolerance: float
     passed: bool
 
@@ -91,7 +100,7 @@ class CaseCheck:
         return all(row.passed for row in self.expected) and all(row.passed for row in self.published)
 
 
-def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> CaseCheck:
+def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCheck:
     """Solve a case and check it.
 
     Args:
@@ -105,70 +114,78 @@ def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> Ca
     solved = {} if solved is None else solved
     case = load_case(name)
     result = _solved(name, solved, case)
+    data = json_data(result)
     return CaseCheck(
         name=case.name,
         title=case.title,
-        expected=tuple(_expected(case, result)),
-        published=tuple(_published(name, case, row, result, solved) for row in case.published),
+        expected=tuple(_expected(case, result, data)),
+        published=tuple(_published(name, case, row, result, data, solved) for row in case.published),
         seconds=time.perf_counter() - began,
     )
 
 
-def _solved(name: str, solved: dict[str, dict[str, Any]], case: Case | None = None) -> dict[str, Any]:
-    """Result of a case by name, solved once; the case itself, where it is read already."""
+def _solved(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
+    """Return the result of a case by name, solved once; the case itself, where it is read already."""
     if name not in solved:
         case = case or load_case(name)
         solved[name] = compromise_of(solve_tasks(case)) if len(case.tasks) > 1 else result_of(solve(case))
     return solved[name]
 
 
-def _expected(case: Case, result: Mapping[str, Any]) -> list[ExpectedCheck]:
+def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
     expect = case.expect
-    rows = [ExpectedCheck("status", "an answer", str(result["status"]), 0.0, _is_answer(result))]
+    rows = [ExpectedCheck("status", "an answer", result.status.value, 0.0, result.status.is_answer)]
     if expect.F is not None:
-        F = _lookup(result, "F")
-        off = math.inf if F is None else abs(float(F) - expect.F)
+        F = _number(data, "F")
+        off = math.inf if F is None else abs(F - expect.F)
         rows.append(ExpectedCheck("F", expect.F, F, expect.tolerance, off <= expect.tolerance * (abs(expect.F) or 1.0)))
     if expect.singular is not None:
-        singular = _lookup(result, "singular" if "F" in result else "combined.singular")
+        singular = _lookup(data, "singular" if "F" in data else "combined.singular")
         rows.append(ExpectedCheck("singular", expect.singular, singular, 0.0, singular == expect.singular))
     for row in expect.values:
-        value = _lookup(result, row.quantity)
+        value = _lookup(data, row.quantity)
         near = isinstance(value, float | int) and abs(value - row.value) <= row.within
         rows.append(ExpectedCheck(row.quantity, row.value, value, row.within, near))
     return rows
 
 
-def _is_answer(result: Mapping[str, Any]) -> bool:
-    return Status(result["status"]).is_answer
-
-
-def _lookup(result: Any, path: str) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    """What stands at a dotted path of a result, numbers meaning places in lists; None when nothing does."""
-    found = result
+def _lookup(data: JsonValue, path: str) -> JsonValue:
+    """Return what stands at a dotted path of JSON data, numbers being places in lists; None where nothing does."""
+    found = data
     for part in path.split("."):
-        if isinstance(found, Mapping):
+        if isinstance(found, dict):
             found = found.get(part)
-        elif isinstance(found, Sequence) and not isinstance(found, str) and part.isdigit() and int(part) < len(found):
+        elif isinstance(found, list) and part.isdigit() and int(part) < len(found):
             found = found[int(part)]
         else:
             return None
     return found
 
 
+def _number(data: JsonValue, path: str) -> float | None:
+    """Return the number at a dotted path of JSON data, or None where there is none."""
+    found = _lookup(data, path)
+    return float(found) if isinstance(found, float | int) else None
+
+
+def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
+    """Return the number, or the list of numbers, at a dotted path of JSON data; nothing where there is neither."""
+    found = _lookup(data, path)
+    parts = found if isinstance(found, list) else [found]
+    numbers = tuple(float(part) for part in parts if isinstance(part, float | int))
+    return numbers if len(numbers) == len(parts) else ()
+
+
 def _published(
-    name: str, case: Case, row: Published, result: Mapping[str, Any], solved: dict[str, dict[str, Any]]
+    name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
 ) -> PublishedCheck:
-    if row.over is not None:
-        over, F = _lookup(_solved(row.over, solved), "F"), _lookup(result, "F")
-        found = 100 * (F - over) / over if F is not None and over else None
+    if row.over is None:
+        computed = _numbers(data, row.quantity)
     else:
-        found = _lookup(result, row.quantity)
-    computed = tuple(float(each) for each in found) if isinstance(found, list) else ()
-    if isinstance(found, float | int):
-        computed = (float(found),)
-    if not _is_answer(result):
-        return PublishedCheck(row, (), False, f"the case has no answer: it is {result['status']}")
+        over, F = _number(json_data(_solved(row.over, solved)), "F"), _number(data, "F")
+        computed = (100 * (F - over) / over,) if F is not None and over else ()
+    if not result.status.is_answer:
+        return PublishedCheck(row, (), False, f"the case has no answer: it is {result.status.value}")
     if len(computed) != len(row.value):
         source = case.source or name
         fault = f"is no number of this result with {len(row.value)} components"
@@ -191,18 +208,18 @@ def decimals_of(value: float) -> int:
     return len(text.partition(".")[2])
 
 
-def _flat_difference(name: str, case: Case, row: Published, result: Mapping[str, Any]) -> float | None:
-    """Relative difference of F between the printed point and the best with this argument free.
+def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) -> float | None:
+    """Return the relative difference of F between the printed point and the best with this argument free.
 
     None when the number is no argument of F, or the printed point is no robot.
     """
-    printed: dict[str, Any] = {}
+    printed: Settings = {}
     for each in case.published:
         printed |= _setting(case, each.quantity, each.value)
-    own = _setting(case, row.quantity, row.value)
-    if not own:
+    own, robot = _setting(case, row.quantity, row.value), _robot(result)
+    if not own or robot is None:
         return None
-    settings = {**_own_settings(case, result), **printed}
+    settings = {**_own_settings(case, robot), **printed}
     try:
         at_printed = _objectives(load_case(name, settings))
         best = _objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
@@ -215,8 +232,8 @@ def _flat_difference(name: str, case: Case, row: Published, result: Mapping[str,
     return max(differences)
 
 
-def _setting(case: Case, quantity: str, value: Sequence[float]) -> dict[str, Any]:
-    """An argument of F as settings of the case; empty for anything else."""
+def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
+    """Return an argument of F as settings of the case; nothing for anything else."""
     path = quantity.removeprefix("combined.")
     if path == "pose.position":
         return dict(zip(component_names("p", 3), value, strict=True))
@@ -228,13 +245,21 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> dict[str, Any
     return {}
 
 
-def _own_settings(case: Case, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The computed point as settings of the case."""
-    point = result if "parameters" in result else result["combined"]
-    settings: dict[str, Any] = dict(point["parameters"])
-    settings |= dict(zip(component_names("p", 3), point["pose"]["position"], strict=True))
-    settings["angle"] = point["pose"]["angle"]
-    settings["axis"] = point["pose"]["axis"] if case.axis is None else case.axis.tolist()
+def _robot(result: CaseResult) -> RobotData | None:
+    """Return the robot of an answer, or None where its equations have no value."""
+    if isinstance(result, CombinedResult):
+        return None if result.combined.made is None else result.combined.made.robot
+    return result.robot
+
+
+def _own_settings(case: Case, robot: RobotData) -> Settings:
+    """Return the computed point as settings of the case."""
+    settings: Settings = {
+        name: list(value) if isinstance(value, tuple) else value for name, value in robot.parameters.items()
+    }
+    settings |= dict(zip(component_names("p", 3), robot.pose.position, strict=True))
+    settings["angle"] = robot.pose.angle
+    settings["axis"] = list(robot.pose.axis) if case.axis is None else case.axis.tolist()
     return settings
 
 

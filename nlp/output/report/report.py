@@ -15,7 +15,9 @@ from ....models import FloatArray
 from ...case.case import Case
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...results.regression import CaseCheck, check_case
+from ...results.data import CaseResult
+from ...results.jsondata import json_data
+from ...results.regression import CaseCheck
 from ...solve.compromise import Compromise
 from ...solve.multistart import Solution
 from ..pictures.scene import drawing_of
@@ -58,7 +60,7 @@ class Report:
     Attributes:
         case: the case.
         text: the case as it is written in its file.
-        result: as ``--json`` writes it.
+        result: of the solve.
         parts: one for each task.
         combined: the solution of the program that brings several tasks together, where there is one.
         check: published and expected numbers beside the computed; None where the case has none.
@@ -67,7 +69,7 @@ class Report:
 
     case: Case
     text: str
-    result: dict[str, Any]
+    result: CaseResult
     parts: tuple[Part, ...]
     combined: Solution | None
     check: CaseCheck | None
@@ -76,23 +78,20 @@ class Report:
     def as_data(self) -> dict[str, Any]:
         """What the page's script needs, ready for JSON."""
         return {
-            "result": self.result,
+            "result": json_data(self.result),
             "views": [part.view for part in self.parts if part.view is not None],
             "planes": [[_plane(part.nlp, part.x, plane) for plane in part.planes] for part in self.parts],
         }
 
 
-def report_of(name: str, text: str, solution: Solution | Compromise, result: dict[str, Any]) -> Report:
-    """Everything that a page shows of a solved case.
+def report_of(text: str, solution: Solution | Compromise, result: CaseResult, check: CaseCheck | None = None) -> Report:
+    """Return everything that a page shows of a solved case.
 
     Args:
-        name: by which the case was read.
         text: the case as it is written in its file.
         solution: the solve.
-        result: the same as plain data, with its certificates.
-
-    Raises:
-        InputError: a case that this one's published numbers refer to cannot be read.
+        result: of that solve, with its certificates.
+        check: published and expected numbers beside the computed; None where the case has none.
     """
     if isinstance(solution, Compromise):
         case, combined, is_answer = solution.case, solution.combined, solution.status.is_answer
@@ -103,7 +102,6 @@ def report_of(name: str, text: str, solution: Solution | Compromise, result: dic
     else:
         case, combined, is_answer = solution.nlp.case, None, solution.status.is_answer
         parts = (_part(solution.nlp, solution.x, solution.state, solution, 0, 1, is_answer),)
-    check = check_case(name, {name: result}) if case.published else None
     return Report(case, text, result, parts, combined, check, is_answer)
 
 
