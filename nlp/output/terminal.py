@@ -33,8 +33,11 @@ def _rendered(item: Line | TextTable) -> RenderableType:
 
 
 def _text(line: Line) -> Text:
+    style = _STYLES[line.tone]
+    if not (line.label or line.before or line.after):
+        return Text(line.text, style=style)
     label = [(f"{line.label}  ", _LABEL)] if line.label else []
-    return Text.assemble(*label, line.before, (line.text, _STYLES[line.tone]), line.after)
+    return Text.assemble(*label, line.before, (line.text, style), line.after)
 
 
 def _table(table: TextTable) -> Table:

@@ -39,7 +39,7 @@ class PublishedData(Data):
         computed: the computed number; empty where there is none.
         verdict: of the check.
         rule: that decided, with its figures.
-        passed: whether the case says what the check finds.
+        passed: whether the check confirms the case.
     """
 
     quantity: str
@@ -63,8 +63,8 @@ class CaseCheckData(Data):
         title: title of the case.
         passed: whether everything holds.
         seconds: wall time.
-        expected: what the case expects.
-        published: what the literature prints.
+        expected: numbers that the case expects.
+        published: numbers that the literature prints.
     """
 
     case: str

@@ -1,8 +1,8 @@
-"""Cases held to what they must compute, and to what the literature prints.
+"""Cases held to expected and to published values.
 
-Three kinds of value are kept apart: what this program **computes**, what it must compute (**expected**, with a
-tolerance of the case's own), and what the literature prints (**published**). A published number is *reproduced* by one
-of two rules, and no other:
+Three kinds of value are kept apart: those that this program **computes**, those that the case **expects**, with a
+tolerance of its own, and those that the literature prints (**published**). A published number is *reproduced* by one of
+two rules, and no other:
 
 * ``digits``: the computed number is within half a unit of the last printed digit, in every component;
 * ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
@@ -46,7 +46,7 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class ExpectedCheck:
-    """A computed number beside what it must be."""
+    """A computed number beside the one that the case expects."""
 
     quantity: str
     expected: float | bool | str
@@ -60,9 +60,9 @@ class PublishedCheck:
     """A published number beside the computed one.
 
     Attributes:
-        published: what is printed, and how the case marks it.
+        published: the printed number, and how the case marks it.
         computed: components of the computed number, empty when there is none.
-        reproduced: what the rules find.
+        reproduced: whether a rule finds it reproduced.
         rule: the rule that decided, with its figures.
     """
 
@@ -86,7 +86,7 @@ class PublishedCheck:
 
 @dataclass(frozen=True)
 class CaseCheck:
-    """A case's checks."""
+    """Checks of a case."""
 
     name: str
     title: str
@@ -150,7 +150,7 @@ def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCh
 
 
 def _lookup(data: JsonValue, path: str) -> JsonValue:
-    """Return what stands at a dotted path of JSON data, numbers being places in lists; None where nothing does."""
+    """Return the value at a dotted path of JSON data, numbers being places in lists; None where there is none."""
     found = data
     for part in path.split("."):
         if isinstance(found, dict):
@@ -201,7 +201,7 @@ def _published(
 
 
 def decimals_of(value: float) -> int:
-    """Digits behind the point of the shortest text of a number."""
+    """Return the number of digits behind the point of the shortest text of a number."""
     text = f"{value:.15g}"
     if "e" in text:
         return 15
@@ -264,7 +264,7 @@ def _own_settings(case: Case, robot: RobotData) -> Settings:
 
 
 def _objectives(case: Case) -> list[tuple[float, float]]:
-    """Best F of each task over what is still free, and its size without cancellation."""
+    """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):
         solution = solve_nlp(nlp, Search(starts=_STARTS))

@@ -240,7 +240,7 @@ def optimum_table(solution: Solution) -> TextTable:
 
 
 def origin_table(versions: VersionsData, search: Search, seconds: float) -> TextTable:
-    """Return what the numbers depend on."""
+    """Return versions, seed, starts and time: all that the numbers depend on."""
     rows = [(name, str(getattr(versions, name))) for name in versions.marks]
     rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
     return TextTable(("", ""), tuple(rows))

@@ -61,7 +61,7 @@ def motion_words(motion: MotionData, units: Units) -> str:
 
 
 def headline(result: SolveResult) -> Line:
-    """Return F, or the status of what is no answer."""
+    """Return F, or the status of a solve without an answer."""
     robot = result.robot
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
@@ -80,7 +80,7 @@ def headline(result: SolveResult) -> Line:
 
 
 def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
-    """Yield title, task, and what was found."""
+    """Yield title, task, and F or the status."""
     yield title_line(case)
     if result.robot is not None and result.robot.task is not None:
         yield task_line(result.robot.task, case.units)
@@ -88,7 +88,7 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
 
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:
-    """Yield the verdict about the point and the evidence for it, and what a failed solve violates."""
+    """Yield the verdict, the evidence for it, and the limits that a failed solve violates or would have to move."""
     evidence = result.optimality
     if evidence is not None:
         yield verdict_line(evidence)
@@ -174,7 +174,7 @@ def tolerance_line(lost: ToleranceData, F: float | None, units: Units) -> Line:
 
 
 def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
-    """Yield the proved statement, and what the proof took."""
+    """Yield the proved statement, the gap, and the size of the search."""
     if certificate is None:
         return
     tone = Tone.ANSWER if certificate.status is CertificateStatus.PROVED else Tone.NO_ANSWER
@@ -188,7 +188,7 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
 
 
 def combined_lines(result: CombinedResult) -> Iterator[Line]:
-    """Yield how the tasks were combined, and what is wrong with the combined point."""
+    """Yield how the tasks were combined, and the limits that the combined point violates."""
     combined, status = result.combined, result.status.value
     yield Line(f"{combined.method.value} ({status})", label="combined by")
     if combined.made is None:

@@ -1,4 +1,4 @@
-"""What was found around the answer, as HTML: other optima, slices and maps of F."""
+"""The surroundings of the answer as HTML: other optima, slices and maps of F."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .slices import Slice, has_loops
 
 
 def optima(report: Report) -> Markup:
-    """Distinct optima that the starts ended at: F against count, and where they lie."""
+    """Return the distinct optima that the starts ended at: F against count, and where they lie."""
     parts: list[Markup] = []
     solutions = [(part.name, part.solution) for part in report.parts]
     if report.combined is not None:
@@ -52,7 +52,7 @@ def _optima_of(solution: Solution) -> Iterator[Markup]:
 
 
 def around(report: Report) -> Markup:
-    """F along each variable through the answer, and over pairs of variables."""
+    """Return F along each variable through the answer, and over pairs of variables."""
     parts: list[Markup] = []
     with_maps = [k for k, part in enumerate(report.parts) if part.planes]
     if not any(part.slices for part in report.parts):

@@ -1,4 +1,4 @@
-"""How good the answer is, as HTML: evidence of optimality, certificates, published values."""
+"""Judgement of the answer as HTML: evidence of optimality, certificates, published values."""
 
 from __future__ import annotations
 

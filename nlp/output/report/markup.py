@@ -1,4 +1,4 @@
-"""HTML from Python values: whatever is not markup already is escaped, so nothing of a case can become any."""
+"""HTML from Python values: everything but markup is escaped, so that no text of a case becomes markup."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _VOID = frozenset(["meta", "link", "input", "br", "img"])
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
-    """An element.
+    """Return an element.
 
     Args:
         name: of the element.
@@ -42,7 +42,7 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
 
 
 def joined(content: Iterable[object]) -> Markup:
-    """Several pieces of content as one."""
+    """Return several pieces of content as one."""
     return Markup(
         "".join(part if isinstance(part, Markup) else escape(str(part)) for part in content if part is not None)
     )
@@ -81,7 +81,7 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
-    """JSON that can stand in a script element: no ``<`` is left, so nothing in it can end the element."""
+    """Return JSON that can stand in a script element: no ``<`` is left that could end the element."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")

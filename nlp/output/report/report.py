@@ -1,6 +1,6 @@
-"""What a report shows of a solved case: its result, its robot along the motion, and F beside the point found.
+"""Content of a report about a solved case: its result, its robot along the motion, and F beside the point found.
 
-A report of a solve that failed shows what was reached, and calls it that.
+A report of a solve that failed shows the point reached, and calls it that.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Part:
         name: of the task.
         nlp: its program.
         x: (n,) the point.
-        solution: what the task has by itself.
+        solution: of the task by itself.
         view: the robot there, for the 3-D view; None where it does not exist.
         slices: F along each variable.
         planes: F over pairs of variables.
@@ -55,7 +55,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Everything that a page shows.
+    """Content of a page.
 
     Attributes:
         case: the case.
@@ -64,7 +64,7 @@ class Report:
         parts: one for each task.
         combined: the solution of the program that brings several tasks together, where there is one.
         check: published and expected numbers beside the computed; None where the case has none.
-        is_answer: whether the point is what was asked for.
+        is_answer: whether the point is an answer.
     """
 
     case: Case
@@ -76,7 +76,7 @@ class Report:
     is_answer: bool
 
     def as_data(self) -> dict[str, Any]:
-        """What the page's script needs, ready for JSON."""
+        """Return the data of the page's script, as JSON's own types."""
         return {
             "result": json_data(self.result),
             "views": [part.view for part in self.parts if part.view is not None],
@@ -85,7 +85,7 @@ class Report:
 
 
 def report_of(text: str, solution: Solution | Compromise, result: CaseResult, check: CaseCheck | None = None) -> Report:
-    """Return everything that a page shows of a solved case.
+    """Return the content of a page about a solved case; nothing is solved here.
 
     Args:
         text: the case as it is written in its file.
@@ -128,7 +128,7 @@ def _part(
 
 
 def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
-    """A map in the case's units, rounded to what a picture shows."""
+    """Return a map in the case's units, rounded to a picture's precision."""
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 
@@ -148,7 +148,7 @@ def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
 
 
 def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
-    """What a map shows, in a sentence."""
+    """Return a map in words."""
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...case.case import Case
+from ...case.pose import sizes_of_turn
 from ...results.data import CombinedResult, SolveResult
 from ...results.parts import LimitData, MarginData
 from ...results.point import motion_data
@@ -35,7 +36,7 @@ from .slices import LEVEL
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Every section that has something to show: its anchor, its heading and its content."""
+    """Return every section that has something to show: its anchor, its heading and its content."""
     found = [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", _robot(report)),
@@ -52,7 +53,7 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
 
 
 def answer(report: Report) -> Markup:
-    """What was found, at the top of the page; what is no answer is said to be none."""
+    """Return the answer, for the top of the page, or the sentence that there is none."""
     result = report.result
     if isinstance(result, SolveResult):
         lines = [headline(result).words]
@@ -82,7 +83,8 @@ def _case(report: Report) -> Markup:
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
-        if any(name.endswith("q_x") for name in names):
+        turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
+        if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
             lines.append("q is the vector part of the unit quaternion that turns the platform.")
     else:
         lines.append("Nothing is free: the robot is evaluated where it stands.")
@@ -168,7 +170,7 @@ def _legend(view: dict[str, Any]) -> Markup:
 
 
 def _rates(view: dict[str, Any]) -> Markup:
-    """Rates of every row at the drawn posture; the script keeps it in step with the platform."""
+    """Return the rates of every row at the drawn posture; the script keeps the table in step with the platform."""
     frame = view["frames"][view["zero"]]
     # Where the task's motion is resisted by nothing, what is left is rounding.
     rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
