@@ -61,9 +61,10 @@ from .output.report.html import report as report
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
-from .results.data import result_of as result_of
+from .results.jsondata import json_data as json_data
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
+from .results.result import result_of as result_of
 from .solve.certified import Certified as Certified
 from .solve.certified import certify as certify
 from .solve.multistart import Optimum as Optimum

@@ -26,7 +26,7 @@ def evaluate(
     from ..evidence.kkt import close_equations
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
-    from ..results.data import evaluation_of
+    from ..results.evaluation import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     check_target(json_file)
@@ -36,10 +36,11 @@ def evaluate(
     if json_file is not None:
         write_json(json_file, result)
     if json_file != "-":
-        from ..output.terminal import print_state
+        from ..output.terminal import show
+        from ..results.summary import evaluation_summary
 
-        print_state(console(), loaded, result)
-    raise typer.Exit(1 if result["violated"] else 0)
+        show(console(), evaluation_summary(loaded, result))
+    raise typer.Exit(1 if result.violated else 0)
 
 
 def _setting(text: str) -> tuple[str, float | list[float]]:

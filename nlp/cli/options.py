@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from ..results.jsondata import Data
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -46,15 +48,16 @@ def check_picture(target: str | None) -> None:
         check_target(target)
 
 
-def write_json(target: str, result: dict[str, Any]) -> None:
+def write_json(target: str, result: Data) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
         InputError: it cannot be written.
     """
     from ..output.files import write_text
+    from ..results.jsondata import json_data
 
-    write_text(target, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
 
 
 def console() -> Console:

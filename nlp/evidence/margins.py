@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -159,52 +159,3 @@ def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values
                 states[each.pose] = evaluate(nlp, x, each.pose)
             measured[k] = each.measure(states[each.pose].jacobian, states[each.pose].position)
     return measured
-
-
-def margins_as_data(nlp: Nlp, margins: Sequence[Margin]) -> list[dict[str, Any]]:
-    """Margins in the case's units, ready for JSON."""
-    units = nlp.case.units
-    return [
-        {
-            "name": row.name,
-            "key": row.key,
-            "bound": row.bound,
-            "value": _finite(units.shown(row.value, row.dimension)),
-            "limit": units.shown(row.limit, row.dimension),
-            "margin": _finite(units.shown(row.margin, row.dimension)),
-            "unit": units.label(row.dimension),
-            "active": row.active,
-            "cost": None if row.cost is None else row.cost * units.to_internal(1.0, row.dimension),
-        }
-        for row in margins
-    ]
-
-
-def costs_of(margins: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row for each number in the case: its least margin, where it is active, and what it costs in all.
-
-    Args:
-        margins: as :func:`margins_as_data` gives them.
-    """
-    rows = []
-    for key in dict.fromkeys(row["key"] for row in margins):
-        own = [row for row in margins if row["key"] == key]
-        least = min(own, key=lambda row: float("-inf") if row["margin"] is None else row["margin"])
-        costs = [row["cost"] for row in own if row["cost"] is not None]
-        rows.append(
-            {
-                "key": key,
-                "limit": least["limit"],
-                "unit": least["unit"],
-                "nearest": least["name"],
-                "value": least["value"],
-                "margin": least["margin"],
-                "active": [row["name"] for row in own if row["active"]],
-                "cost": sum(costs) if costs else None,
-            }
-        )
-    return rows
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

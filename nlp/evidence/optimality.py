@@ -17,10 +17,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
-from ...models import FloatArray, frozen_array
+from ...models import Dimension, FloatArray, frozen_array
 from ..case.task import Sense
 from ..program.nlp import Nlp
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
@@ -71,12 +72,14 @@ class ActiveSide:
         bound: ``min``, ``max`` or ``equal``.
         value: the limit, radians for angles.
         multiplier: improvement of F per unit by which the limit is relaxed, in the same unit.
+        dimension: what the limit measures.
     """
 
     name: str
-    bound: str
+    bound: Literal["min", "max", "equal"]
     value: float
     multiplier: float
+    dimension: Dimension
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +152,10 @@ def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
     multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
     if side.constraint is not None:
         reading = nlp.program.constraints[side.constraint].reading
-        return ActiveSide(side.name, side.bound, reading.from_value(limit), multiplier * reading.slope(limit))
-    return ActiveSide(side.name, side.bound, limit, multiplier)
+        value, slope = reading.from_value(limit), reading.slope(limit)
+        return ActiveSide(side.name, side.bound, value, multiplier * slope, reading.dimension)
+    dimension = nlp.program.variables[side.variable or 0].dimension
+    return ActiveSide(side.name, side.bound, limit, multiplier, dimension)
 
 
 def _second_order_test(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[PointKind, FloatArray, list[FloatArray]]:

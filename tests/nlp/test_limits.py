@@ -36,6 +36,7 @@ from screwsynth.nlp import (
     Status,
     Task,
     case_from_tables,
+    json_data,
     result_of,
 )
 from screwsynth.nlp.case.limits.segments import squared_distance
@@ -187,7 +188,7 @@ def test_limits_hold_and_margins_are_what_numpy_measures(name: str) -> None:
     limits = SETS[name]
     solution = solved(case_with(limits))
     assert solution.status is Status.OPTIMAL
-    result = result_of(solution)
+    result = json_data(result_of(solution))
     found = measured(result, limits, limits.get("home"))
     assert result["limits"]
     for row in result["limits"]:
@@ -202,7 +203,7 @@ def test_limits_hold_and_margins_are_what_numpy_measures(name: str) -> None:
 def test_what_a_limit_costs_is_what_moving_it_does(name: str) -> None:
     case = case_with(SETS[name])
     solution = solved(case)
-    for row in result_of(solution)["limits"]:
+    for row in json_data(result_of(solution))["limits"]:
         key = row["key"]
         if not row["active"] or key.startswith("custom"):
             continue
@@ -229,7 +230,7 @@ def with_number(limits: dict[str, Any], key: str, number: float) -> dict[str, An
 
 def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
     solution = solved(case_with({"custom": ["x1 - 2*x2 >= 0"]}))
-    (row,) = result_of(solution)["limits"]
+    (row,) = json_data(result_of(solution))["limits"]
     assert row["active"]
     ends = [solved(case_with({"custom": [f"x1 - 2*x2 >= {h}"]}), solution.x).F for h in (-1e-3, 1e-3)]
     assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
@@ -238,7 +239,7 @@ def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
 
 def test_a_custom_equation_costs_what_moving_its_right_hand_side_does() -> None:
     solution = solved(case_with({"custom": ["x1 == 2*x2"], "leg_length": {"max": 45}}))
-    row = next(row for row in result_of(solution)["margins"] if row["key"] == "custom[0]")
+    row = next(row for row in json_data(result_of(solution))["margins"] if row["key"] == "custom[0]")
     assert row["bound"] == "equal"
     assert row["active"]
     ends = [
@@ -269,13 +270,13 @@ def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
 
 
 def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
-    degrees = result_of(solved(case_with({"base_joint_angle": 12})))
+    degrees = json_data(result_of(solved(case_with({"base_joint_angle": 12}))))
     text = HEXAPOD.replace('length = "cm"', 'length = "cm"\nangle = "rad"')
     for degree in (2, 28, 30):
         for sign in ("= ", "= -"):
             text = text.replace(f"{sign}{degree},", f"{sign}{math.radians(degree)},")
             text = text.replace(f"{sign}{degree} }}", f"{sign}{math.radians(degree)} }}")
-    radians = result_of(solved(case_with({"base_joint_angle": math.radians(12)}, text)))
+    radians = json_data(result_of(solved(case_with({"base_joint_angle": math.radians(12)}, text))))
     assert radians["F"] == pytest.approx(degrees["F"], rel=1e-9)
     assert radians["limits"][0]["unit"] == "rad"
     assert radians["limits"][0]["cost"] == pytest.approx(math.degrees(degrees["limits"][0]["cost"]), rel=1e-6)
@@ -308,7 +309,7 @@ def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
         "rate_share": {"max": 0.6},
         "smallest_singular_value": {"min": 0.015, "length": 30},
     }
-    result = result_of(solved(case_with(limits, THREE_UPU), starts=16))
+    result = json_data(result_of(solved(case_with(limits, THREE_UPU), starts=16)))
     assert result["status"] == "optimal"
     radii = {plate: result["parameters"][f"{plate}_radius"] for plate in ("base", "platform")}
     corners = np.array([[math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0] for k in range(3)])
@@ -376,7 +377,7 @@ def test_limits_in_python_are_those_of_a_file() -> None:
 
 def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
     text = HEXAPOD.replace("x1 = { min = 8, max = 16 }", "x1 = 12").replace("x3 = { min = 2, max = 28 }", "x3 = 20")
-    result = result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text)))
+    result = json_data(result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text))))
     row = next(row for row in result["limits"] if row["key"] == "footprint.base")
     assert (row["cost"], row["active"]) == (0.0, [])
     assert row["margin"] == pytest.approx(1, rel=1e-9)

@@ -37,6 +37,7 @@ from screwsynth.nlp import (
     Task,
     examine,
     formulate,
+    json_data,
     load_case,
     result_of,
     solve,
@@ -106,7 +107,7 @@ def test_the_angle_bears_the_whole_multiplier_when_the_axis_is_a_coordinate_axis
     slope = (solve(turned_case(10.01), starts=4).F - solve(turned_case(9.99), starts=4).F) / math.radians(0.02)
     assert solution.evidence.active[0].multiplier == pytest.approx(slope, rel=1e-4)
     # In JSON it is per degree.
-    (side,) = result_of(solution)["optimality"]["active"]
+    (side,) = json_data(result_of(solution))["optimality"]["active"]
     assert side["value"] == pytest.approx(10)
 
 
@@ -162,7 +163,7 @@ def test_a_robot_is_assembled_before_it_is_evaluated() -> None:
 def test_a_robot_that_cannot_be_assembled_is_infeasible() -> None:
     solution = solve(looped(a=12), starts=3)
     assert solution.status is Status.INFEASIBLE
-    assert [side["name"] for side in result_of(solution)["reached"]["violated"]] == ["loop"]
+    assert [side["name"] for side in json_data(result_of(solution))["reached"]["violated"]] == ["loop"]
     nlp = formulate(looped(a=12))
     assert linearise(nlp, close_equations(nlp, nlp.start)).violation > 0.1
 
