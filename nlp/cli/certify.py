@@ -29,7 +29,7 @@ def certify(
     from ..errors import InputError
     from ..output.files import read_text, write_text
     from ..results.certified import certified_of
-    from ..solve.certified import CertifyOptions, OptionError, proof_of
+    from ..solver.certified import CertifyOptions, OptionError, proof_of
 
     try:
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case

@@ -11,7 +11,7 @@ from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
 if TYPE_CHECKING:
-    from ..solve.certified import Certified
+    from ..solver.certified import Certified
 
 
 class CertifiedTaskData(Data):

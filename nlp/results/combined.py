@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ..certificate.certificate import Certificate
-from ..solve.solution import Combination, Solution, TaskOutcome
+from ..solver.solution import Combination, Solution, TaskOutcome
 from .data import CombinedData, CombinedPointData, CombinedResult, OutcomeData
 from .design import limits_data, margins_data
 from .evidence import certificate_data, optimality_data

@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 from ..case.task import Method, Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
-from ..solve.multistart import Status
+from ..solver.multistart import Status
 from .jsondata import Absent, Data, Inline, Size, Vector
 from .parts import (
     Bound,

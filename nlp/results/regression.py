@@ -25,8 +25,8 @@ from ..case.reader import load_case, shipped_cases
 from ..case.settings import Published, Search
 from ..errors import CaseError, EvaluationError, InputError
 from ..program.formulation import formulate_each
-from ..solve.multistart import solve_program
-from ..solve.solve import solve
+from ..solver.multistart import solve_program
+from ..solver.solve import solve
 from .data import CaseResult, CombinedResult
 from .jsondata import JsonValue, json_data
 from .parts import RobotData

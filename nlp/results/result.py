@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..solve.solution import Solution
+from ..solver.solution import Solution
 from .combined import combined_result
 from .data import CaseResult
 from .solution import task_result
 
 if TYPE_CHECKING:
-    from ..solve.certified import Certified
+    from ..solver.certified import Certified
 
 
 def result_of(found: Solution | Certified) -> CaseResult:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from ..certificate.certificate import Certificate
-from ..solve.multistart import ProgramSolution
-from ..solve.starts import StartStatus
+from ..solver.multistart import ProgramSolution
+from ..solver.starts import StartStatus
 from .data import OptimumData, ReachedData, SolveResult, StartsData
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data

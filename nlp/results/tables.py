@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..case.settings import Search
-    from ..solve.multistart import ProgramSolution
+    from ..solver.multistart import ProgramSolution
     from .data import ActiveData, CombinedData, OptimalityData, SolveResult
     from .evaluation import PrincipalMotionsData
     from .parts import LimitData, MarginData, PosesData, RobotData, SensitivityData, VersionsData

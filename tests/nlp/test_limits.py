@@ -44,9 +44,9 @@ from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eig
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.solve.compromise import solution_of_one_task
-from screwsynth.nlp.solve.multistart import solve_program
-from screwsynth.nlp.solve.starts import StartStatus
+from screwsynth.nlp.solver.compromise import solution_of_one_task
+from screwsynth.nlp.solver.multistart import solve_program
+from screwsynth.nlp.solver.starts import StartStatus
 
 Array = NDArray[np.float64]
 Run = Any

@@ -18,8 +18,8 @@ from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, 
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
-from screwsynth.nlp.solve.compromise import solution_of_one_task
-from screwsynth.nlp.solve.multistart import solve_program
+from screwsynth.nlp.solver.compromise import solution_of_one_task
+from screwsynth.nlp.solver.multistart import solve_program
 
 Array = NDArray[np.float64]
 Run = Any

@@ -28,7 +28,7 @@ from screwsynth.nlp.output.report.frames import RATES
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
 from screwsynth.nlp.output.report.webpage import page_of
-from screwsynth.nlp.solve import solve as solve_module
+from screwsynth.nlp.solver import solve as solve_module
 
 Run = Callable[..., tuple[int, str, str]]
 

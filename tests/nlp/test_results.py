@@ -24,7 +24,7 @@ from screwsynth.nlp.results.regression import check_case
 from screwsynth.nlp.results.schema import RESULTS, result_schema
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
-from screwsynth.nlp.solve import ipopt, multistart
+from screwsynth.nlp.solver import ipopt, multistart
 
 Run = Callable[..., tuple[int, str, str]]
 Json = dict[str, Any]

@@ -15,7 +15,7 @@ from ...errors import EvaluationError
 from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...solve.multistart import state_or_none
+from ...solver.multistart import state_or_none
 from .posture import Linkage, Posture
 
 #: A path around the axis: at most so many turns, over at most this part of the axis, at this part of the robot's size.

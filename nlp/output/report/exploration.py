@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...results.tables import MOST_OPTIMA, optimum_table
-from ...solve.multistart import ProgramSolution
-from ...solve.starts import StartStatus
+from ...solver.multistart import ProgramSolution
+from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
 from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Part, Report

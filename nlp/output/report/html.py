@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...results.regression import CaseCheck
 from ...results.result import result_of
-from ...solve.certified import Certified
-from ...solve.solution import Solution
+from ...solver.certified import Certified
+from ...solver.solution import Solution
 from ..pictures.extras import check_library
 from .report import report_of
 from .webpage import page_of

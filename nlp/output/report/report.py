@@ -18,8 +18,8 @@ from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
-from ...solve.multistart import ProgramSolution
-from ...solve.solution import Solution
+from ...solver.multistart import ProgramSolution
+from ...solver.solution import Solution
 from ..pictures.scene import drawing_of
 from .frames import view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of

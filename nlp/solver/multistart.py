@@ -19,8 +19,8 @@ from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit, formulate_relaxation, relaxation_point, relaxed_limits
 from ..program.sampling import starting_points
+from .interface import Solver
 from .ipopt import ipopt
-from .solver import Solver
 from .starts import SAME_POINT, Start, StartStatus, search_from
 
 #: Two optima have the same F when it differs by less than this part of F's scale.

@@ -20,8 +20,8 @@ from ...models import FloatArray
 from ..case.settings import Search
 from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers
 from ..program.nlp import Nlp
+from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
-from .solver import LocalSearch, Solver, SolverResult, StopReason
 
 #: A side farther than this, in half ranges, from where the solver stopped is not one that the optimum lies on.
 _NEAR = 1e-2
