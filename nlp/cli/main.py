@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..output.pictures.scene import Drawing
     from ..results.data import CaseResult
-    from ..results.jsondata import Data
+    from ..results.jsondata import JsonObject
     from ..solve.certified import Certified, CertifyOptions
     from ..solve.compromise import Compromise
     from ..solve.multistart import Solution
@@ -546,7 +546,7 @@ def _write_picture(target: str, drawings: Sequence[Drawing]) -> None:
     write_bytes(target, picture(drawings, ending_of(target)))
 
 
-def _write_json(target: str, result: Data) -> None:
+def _write_json(target: str, result: JsonObject) -> None:
     from ..output.files import write_text
     from ..results.jsondata import json_data
 

@@ -28,6 +28,7 @@ from screwsynth.nlp.output.report.frames import RATES
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
 from screwsynth.nlp.output.report.webpage import page_of
+from screwsynth.nlp.solve import multistart
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -470,7 +471,7 @@ def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.solve.multistart.solve", lambda *_, **__: pytest.fail("it was solved"))
+    monkeypatch.setattr(multistart, "solve", lambda *_, **__: pytest.fail("it was solved"))
     code, _, err = cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html"))
     assert code == 2
     assert err.count("\n") == 1
