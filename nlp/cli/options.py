@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..results.jsondata import Data
+    from ..results.jsondata import JsonObject
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -48,7 +48,7 @@ def check_picture(target: str | None) -> None:
         check_target(target)
 
 
-def write_json(target: str, result: Data) -> None:
+def write_json(target: str, result: JsonObject) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
