@@ -9,9 +9,9 @@ from pathlib import Path
 from screwsynth.models import model_names
 from screwsynth.nlp import load_case, solve, solve_tasks
 from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.figures import picture
-from screwsynth.nlp.output.pictures.gallery import drawings_of
-from screwsynth.nlp.output.pictures.scene import drawing_of_model
+from screwsynth.nlp.output.pictures.solutions import drawings_of
 
 FOLDER = Path(__file__).parent / "figures"
 CASES = {

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..case.case import Case
-    from ..output.pictures.scene import Drawing
+    from ..output.pictures.drawing import Drawing
     from ..solve.certified import Certified, CertifyOptions
     from ..solve.compromise import Compromise
     from ..solve.multistart import Solution
@@ -96,7 +96,7 @@ def solve(
     if json_file is not None:
         _write_json(json_file, result)
     if plot is not None:
-        from ..output.pictures.gallery import drawings_of
+        from ..output.pictures.solutions import drawings_of
 
         _write_picture(plot, drawings_of(solution))
     if json_file != "-":
@@ -122,7 +122,7 @@ def report(
     """Solve a case and write a page about it: one file that opens without a network."""
     from ..case.reader import find_case, load_case
     from ..output.files import read_text, write_text
-    from ..output.pictures.extras import check_library
+    from ..output.pictures.requirements import check_library
 
     loaded = load_case(case)
     text = read_text(str(find_case(case)))
@@ -343,7 +343,7 @@ def models(
     # Without the options that it cannot do without, a robot has no parameters to show yet.
     model = None if needed else build_model(name)
     if plot is not None:
-        from ..output.pictures.scene import drawing_of_model
+        from ..output.pictures.drawing import drawing_of_model
 
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
@@ -515,7 +515,7 @@ def _check_target(target: str | None) -> None:
 
 def _check_picture(target: str | None) -> None:
     if target is not None:
-        from ..output.pictures.extras import check_picture
+        from ..output.pictures.requirements import check_picture
 
         check_picture(target)
         _check_target(target)
@@ -523,7 +523,8 @@ def _check_picture(target: str | None) -> None:
 
 def _write_picture(target: str, drawings: Sequence[Drawing]) -> None:
     from ..output.files import write_bytes
-    from ..output.pictures.figures import ending_of, picture
+    from ..output.pictures.figures import picture
+    from ..output.pictures.requirements import ending_of
 
     write_bytes(target, picture(drawings, ending_of(target)))
 

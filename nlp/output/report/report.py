@@ -18,8 +18,8 @@ from ...program.nlp import Nlp
 from ...results.regression import CaseCheck, check_case
 from ...solve.compromise import Compromise
 from ...solve.multistart import Solution
-from ..pictures.scene import drawing_of
-from .frames import view_data
+from ..pictures.drawing import drawing_of
+from .frames import ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
 #: So many maps of two variables are made in all: seven free variables have 21 pairs.
@@ -45,7 +45,7 @@ class Part:
     nlp: Nlp
     x: FloatArray
     solution: Solution
-    view: dict[str, Any] | None
+    view: ViewData | None
     slices: tuple[Slice, ...]
     planes: tuple[Plane, ...]
     pairs: int

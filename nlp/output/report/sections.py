@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Group
 
 from ...results.data import motion_of
+from ..pictures.style import RATE_COLOURS
 from ..terminal import (
     design_table,
     headline,
@@ -19,7 +20,7 @@ from ..terminal import (
     tolerance_line,
 )
 from .exploration import around, optima
-from .frames import RATES
+from .frames import ViewData
 from .judgement import certificates, evidence_section, published
 from .markup import Markup, grid, html_table, joined, paragraphs, paragraphs_of, tag
 from .report import Report
@@ -143,8 +144,8 @@ def _robot(report: Report) -> Markup:
     return joined([*content, tag("noscript", tag("p", note))])
 
 
-def _legend(view: dict[str, Any]) -> Markup:
-    gradient = f"background:linear-gradient(90deg,{','.join(RATES)})"
+def _legend(view: ViewData) -> Markup:
+    gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
     words = [
         "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
@@ -159,7 +160,7 @@ def _legend(view: dict[str, Any]) -> Markup:
     return joined([bar, *words])
 
 
-def _rates(view: dict[str, Any]) -> Markup:
+def _rates(view: ViewData) -> Markup:
     """Rates of every row at the drawn posture; the script keeps it in step with the platform."""
     frame = view["frames"][view["zero"]]
     # Where the task's motion is resisted by nothing, what is left is rounding.

@@ -1,15 +1,15 @@
-"""From what was found to its drawings: one of a solution, one for each task of a compromise."""
+"""Drawings of a solution: one for a single task, one for each task of a compromise."""
 
 from __future__ import annotations
 
 from ...case.task import Sense
 from ...solve.compromise import Compromise
 from ...solve.multistart import Solution, Status
-from .scene import Drawing, drawing_of
+from .drawing import Drawing, drawing_of
 
 
 def drawings_of(found: Solution | Compromise) -> list[Drawing]:
-    """The robot with its task, or at the combined point with each of several tasks; at the first of several poses.
+    """Return the robot with its task, or at the combined point with each of several tasks; at the first of its poses.
 
     Raises:
         EvaluationError: the robot does not exist at the point reached.
@@ -31,7 +31,7 @@ def drawings_of(found: Solution | Compromise) -> list[Drawing]:
 
 
 def _headline(solution: Solution) -> str:
-    """What was found, in a line."""
+    """Return the result in one line."""
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"
     value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F
