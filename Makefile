@@ -32,6 +32,7 @@ check: $(VENV)/ready build/typing/screwsynth ## formatting, lint, types and impo
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/basedpyright --level error
 	$(BIN)/lint-imports
 
 docs: $(VENV)/ready ## write what the documentation shows of the program's output

@@ -1,10 +1,10 @@
 """Symbolic robots and the screw algebra they are written in."""
 
-from .arrays import FloatArray, frozen_array
+from .arrays import FloatArray, frozen_array, frozen_vector
 from .catalog import RobotFunction, UnknownModelError, model_names, robot_function
 from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
-from .instance import LegInstance, RobotInstance, vanished
+from .instance import LegInstance, RobotInstance, Substitution, homogenised, instantiate, jacobian, objective, vanished
 from .legs import LeggedPlatform, legged_platform
 from .model import Model, ModelError
 from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
@@ -46,6 +46,7 @@ __all__ = [
     "RobotInstance",
     "Scene",
     "Screw",
+    "Substitution",
     "Unknown",
     "UnknownModelError",
     "Wrench",
@@ -57,7 +58,11 @@ __all__ = [
     "displacement",
     "force_along",
     "frozen_array",
+    "frozen_vector",
     "hexapod",
+    "homogenised",
+    "instantiate",
+    "jacobian",
     "legged_platform",
     "line_through",
     "matrix_from_axis_angle",
@@ -65,6 +70,7 @@ __all__ = [
     "matrix_from_quaternion_vector",
     "model_names",
     "moved_screw",
+    "objective",
     "reciprocal_product",
     "robot_function",
     "screw_from_axis",

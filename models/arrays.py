@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -28,3 +29,8 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
         raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
     array.flags.writeable = False
     return array
+
+
+def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
+    """Return a read-only vector of any length, float64."""
+    return frozen_array(values, (len(values),))

@@ -19,27 +19,6 @@ from .drawing import Scene
 from .parts import Closure, Leg, Parameter, PoseSymbols, Quantity, Unknown
 from .wrench import Wrench, WrenchKind
 
-#: Names by which programs call the pose and other numbers of a case.
-RESERVED = frozenset(
-    [
-        "p_x",
-        "p_y",
-        "p_z",
-        "q_x",
-        "q_y",
-        "q_z",
-        "axis",
-        "axis_x",
-        "axis_y",
-        "axis_z",
-        "angle",
-        "twist",
-        "characteristic_length",
-        "level",
-        "ceiling",
-    ]
-)
-
 
 class ModelError(ValueError):
     """A robot function built a model that contradicts itself; the message names the robot and the fault."""
@@ -116,9 +95,6 @@ def _check_names(model: Model) -> None:
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise _fail(model, f"names appear twice: {', '.join(repeated)}")
-    reserved = sorted(RESERVED.intersection(names))
-    if reserved:
-        raise _fail(model, f"names are the program's own: {', '.join(reserved)}")
     for unknown in model.unknowns:
         if not -math.inf < unknown.lower < unknown.upper < math.inf:
             raise _fail(model, f"unknown {unknown.name!r} needs finite bounds, lower below upper")

@@ -95,6 +95,21 @@ class Case:
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
+    def component_names(self, parameter: Parameter) -> tuple[str, ...]:
+        """Names of a parameter's components in this case.
+
+        A robot may call its parameters what it likes. One that has the name of a number of the pose, such as ``p_x``,
+        is written ``robot.p_x``.
+        """
+        return tuple(f"robot.{name}" if name in self._pose_names else name for name in parameter.components)
+
+    @property
+    def _pose_names(self) -> frozenset[str]:
+        """Names of the poses' numbers."""
+        return frozenset(
+            f"{prefix}{part}" for prefix in self.pose_prefixes for part in (*component_names("p", 3), "angle", "axis")
+        )
+
     @property
     def axis(self) -> FloatArray | None:
         """Held axis of rotation, (3,) unit, or None when it is free."""
@@ -118,8 +133,11 @@ class Case:
 
     @property
     def scalars(self) -> Mapping[str, Dimension]:
-        """Names of the case's own numbers, which ``limits.custom`` may relate, with what they measure."""
-        names = {part: item.dimension for item in self.model.parameters for part in item.components}
+        """Names of the case's own numbers, which ``limits.custom`` may relate, with what they measure.
+
+        In this order: components of the parameters; then position and, where its axis is held, angle of each pose.
+        """
+        names = {part: item.dimension for item in self.model.parameters for part in self.component_names(item)}
         for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
             names |= dict.fromkeys((f"{prefix}{part}" for part in component_names("p", 3)), Dimension.LENGTH)
             if pose.rotation.axis is not None:

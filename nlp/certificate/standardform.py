@@ -20,9 +20,6 @@ from casadi import SX
 from ...models import FloatArray, frozen_array
 from ..program.nlp import Nlp
 
-#: The variable and the constraints' names of :func:`screwsynth.nlp.program.formulation.formulate_worst`.
-_LEVEL = "level"
-
 
 @dataclass(frozen=True, eq=False)
 class Condition:
@@ -102,20 +99,22 @@ class StandardForm:
 def standard_form(nlp: Nlp) -> StandardForm:
     """The standard form of a program with at least one variable."""
     program = nlp.program
-    names = [variable.name for variable in program.variables]
     x = SX.sym("x", nlp.n)
     F, g = program.values.call([x, SX(ca.DM(nlp.arguments))])
-    has_level = names[-1] == _LEVEL
-    count = nlp.n - 1 if has_level else nlp.n
+    epigraph = program.places.epigraph
+    count = nlp.n if epigraph is None else epigraph.level
     functions: list[SX] = [-nlp.sign * F]
     lower, upper = nlp.g_lower.tolist(), nlp.g_upper.tolist()
     constraints = [(constraint.name, g[k], lower[k], upper[k]) for k, constraint in enumerate(program.constraints)]
-    if has_level:
-        level = x[count]
-        by_level = [bool(ca.depends_on(expression, level)) for _, expression, _, _ in constraints]
-        pairs = list(zip(constraints, by_level, strict=True))
-        functions = [_own_function(expression, level, nlp.sign) for (_, expression, _, _), held in pairs if held]
-        constraints = [constraint for constraint, held in pairs if not held]
+    if epigraph is not None:
+        pairs = list(zip(constraints, program.constraints, strict=True))
+        level = x[epigraph.level]
+        functions = [
+            _own_function(expression, level, nlp.sign)
+            for (_, expression, _, _), constraint in pairs
+            if constraint in epigraph.constraints
+        ]
+        constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
     return StandardForm(
         nlp=nlp,
         x=x[:count],
@@ -124,7 +123,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
         functions=tuple(functions),
         rows=tuple(_rows(constraints)),
         sign=-nlp.sign,
-        has_level=has_level,
+        has_level=epigraph is not None,
     )
 
 

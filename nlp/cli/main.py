@@ -278,13 +278,14 @@ def evaluate(
     from ..case.reader import load_case
     from ..evidence import state as evaluation
     from ..evidence.kkt import assembled
-    from ..program.formulation import formulate_each, levelled
+    from ..program.epigraph import with_exact_level
+    from ..program.formulation import formulate_each
     from ..results.data import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     _check_target(json_file)
     nlps = formulate_each(loaded)
-    x = levelled(nlps[0], assembled(nlps[0], nlps[0].start))
+    x = with_exact_level(nlps[0], assembled(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [evaluation.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         _write_json(json_file, result)

@@ -117,7 +117,7 @@ def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
         "m": str(len(program.model.wrenches)),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
-        "twist": str([argument.name for argument in program.arguments].index("twist_0")),
+        "twist": str(program.places.twists[0].start),
         "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
@@ -184,10 +184,10 @@ def _references(nlp: Nlp) -> tuple[int, str]:
     rows: list[dict[str, FloatArray]] = []
     for x in starting_points(nlp, 4 * _POINTS + 1, _SEED)[1:]:
         F, gradient, g, slopes = kernels.derivatives(x, p)
-        (hessian,) = kernels.hessian(x, p, 1.0, np.zeros(len(nlp.program.constraints)))
-        _, R, _, J, rates, *_ = kernels.robot_state(x, p)
-        row = {"points": x, "F": F, "gradient": gradient, "hessian": hessian, "jacobian": J, "rates": rates}
-        row |= {"limits": g, "slopes": slopes, "rotation": R}
+        hessian = kernels.hessian(x, p, 1.0, np.zeros(len(nlp.program.constraints)))
+        state = kernels.robot_state(x, p)
+        row = {"points": x, "F": F, "gradient": gradient, "hessian": hessian, "jacobian": state.jacobian}
+        row |= {"rates": state.rates, "limits": g, "slopes": slopes, "rotation": state.rotation}
         if all(np.isfinite(each).all() for each in row.values()):
             rows.append(row)
         if len(rows) == (_POINTS if nlp.n else 1):

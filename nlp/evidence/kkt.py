@@ -139,7 +139,7 @@ def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
     table = nlp.sides
     carried = np.bincount(table.place, table.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
     weights = carried[nlp.n :].astype(np.float64)
-    (full,) = nlp.program.kernels.hessian(at.x, nlp.arguments, nlp.sign / nlp.objective_scale, weights)
+    full = nlp.program.kernels.hessian(at.x, nlp.arguments, nlp.sign / nlp.objective_scale, weights)
     return full * np.outer(nlp.scale, nlp.scale)
 
 

@@ -35,9 +35,8 @@ class Sensitivity:
 
 
 def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
-    """Derivatives at an optimum (n,) by the robot's and the pose's fixed numbers, in the program's order."""
-    named = nlp.case.scalars
-    places = [k for k, argument in enumerate(nlp.program.arguments) if argument.name in named]
+    """Return the derivatives at an optimum (n,) by the robot's and the pose's fixed numbers, in the case's order."""
+    places = [place.index for place in nlp.program.places.numbers if place.vector == "p"]
     if not places:
         return []
     at = linearise(nlp, x)

@@ -8,11 +8,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...models import FloatArray, axis_angle_from_matrix, frozen_array, vanished
+from ...models import FloatArray, axis_angle_from_matrix, frozen_array, homogenised, vanished
 from ..case.case import Case
-from ..case.pose import Free, Pose, Step
+from ..case.pose import Step
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
+from ..program.places import HeldRotation
 from .linalg import plain_basis
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
@@ -92,21 +93,21 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
-    outputs = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
-    components, rotation, position, jacobian, rates, F, squares, size, *quantities = outputs
-    for row, square in zip(model.wrenches, squares.ravel(), strict=True):
+    numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    rotation, position, jacobian, rates = numbers.rotation, numbers.position, numbers.jacobian, numbers.rates
+    for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if not square > 0:
             raise EvaluationError(f"{where}{vanished(row)}, at this point")
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
-    prefix, stated, step = _stated(case)[pose]
+    stated, step = _stated(case)[pose]
     if step.is_identity:
-        axis, angle = _turn(nlp, x, prefix, stated, rotation)
+        axis, angle = _turn(nlp, x, stated, rotation)
     rank, free_twists = _rank(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
-    parts = np.split(components.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
+    parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     return RobotState(
         parameters=MappingProxyType(
             {item.name: frozen_array(part, part.shape) for item, part in zip(model.parameters, parts, strict=True)}
@@ -117,15 +118,15 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
         angle=angle,
         jacobian=frozen_array(jacobian, jacobian.shape),
         rates=frozen_array(rates[:, 0], (len(model.wrenches),)),
-        F=float(F[0, 0]),
-        size=float(size[0, 0]),
+        F=float(numbers.F[0, 0]),
+        size=float(numbers.magnitude[0, 0]),
         singular_values=frozen_array(singular_values, singular_values.shape),
         rank=rank,
         free_twists=frozen_array(free_twists, free_twists.shape),
         quantities=MappingProxyType(
             {
                 item.name: frozen_array(values.ravel(), (len(item.owners),))
-                for item, values in zip(model.quantities, quantities, strict=True)
+                for item, values in zip(model.quantities, numbers.quantities, strict=True)
             }
         ),
     )
@@ -133,37 +134,37 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
     """The poses that a case states, at a point (n,), before their displacements."""
-    found: dict[str, StatedPose] = {}
-    for k, (prefix, stated, step) in enumerate(_stated(nlp.case)):
-        if prefix not in found:
-            outputs = nlp.program.kernels.robot_states[k](x, nlp.arguments)
-            rotation, position = step.rotation.T @ outputs[1], step.rotation.T @ (outputs[2].ravel() - step.translation)
-            axis, angle = _turn(nlp, x, prefix, stated, rotation)
-            found[prefix] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
+    found: dict[int, StatedPose] = {}
+    for k, (stated, step) in enumerate(_stated(nlp.case)):
+        if stated not in found:
+            numbers = nlp.program.kernels.robot_states[k](x, nlp.arguments)
+            rotation = step.rotation.T @ numbers.rotation
+            position = step.rotation.T @ (numbers.position.ravel() - step.translation)
+            axis, angle = _turn(nlp, x, stated, rotation)
+            found[stated] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
     return list(found.values())
 
 
-def _turn(nlp: Nlp, x: FloatArray, prefix: str, stated: Pose, rotation: FloatArray) -> tuple[FloatArray, float]:
-    """A stated pose's rotation as axis and angle: the held axis with a signed angle where there is one."""
-    if stated.rotation.axis is None:
+def _turn(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArray) -> tuple[FloatArray, float]:
+    """Return a stated pose's rotation as axis and angle: a held axis with a signed angle."""
+    places, axis = nlp.program.places.rotations[stated], nlp.case.poses[stated].rotation.axis
+    if axis is None or not isinstance(places, HeldRotation):
         return axis_angle_from_matrix(rotation)
-    held, axis = stated.rotation.angle, frozen_array(stated.rotation.axis, (3,))
-    return axis, float(x[nlp.program.index(f"{prefix}angle")]) if isinstance(held, Free) else held
+    vector = x if places.angle.vector == "x" else nlp.arguments
+    return frozen_array(axis, (3,)), float(vector[places.angle.index])
 
 
-def _stated(case: Case) -> list[tuple[str, Pose, Step]]:
-    """The stated pose that each pose comes from: what its names begin with, the pose, and the displacement."""
-    return [
-        (prefix, pose, step) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True) for step in pose.steps
-    ]
+def _stated(case: Case) -> list[tuple[int, Step]]:
+    """Return the index of the stated pose that each pose comes from, and the displacement."""
+    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.steps]
 
 
 def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
     """Rank and free twists of J with its moments about the platform's origin, divided by their longest arm."""
-    moments = jacobian[:, 3:] - np.cross(centre, jacobian[:, :3])
-    arm = float(np.max(np.linalg.norm(moments, axis=1))) or 1.0
+    arm = float(np.max(np.linalg.norm(homogenised(jacobian, centre, 1.0)[3:], axis=0))) or 1.0
     # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
-    resistance = np.hstack([moments / arm, jacobian[:, :3]])
+    forces, moments = np.split(np.array(homogenised(jacobian, centre, arm)), 2)
+    resistance = np.vstack([moments, forces]).T
     _, values, rows = np.linalg.svd(resistance)
     rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
     null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)

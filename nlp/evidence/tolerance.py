@@ -15,8 +15,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, WrenchKind, frozen_array
+from ...models import FloatArray, frozen_array, objective
 from ..case.pose import OverPoses
+from ..program.epigraph import total_over_poses, worst
 from ..program.nlp import Nlp
 
 #: Poses whose F is within this part of the worst one's are the worst together.
@@ -52,21 +53,16 @@ class BuiltRobot:
         errors = [error for leg in model.legs for error in (leg.base_error, leg.platform_error)]
         self.joints = tuple((leg.name, plate) for leg in model.legs for plate in ("base", "platform"))
         e = ca.vertcat(*errors)
-        place = [argument.name for argument in nlp.program.arguments].index("twist_0")
-        twist = nlp.arguments[place : place + 6]
+        twist = nlp.arguments[nlp.program.places.twists[0]]
+        states = [kernel(x, nlp.arguments) for kernel in nlp.program.kernels.robot_states]
         self._functions = [
-            self._function(model_values, e, twist)
-            for model_values in (kernel(x, nlp.arguments)[:3] for kernel in nlp.program.kernels.robot_states)
+            self._function((state.parameters, state.rotation, state.position), e, twist) for state in states
         ]
 
     def _function(self, values: Sequence[FloatArray], e: SX, twist: FloatArray) -> ca.Function:
         """``e -> (F, dF/de)`` at one pose, whose parameters, R and p are numbers."""
         model, length = self._nlp.program.model, self._nlp.case.characteristic_length
-        chi = SX(twist.tolist())
-        F = SX(0)
-        for row in model.built:
-            scale = length if row.kind is WrenchKind.COUPLE else 1.0
-            F += (scale * row.rate(chi)) ** 2 / row.square
+        F = objective(model.built, SX(twist.tolist()), SX(length))
         symbols = [ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters])]
         symbols += [model.pose.rotation, model.pose.position, e]
         whole = ca.Function("built", symbols, [F])
@@ -80,19 +76,17 @@ class BuiltRobot:
             errors: (k, 3) of the joints.
         """
         results = [function(errors.ravel()) for function in self._functions]
-        values = np.array([float(F) for F, _ in results])
-        gradients = [gradient.full().reshape(-1, 3) for _, gradient in results]
+        values = [float(F) for F, _ in results]
+        gradients: list[FloatArray] = [gradient.full().reshape(-1, 3) for _, gradient in results]
         case = self._nlp.case
         if case.over_poses is OverPoses.WORST and len(values) > 1:
-            best = self._nlp.sign < 0
-            worst = float(values.min() if best else values.max())
-            return worst, [
+            level = worst(values, self._nlp.sense)
+            return level, [
                 gradient
                 for value, gradient in zip(values, gradients, strict=True)
-                if abs(value - worst) <= _LEVEL * abs(worst)
+                if abs(value - level) <= _LEVEL * abs(level)
             ]
-        weight = 1 / len(values) if case.over_poses is OverPoses.MEAN else 1.0
-        return weight * float(values.sum()), [np.asarray(weight * np.sum(gradients, axis=0))]
+        return total_over_poses(values, case.over_poses), [total_over_poses(gradients, case.over_poses)]
 
 
 def tolerance_loss(nlp: Nlp, x: FloatArray, tolerance: float) -> ToleranceLoss:

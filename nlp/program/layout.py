@@ -1,4 +1,4 @@
-"""Laying a case out as symbols: what is free, what is fixed, and the robot's expressions in them.
+"""A case as symbols: free variables, fixed arguments, and the robot's expressions in them.
 
 The variables are the free components of the parameters, of the position ``p``, and of the rotation:
 
@@ -18,8 +18,9 @@ trajectory or a grid follow from it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -28,22 +29,20 @@ from casadi import SX
 from ...models import (
     Dimension,
     FloatArray,
-    LegInstance,
-    Model,
     Parameter,
     RobotInstance,
-    WrenchKind,
-    component_names,
+    Substitution,
+    instantiate,
     matrix_from_axis_angle,
     matrix_from_quaternion_vector,
 )
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
-from ..case.pose import Free, OverPoses, Pose, Step, Value, sizes_of_turn
+from ..case.pose import Free, Pose, Step, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
 from .buildable import distinct, limits_of
-from .program import Scalar
+from .places import FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
 
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
 ROTATION_ANGLE = Reading(
@@ -61,111 +60,104 @@ _ROOM = 1.25
 _ROUNDING = 1e-9
 
 
-@dataclass
-class SymbolTable:
-    """What is being laid out: free variables and fixed arguments in the order they are met."""
-
-    variables: list[Scalar] = field(default_factory=list)
-    x: list[SX] = field(default_factory=list)
-    bounds: list[Free] = field(default_factory=list)
-    arguments: list[Scalar] = field(default_factory=list)
-    p: list[SX] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def place(self, name: str, dimension: Dimension, value: Value) -> SX:
-        """The symbol of a number, which becomes a variable or an argument as the case has it."""
-        symbol = SX.sym(name)
-        scalar = Scalar(name, dimension)
-        if isinstance(value, Free):
-            self.variables.append(scalar)
-            self.x.append(symbol)
-            self.bounds.append(value)
-        else:
-            self.arguments.append(scalar)
-            self.p.append(symbol)
-            self.values.append(value)
-        return symbol
-
-    def place_all(self, name: str, dimension: Dimension, values: Sequence[Value]) -> SX:
-        """The (n, 1) vector of several numbers."""
-        names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
-        return ca.vertcat(*[self.place(part, dimension, value) for part, value in zip(names, values, strict=True)])
-
-
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A case laid out as symbols, before it is said what the objective is.
+    """A case as symbols, before an objective is chosen.
 
     Attributes:
         case: the case.
-        sheet: its numbers as symbols.
+        table: its numbers as symbols.
+        places: where they stand.
         robots: the robot at each pose.
-        constraints: what the variables can change.
-        met: limits that hold whatever is chosen.
+        constraints: constraints that depend on a variable, or that do not hold.
+        met: limits that depend on no variable and hold.
     """
 
     case: Case
-    sheet: SymbolTable
+    table: SymbolTable
+    places: Places
     robots: tuple[RobotInstance, ...]
     constraints: tuple[BoundedConstraint, ...]
     met: tuple[BoundedConstraint, ...] = ()
 
-    @property
-    def F(self) -> SX:  # noqa: N802 - the objective's name
-        """(tasks, 1) objective of each task: the sum or the mean over the poses."""
-        if len(self.robots) == 1:
-            return self.robots[0].F
-        total = sum((robot.F for robot in self.robots), SX(0))
-        return total / len(self.robots) if self.case.over_poses is OverPoses.MEAN else total
+
+class _StatedPose(NamedTuple):
+    """A pose that a case states, as symbols: its numbers' places, its constraints, and its displacements."""
+
+    rotation: SX
+    position: SX
+    numbers: tuple[Place, ...]
+    symbols: SX
+    places: RotationPlaces
+    constraints: list[BoundedConstraint]
+    steps: tuple[Step, ...]
 
 
 def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
-    """Symbols for everything that the case fixes and frees, and the robot's expressions in them."""
-    sheet = SymbolTable()
-    model = case.model
-    placed = [sheet.place_all(item.name, item.dimension, _components(case, item)) for item in model.parameters]
-    stated = []
-    constraints: list[BoundedConstraint] = []
-    for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True):
-        position = sheet.place_all(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
-        rotation, held = _rotation(pose, prefix, sheet)
-        stated += [(rotation, position, step) for step in pose.steps]
-        constraints += held
-    unknowns = [
-        ca.vertcat(
-            SX(0, 1),
-            *[sheet.place(f"{at}{u.name}", u.dimension, Free(u.lower, u.upper)) for u in model.unknowns],
-        )
-        for at in (f"at{k + 1}_" if len(stated) > 1 else "" for k in range(len(stated)))
+    """Return symbols for every number that a case fixes or frees, and the robot's expressions in them."""
+    table, model = SymbolTable(), case.model
+    parameters = [
+        table.add_each(case.component_names(item), item.dimension, _components(case, item)) for item in model.parameters
     ]
-    length = sheet.place("characteristic_length", Dimension.LENGTH, case.characteristic_length)
+    stated = [_add_pose(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
+    unknowns = [
+        [table.add(f"{at}{item.name}", item.dimension, Free(item.lower, item.upper)) for item in model.unknowns]
+        for at in _pose_marks(case)
+    ]
+    length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
     twists = [
-        sheet.place_all(
+        table.add_vector(
             f"twist{index}" if index else "twist", Dimension.NUMBER, [float(c) for c in np.asarray(t.twist)]
         )
         for index, t in enumerate(tasks)
     ]
-    parameters = ca.vertcat(SX(0, 1), *placed)
-    robots = []
+    constraints = [item for pose in stated for item in pose.constraints]
     constraints += [
-        BoundedConstraint(Constraint(f"|{item.name}|", ca.sumsqr(symbol), _LENGTH_OF_DIRECTION), 1.0, 1.0)
-        for item, symbol in zip(model.parameters, placed, strict=True)
+        BoundedConstraint(Constraint(f"|{item.name}|", ca.sumsqr(placed.symbols), _LENGTH_OF_DIRECTION), 1.0, 1.0)
+        for item, placed in zip(model.parameters, parameters, strict=True)
         if item.is_direction
     ]
-    for k, (rotation, position, step) in enumerate(stated):
-        symbols = _Symbols(parameters, unknowns[k], *_displaced(rotation, position, step))
-        robot, closure = _robot(model, symbols, length, twists)
+    values = ca.vertcat(SX(0, 1), *[placed.symbols for placed in parameters])
+    robots = []
+    displaced = [_displaced(pose.rotation, pose.position, step) for pose in stated for step in pose.steps]
+    for k, (rotation, position) in enumerate(displaced):
+        put = Substitution(values, ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]]), rotation, position)
+        robot = instantiate(model, put, length, [twist.symbols for twist in twists])
         robots.append(robot)
-        where = f" pose {k + 1}" if len(stated) > 1 else ""
+        where = f" pose {k + 1}" if len(displaced) > 1 else ""
         constraints += [
             BoundedConstraint(
-                Constraint(f"{equation.name}{where}", closure[index], Reading(Dimension.NUMBER)), 0.0, 0.0
+                Constraint(f"{equation.name}{where}", robot.closure[i], Reading(Dimension.NUMBER)), 0.0, 0.0
             )
-            for index, equation in enumerate(model.closure)
+            for i, equation in enumerate(model.closure)
         ]
-    constraints = _varying(case, constraints, sheet)
-    limits, met = _limits(case, robots, sheet) if case.limits else ([], [])
-    return Layout(case, sheet, tuple(robots), (*constraints, *limits), tuple(met))
+    constraints = _varying(case, constraints, table)
+    numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
+    limits, met = (
+        _limits(case, robots, table, dict(zip(case.scalars, numbers, strict=True))) if case.limits else ([], [])
+    )
+    places = Places(
+        numbers=(
+            *(place for placed in parameters for place in placed.places),
+            *(place for pose in stated for place in pose.numbers),
+        ),
+        rotations=tuple(pose.places for pose in stated),
+        unknowns=tuple(tuple(each.places[0].index for each in at_pose) for at_pose in unknowns),
+        twists=tuple(range(placed.places[0].index, placed.places[-1].index + 1) for placed in twists),
+        directions=tuple(
+            (x.index, y.index, z.index)
+            for item, placed in zip(model.parameters, parameters, strict=True)
+            if item.is_direction and all(place.vector == "x" for place in placed.places)
+            for x, y, z in [placed.places]
+        ),
+    )
+    return Layout(case, table, places, tuple(robots), (*constraints, *limits), tuple(met))
+
+
+def _pose_marks(case: Case) -> list[str]:
+    """Return what stands before the names of the unknowns at each pose: nothing for a single one."""
+    count = case.pose_count
+    return [f"at{k + 1}_" for k in range(count)] if count > 1 else [""]
 
 
 def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
@@ -177,16 +169,15 @@ def _displaced(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
 
 
 def _limits(
-    case: Case, robots: Sequence[RobotInstance], sheet: SymbolTable
+    case: Case, robots: Sequence[RobotInstance], table: SymbolTable, numbers: Mapping[str, SX]
 ) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
     """The case's limits: those that the variables can change or that do not hold, and those that hold anyway."""
-    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
-    names = [scalar.name for scalar in (*sheet.variables, *sheet.arguments)]
-    limits = limits_of(case, robots, dict(zip(names, (*sheet.x, *sheet.p), strict=True)))
-    limits = distinct(limits, x, p, sheet.values, _somewhere(sheet.bounds))
+    x, p = table.variables_vector, table.arguments_vector
+    limits = limits_of(case, robots, numbers)
+    limits = distinct(limits, x, p, table.values, _somewhere(table.bounds))
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
-    free = ca.which_depends(expressions, x, 1, True) if len(sheet.x) else [False] * len(limits)
-    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(_somewhere(sheet.bounds)[0], sheet.values)
+    free = ca.which_depends(expressions, x, 1, True) if len(table.x) else [False] * len(limits)
+    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(_somewhere(table.bounds)[0], table.values)
     varying: list[BoundedConstraint] = []
     met: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values.full().ravel(), strict=True):
@@ -220,122 +211,56 @@ def _components(case: Case, parameter: Parameter) -> tuple[Value, ...]:
     return tuple(roomy)
 
 
-def free_directions(model: Model, variables: Sequence[Scalar]) -> tuple[tuple[int, int, int], ...]:
-    """Indices of the components of each direction that is wholly free."""
-    names = [variable.name for variable in variables]
-    found = []
-    for parameter in model.parameters:
-        if parameter.is_direction and all(component in names for component in parameter.components):
-            x, y, z = (names.index(component) for component in parameter.components)
-            found.append((x, y, z))
-    return tuple(found)
-
-
-def _varying(case: Case, constraints: Sequence[BoundedConstraint], sheet: SymbolTable) -> list[BoundedConstraint]:
+def _varying(case: Case, constraints: Sequence[BoundedConstraint], table: SymbolTable) -> list[BoundedConstraint]:
     """The constraints that the variables can change; one that they cannot must hold.
 
     Raises:
         CaseError: one that they cannot change does not hold.
     """
-    x, p = ca.vertcat(SX(0, 1), *sheet.x), ca.vertcat(SX(0, 1), *sheet.p)
+    x, p = table.variables_vector, table.arguments_vector
     varying = []
     for item in constraints:
         expression = item.constraint.expression
         if x.numel() and any(ca.which_depends(expression, x, 1, True)):
             varying.append(item)
             continue
-        value = float(ca.Function("constant", [x, p], [expression])(0, sheet.values))
+        value = float(ca.Function("constant", [x, p], [expression])(0, table.values))
         if not item.lower - _ROUNDING <= value <= item.upper + _ROUNDING:
             fault = f"is {value:.6g} with these parameters, which are all fixed, and must be {item.lower:g}"
             raise CaseError(f"robot.parameters: {item.constraint.name}", fault, source=case.source)
     return varying
 
 
-def _rotation(pose: Pose, prefix: str, sheet: SymbolTable) -> tuple[SX, list[BoundedConstraint]]:
+def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPose:
+    """Add the numbers of a stated pose: its position, then its rotation."""
+    position = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
     axis, angle = pose.rotation.axis, pose.rotation.angle
     if axis is not None:
-        n = sheet.place_all(f"{prefix}axis", Dimension.NUMBER, [float(c) for c in np.asarray(axis)])
-        return matrix_from_axis_angle(n, sheet.place(f"{prefix}angle", Dimension.ANGLE, angle)), []
+        n = table.add_vector(f"{prefix}axis", Dimension.NUMBER, [float(c) for c in np.asarray(axis)])
+        turn = table.add(f"{prefix}angle", Dimension.ANGLE, angle)
+        rotation = matrix_from_axis_angle(n.symbols, turn.symbols)
+        symbols, places = ca.vertcat(position.symbols, turn.symbols), (*position.places, *turn.places)
+        return _StatedPose(rotation, position.symbols, places, symbols, HeldRotation(turn.places[0]), [], pose.steps)
     smallest, largest = sizes_of_turn(angle)
     radius = math.sin(largest / 2)
     if radius == 0:
-        q = sheet.place_all(f"{prefix}q", Dimension.NUMBER, (0.0, 0.0, 0.0))
-        return matrix_from_quaternion_vector(q), []
+        q = table.add_vector(f"{prefix}q", Dimension.NUMBER, (0.0, 0.0, 0.0)).symbols
+        rotation = matrix_from_quaternion_vector(q)
+        return _StatedPose(rotation, position.symbols, position.places, position.symbols, None, [], pose.steps)
     inner = math.sin(smallest / 2)
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
     # The ball implies |q_x| <= radius and so on: bounds that touched it would share its multiplier where it binds.
     room = min(_ROOM * radius, 1.0)
     along_z = Free(-room, room, math.sin(start / 2))
-    q = sheet.place_all(f"{prefix}q", Dimension.NUMBER, (Free(-room, room), Free(-room, room), along_z))
-    ball = Constraint(f"{prefix}angle", ca.sumsqr(q), ROTATION_ANGLE)
-    return matrix_from_quaternion_vector(q), [BoundedConstraint(ball, inner**2 if inner else -math.inf, radius**2)]
-
-
-@dataclass(frozen=True, eq=False)
-class _Symbols:
-    """What the program puts in place of a model's symbols."""
-
-    parameters: SX
-    unknowns: SX
-    rotation: SX
-    position: SX
-
-
-def _robot(model: Model, put: _Symbols, length: SX, twists: Sequence[SX]) -> tuple[RobotInstance, SX]:
-    """The model's expressions with its symbols replaced by the program's, and the closure equations likewise."""
-    force = ca.horzcat(*[row.force for row in model.wrenches])
-    moment = ca.horzcat(*[row.moment for row in model.wrenches])
-    square = ca.vertcat(*[row.square for row in model.wrenches])
-    closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
-    symbols = [
-        ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
-        ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
-        model.pose.rotation,
-        model.pose.position,
-    ]
-    quantities = [quantity.values for quantity in model.quantities]
-    joints = [joint for leg in model.legs for joint in (leg.base, leg.platform)]
-    inlined = ca.Function("model", symbols, [force, moment, square, closure, *quantities, *joints])
-    force, moment, square, closure, *others = inlined.call([put.parameters, put.unknowns, put.rotation, put.position])
-    quantities, joints = others[: len(quantities)], others[len(quantities) :]
-    couple_scale = [length if row.kind is WrenchKind.COUPLE else SX(1) for row in model.wrenches]
-    rows, rates, objectives, magnitudes = [], [], [], []
-    for i, scale in enumerate(couple_scale):
-        rows.append(scale * ca.vertcat(force[:, i], moment[:, i]).T / ca.sqrt(square[i]))
-    for twist in twists:
-        omega, v = twist[:3], twist[3:]
-        # (m . omega + f . v)^2 / square, rather than the square of a normalised product: smoother, tighter enclosures.
-        products = [s * (ca.dot(moment[:, i], omega) + ca.dot(force[:, i], v)) for i, s in enumerate(couple_scale)]
-        rates.append(ca.vertcat(*[product / ca.sqrt(square[i]) for i, product in enumerate(products)]))
-        objectives.append(sum((product**2 / square[i] for i, product in enumerate(products)), SX(0)))
-        magnitudes.append(
-            sum(
-                (
-                    scale**2
-                    * (
-                        ca.norm_2(moment[:, i] - ca.cross(put.position, force[:, i])) * ca.norm_2(omega)
-                        + ca.norm_2(force[:, i]) * ca.norm_2(v + ca.cross(omega, put.position))
-                    )
-                    ** 2
-                    / square[i]
-                    for i, scale in enumerate(couple_scale)
-                ),
-                SX(0),
-            )
-        )
-    robot = RobotInstance(
-        parameters=put.parameters,
-        rotation=put.rotation,
-        position=put.position,
-        jacobian=ca.vertcat(*rows),
-        rates=ca.horzcat(*rates),
-        F=ca.vertcat(*objectives),
-        squares=square,
-        magnitude=ca.vertcat(*magnitudes),
-        quantities=tuple(quantities),
-        legs=tuple(
-            LegInstance(leg.name, base, platform, put.position + put.rotation @ platform - base)
-            for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
-        ),
+    placed = table.add_vector(f"{prefix}q", Dimension.NUMBER, (Free(-room, room), Free(-room, room), along_z))
+    ball = Constraint(f"{prefix}angle", ca.sumsqr(placed.symbols), ROTATION_ANGLE)
+    x, y, z = (place.index for place in placed.places)
+    return _StatedPose(
+        matrix_from_quaternion_vector(placed.symbols),
+        position.symbols,
+        position.places,
+        position.symbols,
+        FreeRotation((x, y, z), ball),
+        [BoundedConstraint(ball, inner**2 if inner else -math.inf, radius**2)],
+        pose.steps,
     )
-    return robot, closure

@@ -12,7 +12,7 @@ from ...models import FloatArray
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.task import Sense
-from .program import MAGNITUDE, Program
+from .program import Program
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Nlp:
         lower, upper: (n,) bounds of the variables, ``lower < upper``.
         start: (n,) first starting point.
         g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
-        met: limits of the case that hold whatever is chosen, and so are no constraints of the program.
+        met: limits of the case that do not depend on ``x`` and hold, and so are no constraints of the program.
         size: size of the objective, where it is not made of the robot's F.
     """
 
@@ -149,7 +149,7 @@ class Nlp:
             return self.size
         around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
-            size = float(np.max(self.program.kernels.robot_state(x, self.arguments)[MAGNITUDE]))
+            size = float(np.max(self.program.kernels.robot_state(x, self.arguments).magnitude))
             if np.isfinite(size) and size > 0:
                 return size
         return 1.0

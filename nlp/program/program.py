@@ -9,24 +9,61 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
-from ...models import Dimension, Model, RobotInstance
+from ...models import FloatArray, Model, RobotInstance
 from ..case.limits.constraint import Constraint
-from .kernel import Kernel
+from .kernel import Kernel, the_only
+from .places import Places, Scalar
 
 #: Places of three results among those of :meth:`Program.robot_state`.
 OBJECTIVE, SQUARES, MAGNITUDE = 5, 6, 7
 
 
-@dataclass(frozen=True)
-class Scalar:
-    """A named scalar of a program: a free variable or an argument that a case fixes."""
+class Values(NamedTuple):
+    """Objective (1, 1) and constraints (c, 1)."""
 
-    name: str
-    dimension: Dimension
+    F: FloatArray
+    g: FloatArray
+
+
+class Derivatives(NamedTuple):
+    """Objective (1, 1), its gradient (1, n), constraints (c, 1) and their Jacobian (c, n)."""
+
+    F: FloatArray
+    gradient: FloatArray
+    g: FloatArray
+    jacobian: FloatArray
+
+
+class ArgumentDerivatives(NamedTuple):
+    """Gradient (1, k) of the objective and Jacobian (c, k) of the constraints by the arguments."""
+
+    gradient: FloatArray
+    jacobian: FloatArray
+
+
+class RobotNumbers(NamedTuple):
+    """The numbers of a :class:`~screwsynth.models.RobotInstance`: parameters (k, 1), rates (m, tasks) and so on."""
+
+    parameters: FloatArray
+    rotation: FloatArray
+    position: FloatArray
+    jacobian: FloatArray
+    rates: FloatArray
+    F: FloatArray
+    squares: FloatArray
+    magnitude: FloatArray
+    quantities: tuple[FloatArray, ...]
+
+    @classmethod
+    def from_outputs(cls, *outputs: FloatArray) -> RobotNumbers:
+        """Return the numbers from the outputs of :meth:`Program.robot_state`."""
+        parameters, rotation, position, jacobian, rates, F, squares, magnitude, *quantities = outputs
+        return cls(parameters, rotation, position, jacobian, rates, F, squares, magnitude, tuple(quantities))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +77,9 @@ class Program:
         p: (k, 1) symbols of the arguments.
         objective: (1, 1) expression that is maximised or minimised.
         constraints: beside the variables' bounds.
-        robot: the robot's expressions, at the first pose where there are several.
+        robots: the robot's expressions at each pose.
         model: the robot itself.
-        directions: indices in ``x`` of the three components of each unit vector that is wholly free.
-        further: the robot's expressions at the other poses.
+        places: where the case's numbers, rotations, unknowns, twists and directions stand.
     """
 
     variables: tuple[Scalar, ...]
@@ -52,19 +88,14 @@ class Program:
     p: SX
     objective: SX
     constraints: tuple[Constraint, ...]
-    robot: RobotInstance
+    robots: tuple[RobotInstance, ...]
     model: Model
-    directions: tuple[tuple[int, int, int], ...] = ()
-    further: tuple[RobotInstance, ...] = ()
+    places: Places
 
     @property
-    def robots(self) -> tuple[RobotInstance, ...]:
-        """The robot's expressions at every pose."""
-        return (self.robot, *self.further)
-
-    def index(self, name: str) -> int:
-        """Place of a free variable in ``x``."""
-        return [variable.name for variable in self.variables].index(name)
+    def robot(self) -> RobotInstance:
+        """The robot's expressions, at the first pose where there are several."""
+        return self.robots[0]
 
     @cached_property
     def g(self) -> SX:
@@ -119,31 +150,32 @@ class Kernels:
         self._program = program
 
     @cached_property
-    def values(self) -> Kernel:
+    def values(self) -> Kernel[Values]:
         """Objective and constraints."""
-        return Kernel(self._program.values)
+        return Kernel(self._program.values, Values)
 
     @cached_property
-    def derivatives(self) -> Kernel:
+    def derivatives(self) -> Kernel[Derivatives]:
         """Objective and constraints with first derivatives."""
-        return Kernel(self._program.derivatives)
+        return Kernel(self._program.derivatives, Derivatives)
 
     @cached_property
-    def hessian(self) -> Kernel:
+    def hessian(self) -> Kernel[FloatArray]:
         """Hessian of the Lagrangian."""
-        return Kernel(self._program.hessian)
+        return Kernel(self._program.hessian, the_only)
 
     @cached_property
-    def argument_derivatives(self) -> Kernel:
+    def argument_derivatives(self) -> Kernel[ArgumentDerivatives]:
         """Derivatives by what is fixed."""
-        return Kernel(self._program.argument_derivatives)
+        return Kernel(self._program.argument_derivatives, ArgumentDerivatives)
 
     @cached_property
-    def robot_state(self) -> Kernel:
+    def robot_state(self) -> Kernel[RobotNumbers]:
         """The robot's expressions, at the first pose."""
         return self.robot_states[0]
 
     @cached_property
-    def robot_states(self) -> tuple[Kernel, ...]:
+    def robot_states(self) -> tuple[Kernel[RobotNumbers], ...]:
         """The robot's expressions at each pose."""
-        return tuple(Kernel(self._program.robot_state(pose)) for pose in range(len(self._program.robots)))
+        poses = range(len(self._program.robots))
+        return tuple(Kernel(self._program.robot_state(pose), RobotNumbers.from_outputs) for pose in poses)

@@ -14,11 +14,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Dimension, FloatArray, frozen_array
+from ...models import Dimension, FloatArray, frozen_vector
 from ..case.limits.constraint import Constraint, Reading
 from ..case.task import Sense
 from .nlp import Nlp
-from .program import Scalar
+from .places import Scalar
 from .sampling import starting_points
 
 #: A number is moved when it is moved by more than this part of itself.
@@ -52,6 +52,7 @@ class _MovableSide:
 
     key: str
     constraint: Constraint
+    place: int
     limit: float
     direction: float
 
@@ -71,12 +72,12 @@ class _MovableSide:
 def _rows(nlp: Nlp) -> list[_MovableSide]:
     rows = []
     bounds = zip(nlp.program.constraints, nlp.g_lower, nlp.g_upper, strict=True)
-    for constraint, lower, upper in bounds:
+    for place, (constraint, lower, upper) in enumerate(bounds):
         low, high = constraint.keys
         if low:
-            rows.append(_MovableSide(low, constraint, float(lower), -1.0))
+            rows.append(_MovableSide(low, constraint, place, float(lower), -1.0))
         if high:
-            rows.append(_MovableSide(high, constraint, float(upper), 1.0))
+            rows.append(_MovableSide(high, constraint, place, float(upper), 1.0))
     return rows
 
 
@@ -107,11 +108,11 @@ def elastic(nlp: Nlp) -> Nlp:
         nlp,
         program=stretched,
         sense=Sense.MIN,
-        lower=_vector([*nlp.lower, *np.zeros(len(keys))]),
-        upper=_vector([*nlp.upper, *most]),
-        start=_vector([*nlp.start, *most]),
-        g_lower=_vector(lower),
-        g_upper=_vector(upper),
+        lower=frozen_vector([*nlp.lower, *np.zeros(len(keys))]),
+        upper=frozen_vector([*nlp.upper, *most]),
+        start=frozen_vector([*nlp.start, *most]),
+        g_lower=frozen_vector(lower),
+        g_upper=frozen_vector(upper),
         size=1.0,
     )
 
@@ -140,10 +141,9 @@ def _keys(rows: Sequence[_MovableSide]) -> list[str]:
 
 def _missing(nlp: Nlp, rows: Sequence[_MovableSide], keys: Sequence[str], x: FloatArray) -> FloatArray:
     g = nlp.evaluate(x)[1]
-    places = {constraint.name: k for k, constraint in enumerate(nlp.program.constraints)}
     needed = np.zeros(len(keys))
     for row in rows:
-        value = float(g[places[row.constraint.name]])
+        value = float(g[row.place])
         missing = row.missing(value) if np.isfinite(value) else 0.0
         needed[keys.index(row.key)] = max(needed[keys.index(row.key)], min(missing, _FARTHEST))
     return needed
@@ -161,7 +161,3 @@ def _farthest(nlp: Nlp, rows: Sequence[_MovableSide], keys: Sequence[str]) -> Fl
         if row.direction < 0 and one_sided:
             most[k] = min(most[k], 1.0)
     return np.asarray(np.maximum(most, 1e-3), dtype=np.float64)
-
-
-def _vector(values: Sequence[float]) -> FloatArray:
-    return frozen_array(values, (len(values),))

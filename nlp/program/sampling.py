@@ -8,6 +8,7 @@ import numpy as np
 
 from ...models import FloatArray
 from .nlp import Nlp
+from .places import FreeRotation
 
 
 def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
@@ -29,18 +30,16 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
         strata = generator.sample(range(count - 1), count - 1)
         column[:] = [(stratum + generator.random()) / (count - 1) for stratum in strata]
     points = nlp.lower + unit * (nlp.upper - nlp.lower)
-    for triple in nlp.program.directions:
+    for triple in nlp.program.places.directions:
         points[:, triple] = _sphere(generator, count - 1)
-    names = [variable.name for variable in nlp.program.variables]
-    for prefix in nlp.case.pose_prefixes:
-        if f"{prefix}q_x" not in names:
+    for rotation in nlp.program.places.rotations:
+        if not isinstance(rotation, FreeRotation):
             continue
-        at = names.index(f"{prefix}q_x")
-        ball = [constraint.name for constraint in nlp.program.constraints].index(f"{prefix}angle")
+        ball = nlp.program.constraints.index(rotation.ball)
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
         # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
-        radii = np.cbrt(inner + unit[:, at] * (outer - inner))
-        points[:, at : at + 3] = radii[:, None] * _sphere(generator, count - 1)
+        radii = np.cbrt(inner + unit[:, rotation.q[0]] * (outer - inner))
+        points[:, rotation.q] = radii[:, None] * _sphere(generator, count - 1)
     return np.vstack([nlp.start, np.clip(points, nlp.lower, nlp.upper)])
 
 

@@ -15,7 +15,8 @@ from ..certificate.proof import Proof, Statement, fingerprint
 from ..certificate.proofwriter import ProofWriter
 from ..certificate.standardform import standard_form
 from ..errors import InputError
-from ..program.formulation import formulate, formulate_each, formulate_weighted, formulate_worst
+from ..program.epigraph import formulate_worst
+from ..program.formulation import formulate, formulate_each, formulate_weighted
 from ..program.nlp import Nlp
 from .compromise import Compromise, solve_tasks
 from .multistart import Solution, solve_nlp
@@ -183,6 +184,8 @@ def _statement(compromise: Compromise) -> Statement:
     if compromise.method is Method.WEIGHTED_SUM or compromise.combined is None:
         return Statement("weighted-sum", weights=weights)
     nlp = compromise.combined.nlp
-    named = {scalar.name: float(value) for scalar, value in zip(nlp.program.arguments, nlp.arguments, strict=True)}
-    best = tuple(named[f"best{j}"] for j in range(len(weights)))
-    return Statement("worst-case", weights=weights, best=best, ceiling=named["ceiling"])
+    epigraph = nlp.program.places.epigraph
+    if epigraph is None:
+        raise TypeError("the program of a worst case has an epigraph")
+    best = tuple(float(nlp.arguments[place]) for place in epigraph.best)
+    return Statement("worst-case", weights=weights, best=best, ceiling=float(nlp.arguments[epigraph.ceiling]))

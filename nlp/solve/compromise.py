@@ -32,8 +32,10 @@ from ..errors import CaseError
 from ..evidence.kkt import FEASIBLE, correct, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState
-from ..program.formulation import formulate_each, formulate_weighted, formulate_worst, near
+from ..program.epigraph import formulate_worst, level_of_tasks
+from ..program.formulation import formulate_each, formulate_weighted, with_proximity_term
 from ..program.nlp import Nlp
+from ..program.places import FreeRotation
 from .ipopt import StartStatus
 from .multistart import SAME_VALUE, Progress, Solution, Status, solve_nlp, state_or_none
 
@@ -214,7 +216,7 @@ def _combined(
     if case.method is Method.WEIGHTED_SUM:
         return solve_nlp(formulate_weighted(case, weights), search, first=first, jobs=jobs, progress=progress)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
-    levels = [_level(case, nlps, weights, best, x) for x in first]
+    levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
     # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
@@ -223,20 +225,6 @@ def _combined(
     bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
     starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
     return solve_nlp(nlp, search, first=starts, jobs=jobs, progress=progress)
-
-
-def _level(case: Case, nlps: Sequence[Nlp], weights: Sequence[float], best: Sequence[float], x: FloatArray) -> float:
-    """The level of :func:`formulate_worst` that a point keeps."""
-    values = [nlp.evaluate(x)[0] for nlp in nlps]
-    senses = {task.sense for task in case.tasks}
-    if senses == {Sense.MAX}:
-        return min(F / w for F, w in zip(values, weights, strict=True))
-    if senses == {Sense.MIN}:
-        return max(w * F for F, w in zip(values, weights, strict=True))
-    return max(
-        w * (b - F if task.sense is Sense.MAX else F - b)
-        for F, w, b, task in zip(values, weights, best, case.tasks, strict=True)
-    )
 
 
 def _settled(
@@ -295,7 +283,7 @@ def _nearest(
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]
     for strength in _DRAWN:
-        drawn = solve_nlp(near(nlp, target, strength), replace(search, starts=1), first=points, jobs=1)
+        drawn = solve_nlp(with_proximity_term(nlp, target, strength), replace(search, starts=1), first=points, jobs=1)
         points = [drawn.x]
         for start in drawn.starts:
             back = correct(nlp, start.x, linearise(nlp, start.x).active())
@@ -309,13 +297,14 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
     """``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
     shares = np.array(weights) / len(weights)
     Q = shares @ np.array(points)
-    for triple in nlp.program.directions:
+    for triple in nlp.program.places.directions:
         size = float(np.linalg.norm(Q[list(triple)]))
         if size > 0:
             Q[list(triple)] /= size
-    names = [variable.name for variable in nlp.program.variables]
-    for at in (names.index(f"{prefix}q_x") for prefix in nlp.case.pose_prefixes if f"{prefix}q_x" in names):
-        Q[at : at + 3] = _mean_rotation([point[at : at + 3] for point in points], shares)
+    for rotation in nlp.program.places.rotations:
+        if isinstance(rotation, FreeRotation):
+            q = list(rotation.q)
+            Q[q] = _mean_rotation([point[q] for point in points], shares)
     return np.asarray(Q, dtype=np.float64)
 
 

@@ -122,7 +122,9 @@ def _row_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
 
     The program's other constraints are written that way already and have 1.
     """
-    rows = np.array([nlp.program.kernels.derivatives(x, nlp.arguments)[3] for x in points[:_LOOKED_AT]]) * nlp.scale
+    rows = (
+        np.array([nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_LOOKED_AT]]) * nlp.scale
+    )
     lengths = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
     lengths = np.where(np.isfinite(lengths), lengths, 0.0).max(axis=0, initial=0.0)
     limits = np.array([any(constraint.keys) for constraint in nlp.program.constraints], dtype=bool)

@@ -20,7 +20,7 @@ from screwsynth.nlp.certificate.branchandbound import certify
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.engines import engine_for, kernel
 from screwsynth.nlp.certificate.standardform import standard_form
-from screwsynth.nlp.program.formulation import formulate_worst
+from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")

@@ -75,8 +75,9 @@ def test_compiled_values_are_those_of_the_program_at_a_thousand_points(
         assert c.call("jacobian", x, k, J, work) == c.call("rates", x, k, rates, work) == 0
         assert c.call("limits", x, k, g, dg, work) == c.call("rotation", x, k, R, axis, angle, work) == 0
         value, slope, constraint, constraint_slope = kernels.derivatives(x, p)
-        (second,) = kernels.hessian(x, p, 1.0, np.zeros(limits))
-        _, rotation, _, jacobian, products, *_ = kernels.robot_state(x, p)
+        second = kernels.hessian(x, p, 1.0, np.zeros(limits))
+        state = kernels.robot_state(x, p)
+        rotation, jacobian, products = state.rotation, state.jacobian, state.rates
         # The same operations: a compiler may still contract or reorder the last digit.
         for got, wanted in (
             (F, value.ravel()),

@@ -279,7 +279,7 @@ def test_a_search_that_ends_at_a_saddle_is_no_answer(
 def test_a_side_that_only_rounding_holds_does_not_make_an_optimum(embedded: EmbeddedCase) -> None:
     # With this task F is even in several variables: their middles are bounds here, stationary, and saddles.
     c, nlp = embedded("paper-4.3"), formulate(load_case("paper-4.3"))
-    at = [argument.name for argument in nlp.program.arguments].index("twist_0")
+    at = nlp.program.places.twists[0].start
     p = np.array(nlp.arguments)
     p[at : at + 6] = [0, 0, 0, 0, 1, 0]
     lower = np.array([0, 0, 0, 20, 0, 0, -0.3235238064])
@@ -333,7 +333,7 @@ def test_the_point_may_be_that_of_the_last_result(embedded: EmbeddedCase) -> Non
 
 def test_tracking_follows_an_optimum_without_a_jump(embedded: EmbeddedCase) -> None:
     c, nlp = embedded("paper-4.3"), formulate(load_case("paper-4.3"))
-    at = [argument.name for argument in nlp.program.arguments].index("twist_0")
+    at = nlp.program.places.twists[0].start
     x, longest = c.solve().x, 0.0
     for tick in range(2000):
         angle = 1e-4 * tick

@@ -394,14 +394,15 @@ def test_gradient_of_the_distance_is_that_of_the_nearest_points() -> None:
 def test_derivatives_are_finite_for_parallel_legs_that_are_far_apart() -> None:
     text = HEXAPOD.replace("octahedral", "aligned").replace("max = 9 }", "max = 16 }")
     nlp = formulate(case_with({"leg_clearance": {"min": 1.0}}, text))
+    names = [variable.name for variable in nlp.program.variables]
     x = np.array(nlp.start)
     for name in ("x1", "x2"):
-        x[nlp.program.index(name)] = 12.0
+        x[names.index(name)] = 12.0
     for name in ("x3", "x4"):
-        x[nlp.program.index(name)] = math.radians(20)
-    hessian = nlp.program.kernels.hessian(x, nlp.arguments, 0.0, np.ones(len(nlp.program.constraints)))[0]
+        x[names.index(name)] = math.radians(20)
+    hessian = nlp.program.kernels.hessian(x, nlp.arguments, 0.0, np.ones(len(nlp.program.constraints)))
     # All six legs are parallel here, the nearest two 8.2 cm apart.
-    angle = nlp.program.index("q_x")
+    angle = names.index("q_x")
     hessian[angle : angle + 3, angle : angle + 3] = 0
     np.testing.assert_allclose(hessian, 0, atol=1e-12)
 

@@ -197,7 +197,7 @@ def test_starting_points_lie_in_every_poses_ball() -> None:
 
     nlp = formulate(case_of(LISTED.replace("{ axis = [0, 1, 0], angle", "{ angle")))
     for name in ("pose1_q_x", "pose2_q_x"):
-        at = nlp.program.index(name)
+        at = [variable.name for variable in nlp.program.variables].index(name)
         sizes = np.linalg.norm(starting_points(nlp, 60, 1)[:, at : at + 3], axis=1)
         assert sizes.max() <= math.sin(math.radians(10)) + 1e-12
         assert np.median(sizes) > 0.7 * math.sin(math.radians(10))

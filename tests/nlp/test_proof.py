@@ -16,7 +16,7 @@ from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, read_proof
 from screwsynth.nlp.certificate.proofcheck import check_proof
-from screwsynth.nlp.certificate.prooftree import Reader, unfolded
+from screwsynth.nlp.certificate.prooftree import TreeReader, unfolded
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.solve.certified import CertifyOptions, certify_case, program_of, proof_of
 
@@ -67,7 +67,7 @@ def test_a_proof_with_rows_holds(ball: Proof) -> None:
     check_proof(ball, nlp)
 
 
-class Places(Reader):
+class Places(TreeReader):
     """Notes where in the tree each closing reason stands, and how long it is."""
 
     def _leaf(self, kind: int, lower: np.ndarray, upper: np.ndarray) -> None:

@@ -233,8 +233,7 @@ def _posture(nlp: Nlp, x: FloatArray, state: RobotState) -> tuple[Linkage, Postu
     """Return the linkage and the posture of a program's robot at a point (n,), at its first pose."""
     model = nlp.program.model
     parameters = np.array([value for item in model.parameters for value in state.parameters[item.name]])
-    first = "at1_" if len(nlp.program.robots) > 1 else ""
-    unknowns = np.array([x[nlp.program.index(f"{first}{item.name}")] for item in model.unknowns])
+    unknowns = x[list(nlp.program.places.unknowns[0])]
     linkage = Linkage(model, parameters, nlp.case.characteristic_length)
     return linkage, linkage.posture_at(state.rotation, state.position, unknowns)
 

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, WrenchKind, displacement, frozen_array
-from ...program.kernel import Kernel
+from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian
+from ...program.kernel import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
 _STEPS = 20
@@ -55,25 +55,16 @@ class Linkage:
     def __init__(self, model: Model, parameters: FloatArray, characteristic_length: float = 1.0) -> None:
         self.model = model
         self._parameters = parameters
-        self._scales = np.array(
-            [characteristic_length if row.kind is WrenchKind.COUPLE else 1.0 for row in model.wrenches]
-        )
-        unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns])
-        symbols = [
-            ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
-            unknowns,
-            model.pose.rotation,
-            model.pose.position,
-        ]
+        own = Substitution.identity(model)
         outputs = [
             ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
-            ca.horzcat(*[ca.vertcat(row.force, row.moment) / ca.sqrt(row.square) for row in model.wrenches]),
+            jacobian(model.wrenches, SX(characteristic_length)),
             *[quantity.values for quantity in model.quantities],
         ]
-        self._drawing = Kernel(ca.Function("drawing", symbols, [ca.densify(each) for each in outputs]))
+        self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
         closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
-        slopes = ca.jacobian(closure, unknowns)
-        self._loops = Kernel(ca.Function("loops", symbols, [ca.densify(closure), ca.densify(slopes)]))
+        slopes = ca.jacobian(closure, own.unknowns)
+        self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 
     def posture_at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
         """Return the drawing at a pose.
@@ -99,7 +90,7 @@ class Linkage:
             circles=frozen_array(circles.reshape(-1, 3, 3), (len(scene.circles), 3, 3)),
             directions=frozen_array(directions, directions.shape),
             marks=tuple(frozen_array(part, part.shape) for part in np.split(marks, ends)) if scene.marks else (),
-            jacobian=frozen_array(self._scales[:, None] * rows.T, (len(self.model.wrenches), 6)),
+            jacobian=frozen_array(rows, (len(self.model.wrenches), 6)),
             quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
         )
 

@@ -86,7 +86,7 @@ def around(report: Report) -> Markup:
             "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
             + (
                 " A component of a free direction moves with the direction's others, which are scaled to unit length."
-                if report.parts[0].nlp.program.directions
+                if report.parts[0].nlp.program.places.directions
                 else ""
             ),
         )

@@ -6,6 +6,7 @@ from typing import Any
 
 from rich.console import Group
 
+from ...program.places import FreeRotation
 from ...results.data import motion_of
 from ..pictures.style import RATE_COLOURS
 from ..terminal import (
@@ -24,7 +25,6 @@ from .frames import ViewData
 from .judgement import certificates, evidence_section, published
 from .markup import Markup, grid, html_table, joined, paragraphs, paragraphs_of, tag
 from .report import Report
-from .slices import LEVEL
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
@@ -71,11 +71,13 @@ def _case(report: Report) -> Markup:
     )
     if len(case.tasks) > 1:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
-    names = [variable.name for variable in first.nlp.program.variables if variable.name != LEVEL]
+    program = first.nlp.program
+    level = None if program.places.epigraph is None else program.places.epigraph.level
+    names = [variable.name for k, variable in enumerate(program.variables) if k != level]
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
-        if any(name.endswith("q_x") for name in names):
+        if any(isinstance(rotation, FreeRotation) for rotation in program.places.rotations):
             lines.append("q is the vector part of the unit quaternion that turns the platform.")
     else:
         lines.append("Nothing is free: the robot is evaluated where it stands.")

@@ -10,16 +10,13 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE
+from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
 
-#: The variable that a program over its worst pose has beside those of the robot.
-LEVEL = "level"
 #: Points along a line, and along each side of a plane: odd, so that the middle of the range is among them.
 _LINE, _PLANE = 121, 41
 #: Where the other components of a unit vector are smaller than this, no scale of them keeps its length.
@@ -101,14 +98,15 @@ def has_loops(nlp: Nlp) -> bool:
 
 
 def _movable(nlp: Nlp) -> list[int]:
-    """Indices of the variables but the worst pose's level, which follows from the others."""
-    return [k for k, variable in enumerate(nlp.program.variables) if variable.name != LEVEL]
+    """Return indices of the variables but the epigraph variable, which follows from the others."""
+    epigraph = nlp.program.places.epigraph
+    return [k for k in range(nlp.n) if epigraph is None or k != epigraph.level]
 
 
 def _range(nlp: Nlp, k: int, count: int, x: FloatArray) -> FloatArray:
     """Return values of a variable from bound to bound, the point's own among them."""
     lower, upper = nlp.lower[k], nlp.upper[k]
-    if any(k in direction for direction in nlp.program.directions):
+    if any(k in direction for direction in nlp.program.places.directions):
         lower, upper = max(lower, -1.0), min(upper, 1.0)
     return np.unique(np.append(np.linspace(lower, upper, count), np.clip(x[k], lower, upper)))
 
@@ -127,7 +125,7 @@ def _points_with(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatA
     """
     points = np.repeat(x[:, None], values.shape[1], axis=1)
     points[list(changed)] = values
-    for direction in nlp.program.directions:
+    for direction in nlp.program.places.directions:
         own = [k for k in direction if k in changed]
         rest = [k for k in direction if k not in changed]
         if not own:
@@ -152,11 +150,9 @@ class _Values(NamedTuple):
 
 def _values(nlp: Nlp, points: FloatArray) -> _Values:
     """Return F and the constraints' state at points (n, k)."""
-    level = [k for k, variable in enumerate(nlp.program.variables) if variable.name == LEVEL]
-    if level and len(nlp.program.robots) > 1:
-        extreme = ca.mmin if nlp.sense is Sense.MAX else ca.mmax
-        worst = extreme(ca.vertcat(*[robot.F[0] for robot in nlp.program.robots]))
-        points[level] = ca.Function("worst", [nlp.program.x, nlp.program.p], [worst])(points, nlp.arguments).full()
+    epigraph = nlp.program.places.epigraph
+    if epigraph is not None and len(nlp.program.robots) > 1:
+        points[epigraph.level] = exact_levels(nlp, points)
     F, g = (each.full() for each in nlp.program.values(points, nlp.arguments))
     # An infinite bound is none, and has no size.
     bounds = np.nan_to_num(np.abs([nlp.g_lower, nlp.g_upper]), nan=0.0, posinf=0.0)

@@ -1,0 +1,158 @@
+"""Where a program's numbers stand: among the variables ``x``, or among the arguments ``p``.
+
+A symbol is found by a typed place and never by the text of its name. Names are for people alone, so a robot may call
+its parameters what it likes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple, TypeAlias
+
+import casadi as ca
+from casadi import SX
+
+from ...models import Dimension, component_names
+from ..case.limits.constraint import Constraint
+from ..case.pose import Free, Value
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A named scalar of a program: a free variable or an argument that a case fixes."""
+
+    name: str
+    dimension: Dimension
+
+
+@dataclass(frozen=True)
+class Place:
+    """Index of a scalar among the variables (``x``) or the arguments (``p``)."""
+
+    vector: Literal["x", "p"]
+    index: int
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRotation:
+    """A rotation with a free axis.
+
+    Attributes:
+        q: indices in ``x`` of the vector part of the unit quaternion.
+        ball: the constraint on ``|q|^2``.
+    """
+
+    q: tuple[int, int, int]
+    ball: Constraint
+
+
+@dataclass(frozen=True)
+class HeldRotation:
+    """A rotation with a held axis.
+
+    Attributes:
+        angle: place of the angle, radians.
+    """
+
+    angle: Place
+
+
+#: None stands for no rotation at all: a free axis with an angle of zero.
+RotationPlaces: TypeAlias = FreeRotation | HeldRotation | None
+
+
+@dataclass(frozen=True, eq=False)
+class Epigraph:
+    """The epigraph of a worst case: a variable that bounds several objectives.
+
+    Attributes:
+        level: index in ``x`` of the epigraph variable; the last one.
+        ceiling: index in ``p`` of the size by which the constraints are divided.
+        constraints: one for each objective.
+        best: indices in ``p`` of each task's own optimum; empty over poses.
+    """
+
+    level: int
+    ceiling: int
+    constraints: tuple[Constraint, ...]
+    best: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where a program's numbers stand.
+
+    Attributes:
+        numbers: the case's own numbers, in the order of :attr:`~..case.case.Case.scalars`.
+        rotations: of each stated pose.
+        unknowns: indices in ``x`` of the robot's internal unknowns, at each pose.
+        twists: indices in ``p`` of each task's six numbers.
+        directions: indices in ``x`` of the three components of each unit vector that is wholly free.
+        epigraph: of a worst case; None where the objective is made of F itself.
+    """
+
+    numbers: tuple[Place, ...]
+    rotations: tuple[RotationPlaces, ...]
+    unknowns: tuple[tuple[int, ...], ...]
+    twists: tuple[range, ...]
+    directions: tuple[tuple[int, int, int], ...] = ()
+    epigraph: Epigraph | None = None
+
+
+class Placed(NamedTuple):
+    """Symbols of several numbers, (n, 1), and where each stands."""
+
+    symbols: SX
+    places: tuple[Place, ...]
+
+
+@dataclass
+class SymbolTable:
+    """The symbols of a program under construction: free variables and fixed arguments, in the order they are added."""
+
+    variables: list[Scalar] = field(default_factory=list)
+    x: list[SX] = field(default_factory=list)
+    bounds: list[Free] = field(default_factory=list)
+    arguments: list[Scalar] = field(default_factory=list)
+    p: list[SX] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    _names: set[str] = field(default_factory=set)
+
+    def add(self, name: str, dimension: Dimension, value: Value) -> Placed:
+        """Add a number, as a variable where it is free and as an argument where it is fixed.
+
+        A name that an earlier number has is shown with ``program.`` before it.
+        """
+        name = f"program.{name}" if name in self._names else name
+        self._names.add(name)
+        symbol, scalar = SX.sym(name), Scalar(name, dimension)
+        if isinstance(value, Free):
+            self.variables.append(scalar)
+            self.x.append(symbol)
+            self.bounds.append(value)
+            return Placed(symbol, (Place("x", len(self.x) - 1),))
+        self.arguments.append(scalar)
+        self.p.append(symbol)
+        self.values.append(value)
+        return Placed(symbol, (Place("p", len(self.p) - 1),))
+
+    def add_each(self, names: Sequence[str], dimension: Dimension, values: Sequence[Value]) -> Placed:
+        """Add several numbers by their names."""
+        added = [self.add(name, dimension, value) for name, value in zip(names, values, strict=True)]
+        return Placed(ca.vertcat(SX(0, 1), *[each.symbols for each in added]), tuple(each.places[0] for each in added))
+
+    def add_vector(self, name: str, dimension: Dimension, values: Sequence[Value]) -> Placed:
+        """Add the components of a vector: ``name_x, name_y, name_z``, or ``name_0`` and so on beyond three."""
+        names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
+        return self.add_each(names, dimension, values)
+
+    @property
+    def variables_vector(self) -> SX:
+        """(n, 1) symbols of the variables."""
+        return ca.vertcat(SX(0, 1), *self.x)
+
+    @property
+    def arguments_vector(self) -> SX:
+        """(k, 1) symbols of the arguments."""
+        return ca.vertcat(SX(0, 1), *self.p)
