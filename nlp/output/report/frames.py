@@ -195,6 +195,7 @@ def _largest_time(drawing: Drawing) -> float:
 
 
 def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, units: Units) -> FrameData:
+    """Return the data of one posture with its rates (m,)."""
     return {
         "t": t,
         "words": _words(drawing, t, units),
@@ -248,6 +249,7 @@ def _lengths(drawing: Drawing, posture: Posture) -> list[float]:
 
 
 def _motion_data(motion: Motion, units: Units) -> MotionData:
+    """Return the data of a twist with its words."""
     if math.isinf(motion.pitch):
         words = f"{motion.name}: translation"
     elif abs(motion.pitch) < 1e-9:
