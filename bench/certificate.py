@@ -9,11 +9,10 @@ import time
 from collections.abc import Iterable
 
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import Case, Free, Rotation, Task, load_case, solve
-from screwsynth.nlp.certificate.branchandbound import certify
+from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solve
+from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import Certificate
 from screwsynth.nlp.certificate.engines import kernel
-from screwsynth.nlp.solve.multistart import Solution
 
 LIMIT = 60.0
 
@@ -22,7 +21,7 @@ def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, 
     best = float("inf")
     for _ in range(3):
         began = time.process_time()
-        found = certify(solution.nlp, solution.x, gap=gap, engine=engine, jobs=1, time_limit=LIMIT)
+        found = certify_program(solution.nlp, solution.x, gap=gap, engine=engine, jobs=1, time_limit=LIMIT)
         best = min(best, time.process_time() - began)
         if best > 3:
             break

@@ -16,8 +16,8 @@ import numpy as np
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
 from screwsynth.nlp.case.case import Search
-from screwsynth.nlp.certificate.branchandbound import certify
-from screwsynth.nlp.solve.multistart import solve_nlp
+from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.solver.multistart import solve_program
 
 
 def random_case(seed: int) -> Case:
@@ -45,10 +45,10 @@ def random_case(seed: int) -> Case:
 def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
     seed, starts, gap, limit = job
     nlp = formulate(random_case(seed))
-    solution = solve_nlp(nlp, Search(starts=starts, seed=seed), jobs=1)
+    solution = solve_program(nlp, Search(starts=starts, seed=seed), jobs=1)
     known = solution.x if solution.status.is_answer else None
     began = time.process_time()
-    proved = certify(nlp, known, gap=gap, time_limit=limit, jobs=1)
+    proved = certify_program(nlp, known, gap=gap, time_limit=limit, jobs=1)
     seconds = time.process_time() - began
     sign = -nlp.sign
     best = max((sign * start.F for start in solution.starts if start.violation <= 1e-9), default=-np.inf)

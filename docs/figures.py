@@ -7,11 +7,7 @@ their parameters.
 from pathlib import Path
 
 from screwsynth.models import model_names
-from screwsynth.nlp import load_case, solve, solve_tasks
-from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.output.pictures.drawing import drawing_of_model
-from screwsynth.nlp.output.pictures.figures import picture
-from screwsynth.nlp.output.pictures.solutions import drawings_of
+from screwsynth.nlp import build_model, load_case, plot, solve
 
 FOLDER = Path(__file__).parent / "figures"
 CASES = {
@@ -26,8 +22,6 @@ CASES = {
 
 FOLDER.mkdir(exist_ok=True)
 for name, case in CASES.items():
-    loaded = load_case(case)
-    found = solve_tasks(loaded) if len(loaded.tasks) > 1 else solve(loaded)
-    (FOLDER / f"{name}.png").write_bytes(picture(drawings_of(found), ".png"))
+    plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in model_names():
-    (FOLDER / f"model-{model}.png").write_bytes(picture([drawing_of_model(build_model(model))], ".png"))
+    plot(build_model(model), FOLDER / f"model-{model}.png")

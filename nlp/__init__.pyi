@@ -1,13 +1,21 @@
 """Programs over the robots of :mod:`screwsynth.models`: the public names, and where each is."""
 
 from .case.case import Case as Case
-from .case.limits.limits import Actuator as Actuator
-from .case.limits.limits import Cone as Cone
-from .case.limits.limits import Footprint as Footprint
-from .case.limits.limits import Homogenised as Homogenised
-from .case.limits.limits import Interval as Interval
+from .case.limits.clearance import LegClearance as LegClearance
+from .case.limits.joints import BaseJointAngle as BaseJointAngle
+from .case.limits.joints import MountingPose as MountingPose
+from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
+from .case.limits.legs import Actuator as Actuator
+from .case.limits.legs import LegLength as LegLength
 from .case.limits.limits import Limits as Limits
-from .case.limits.limits import MountingPose as MountingPose
+from .case.limits.plates import Footprint as Footprint
+from .case.limits.plates import JointSpacing as JointSpacing
+from .case.limits.plates import RadiusRatio as RadiusRatio
+from .case.limits.quantity import QuantityLimit as QuantityLimit
+from .case.limits.rate_share import RateShare as RateShare
+from .case.limits.relation import Relations as Relations
+from .case.limits.singular_values import ConditionNumber as ConditionNumber
+from .case.limits.singular_values import SmallestSingularValue as SmallestSingularValue
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
 from .case.pose import Pose as Pose
@@ -25,9 +33,10 @@ from .case.settings import Search as Search
 from .case.task import Method as Method
 from .case.task import Sense as Sense
 from .case.task import Task as Task
-from .certificate.branchandbound import certify as certify
+from .certificate.branchandbound import certify_program as certify_program
 from .certificate.certificate import Certificate as Certificate
 from .certificate.certificate import CertificateStatus as CertificateStatus
+from .embedding.codegen import generate_c as generate_c
 from .errors import CaseError as CaseError
 from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
@@ -47,81 +56,28 @@ from .evidence.state import RobotState as RobotState
 from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
+from .output.pictures.plot import plot as plot
+from .output.report.html import report as report
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
-from .results.data import result_of as result_of
-from .solve.compromise import Compromise as Compromise
-from .solve.compromise import TaskOutcome as TaskOutcome
-from .solve.compromise import solve_tasks as solve_tasks
-from .solve.ipopt import Start as Start
-from .solve.ipopt import StartStatus as StartStatus
-from .solve.multistart import Optimum as Optimum
-from .solve.multistart import Solution as Solution
-from .solve.multistart import Status as Status
-from .solve.multistart import solve as solve
+from .results.jsondata import json_data as json_data
+from .results.regression import CaseCheck as CaseCheck
+from .results.regression import check as check
+from .results.result import result_of as result_of
+from .solver.certified import Certified as Certified
+from .solver.certified import certify as certify
+from .solver.interface import Solver as Solver
+from .solver.interface import SolverResult as SolverResult
+from .solver.interface import StopReason as StopReason
+from .solver.multistart import Optimum as Optimum
+from .solver.multistart import ProgramSolution as ProgramSolution
+from .solver.multistart import Status as Status
+from .solver.multistart import solve_program as solve_program
+from .solver.solution import Combination as Combination
+from .solver.solution import Solution as Solution
+from .solver.solution import TaskOutcome as TaskOutcome
+from .solver.solve import solve as solve
+from .solver.starts import Start as Start
+from .solver.starts import StartStatus as StartStatus
 from .units import Units as Units
-
-__all__ = [
-    "ActiveSide",
-    "Actuator",
-    "Case",
-    "CaseError",
-    "Certificate",
-    "CertificateStatus",
-    "Compromise",
-    "Cone",
-    "EvaluationError",
-    "Evidence",
-    "Expectation",
-    "Footprint",
-    "Free",
-    "Homogenised",
-    "InputError",
-    "Interval",
-    "Limits",
-    "Margin",
-    "Method",
-    "MountingPose",
-    "Nlp",
-    "Optimum",
-    "OverPoses",
-    "PointKind",
-    "Pose",
-    "Program",
-    "Published",
-    "RobotState",
-    "Rotation",
-    "ScrewsynthError",
-    "Search",
-    "Sense",
-    "Sensitivity",
-    "Solution",
-    "Start",
-    "StartStatus",
-    "Status",
-    "Step",
-    "Task",
-    "TaskAnalysis",
-    "TaskOutcome",
-    "ToleranceLoss",
-    "UncoveredError",
-    "Units",
-    "along_screw",
-    "analyse_tasks",
-    "build_model",
-    "case_from_tables",
-    "certify",
-    "evaluate",
-    "examine",
-    "formulate",
-    "load_case",
-    "margins_of",
-    "over_grid",
-    "result_of",
-    "sensitivities",
-    "shipped_cases",
-    "solve",
-    "solve_tasks",
-    "tolerance_loss",
-]

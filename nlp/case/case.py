@@ -17,8 +17,7 @@ import numpy as np
 from ...models import Dimension, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ..errors import CaseError, nearest
 from ..units import Units
-from .limits.grammar import SentenceError, parse
-from .limits.limitcheck import checked_limits
+from .limits.limit import LimitedCase
 from .limits.limits import Limits
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Step, Value
 from .settings import Expectation, Published, Search
@@ -86,7 +85,8 @@ class Case:
         settle(self, "rotation", _rotation(self, self.rotation, "pose"))
         settle(self, "further", _further(self))
         settle(self, "tasks", _tasks(self))
-        _check_buildable(self)
+        self.limits.check(self.as_limited)
+        _check_tolerance(self)
         if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
@@ -143,6 +143,11 @@ class Case:
             if pose.rotation.axis is not None:
                 names[f"{prefix}angle"] = Dimension.ANGLE
         return names
+
+    @property
+    def as_limited(self) -> LimitedCase:
+        """The case as far as its limits read it."""
+        return LimitedCase(self.model, self.units, self.scalars)
 
 
 def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
@@ -204,14 +209,7 @@ def _further(case: Case) -> tuple[Pose, ...]:
     return tuple(settled)
 
 
-def _check_buildable(case: Case) -> None:
-    """Check the limits against the robot, and that each sentence among them can be understood."""
-    checked_limits(case.limits, case.model, case.units)
-    for index, text in enumerate(case.limits.custom):
-        try:
-            parse(text, case.scalars)
-        except SentenceError as error:
-            raise CaseError(f"limits.custom[{index}]", str(error), text) from None
+def _check_tolerance(case: Case) -> None:
     tolerance = case.joint_centre_tolerance
     if tolerance is not None and not (0 < tolerance <= LARGEST):
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)

@@ -50,7 +50,7 @@ _HISTORY = 200
 CertifyProgress = Callable[[float, float, float, int, int], None]
 
 
-def certify(
+def certify_program(
     nlp: Nlp,
     x: FloatArray | None = None,
     *,

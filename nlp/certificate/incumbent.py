@@ -8,7 +8,7 @@ import numpy as np
 
 from ...models import FloatArray
 from ..errors import InputError
-from ..evidence.kkt import FEASIBLE, assembled, correct, linearise
+from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..program.sampling import starting_points
 from .standardform import StandardForm
 
@@ -85,12 +85,12 @@ class Incumbent:
         value = self._form.value_at(point)
         if not math.isfinite(value):
             return
-        whole = assembled(nlp, self._with_level(point, value))
+        whole = close_equations(nlp, self._with_level(point, value))
         at = linearise(nlp, whole)
         if not math.isfinite(at.violation):
             return
         self._keep_if_better(whole[: self._form.n])
-        corrected = correct(nlp, whole, at.active())
+        corrected = correct_point(nlp, whole, at.active())
         self._keep_if_better(np.clip(corrected.x, nlp.lower, nlp.upper)[: self._form.n])
 
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:

@@ -25,7 +25,7 @@ from ..errors import CaseError, InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from ..solve.multistart import Status, solve_nlp
+from ..solver.multistart import Status, solve_program
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .stages import StagedFunctions, stage_functions
 
@@ -47,16 +47,17 @@ _TRIALS = 30
 #: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
+_NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 
 
-def generate_c(case: Case, source: str) -> dict[str, str]:
+def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """Generate the files of a case's C folder.
 
     The twist is a run-time argument, as is everything fixed; its default is that of the case's first task.
 
     Args:
         case: the case.
-        source: text of its case file, which goes into the folder.
+        source: text of its case file, which goes into the folder as ``case.toml``.
 
     Returns:
         Text by file name.
@@ -99,7 +100,7 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
     prefix = identifier(case.name)
     size = len(prefix) + len("_CASADI_")
     functions = staged.all
-    solution = solve_nlp(nlp, case.search)
+    solution = solve_program(nlp, case.search)
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)

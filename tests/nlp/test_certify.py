@@ -16,13 +16,15 @@ from screwsynth.nlp import Case, Free, Rotation, Task, case_from_tables, formula
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.certificate import bounding, quadratic
 from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
-from screwsynth.nlp.certificate.branchandbound import certify
+from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.engines import engine_for, kernel
 from screwsynth.nlp.certificate.examination import Examination, Verdict
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.results.evidence import certificate_data
+from screwsynth.nlp.results.jsondata import json_data
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 ENGINES = ["numpy", pytest.param("c", marks=needs_kernel)]
@@ -107,7 +109,7 @@ def test_the_engines_agree_box_by_box(case: Case) -> None:
 @pytest.mark.parametrize("name", ["paper-4.2-rotation", "paper-4.2-translation"])
 def test_one_box_is_enough_for_a_flat_optimum(name: str, engine: str) -> None:
     solution = solve(load_case(name), starts=2)
-    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine)
+    proved = certify_program(solution.nlp, solution.x, claimed=solution.F, engine=engine)
     assert (proved.status, proved.boxes, proved.engine) == (CertificateStatus.PROVED, 1, engine)
     assert proved.gap <= 1e-9
 
@@ -116,7 +118,7 @@ def test_one_box_is_enough_for_a_flat_optimum(name: str, engine: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_paper_is_proved_to_a_ten_thousandth(engine: str) -> None:
     solution = solve(load_case("paper-4.1-helical"), starts=4)
-    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine)
+    proved = certify_program(solution.nlp, solution.x, claimed=solution.F, engine=engine)
     assert proved.status is CertificateStatus.PROVED
     assert 0 <= proved.bound - 407.2106717 <= 1.0001e-4 * 407.2106717
     assert proved.boxes <= 60_000
@@ -138,7 +140,7 @@ def test_the_paper_is_proved_to_a_ten_thousandth(engine: str) -> None:
 )
 def test_the_kernel_proves(case: Case, gap: float, most: int) -> None:
     solution = solve(case, starts=8)
-    proved = certify(solution.nlp, solution.x, claimed=solution.F, gap=gap, time_limit=120)
+    proved = certify_program(solution.nlp, solution.x, claimed=solution.F, gap=gap, time_limit=120)
     assert proved.status is CertificateStatus.PROVED
     assert proved.gap <= proved.allowed * (1 + 1e-9)
     assert proved.boxes <= most
@@ -147,7 +149,7 @@ def test_the_kernel_proves(case: Case, gap: float, most: int) -> None:
 def ipopt_never_beats(case: Case, engine: str | None = None) -> tuple[float, float]:
     """The certified bound and the best of many Ipopt starts, to be maximised."""
     solution = solve(case, starts=48, seed=1)
-    proved = certify(solution.nlp, solution.x, gap=1e-2, time_limit=60, engine=engine)
+    proved = certify_program(solution.nlp, solution.x, gap=1e-2, time_limit=60, engine=engine)
     assert proved.status is CertificateStatus.PROVED
     sign = -solution.nlp.sign
     return sign * proved.bound, sign * solution.F
@@ -173,7 +175,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     solution = solve(case, starts=4)
     (ball,) = [side for side in solution.evidence.active if side.name == "angle"]  # type: ignore[union-attr]
     assert ball.bound == "max"
-    sound = certify(solution.nlp, None, engine="numpy", gap=1e-3)
+    sound = certify_program(solution.nlp, None, engine="numpy", gap=1e-3)
     assert sound.status is CertificateStatus.PROVED
     assert sound.bound >= solution.F * (1 - 1e-12)
 
@@ -184,7 +186,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
     inside = 0.5 * solution.x
-    wrong = certify(solution.nlp, inside, engine="numpy", gap=1e-9)
+    wrong = certify_program(solution.nlp, inside, engine="numpy", gap=1e-9)
     assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
 
 
@@ -200,7 +202,7 @@ def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeyp
         wrong = 0
         for seed in range(10):
             solution = solve(random_case(seed), starts=8, seed=1)
-            bound = certify(solution.nlp, None, gap=1e-2, engine="numpy", time_limit=20).bound
+            bound = certify_program(solution.nlp, None, gap=1e-2, engine="numpy", time_limit=20).bound
             wrong += -solution.nlp.sign * (bound - solution.F) < -1e-6 * abs(solution.F)
         return wrong
 
@@ -215,12 +217,13 @@ def test_a_box_without_a_value_is_kept(engine: str) -> None:
     task = Task((0.3, -0.2, 0.5, 1.0, 2.0, -0.5), "max")  # type: ignore[arg-type]
     position = [Free(-2.0, 3.0), Free(-2.0, 2.0), Free(-1.0, 2.0)]
     case = Case(stewart_gough(), {"x1": 5.0, "x2": 5.0, "x3": 0.3, "x4": 0.3}, position, [task])
-    found = certify(formulate(case), np.array([1.0, 1.0, 1.0]), engine=engine, time_limit=30)
+    found = certify_program(formulate(case), np.array([1.0, 1.0, 1.0]), engine=engine, time_limit=30)
     assert found.status is CertificateStatus.INCOMPLETE
     assert not math.isfinite(found.bound)
     assert "zero length" in found.reason
-    assert found.as_data()["bound"] is None
-    json.dumps(found.as_data(), allow_nan=False)
+    data = json_data(certificate_data(found))
+    assert data["bound"] is None
+    json.dumps(data, allow_nan=False)
 
 
 def test_nan_in_a_bound_does_not_close_a_box() -> None:
@@ -237,14 +240,14 @@ def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
     assert (solution.x >= solution.nlp.lower).all()
     assert (solution.x <= solution.nlp.upper).all()
     outside = solution.nlp.upper + 1e-6 * solution.nlp.scale
-    found = certify(solution.nlp, outside)
+    found = certify_program(solution.nlp, outside)
     assert found.status is CertificateStatus.REFUSED
     assert "outside of the limits" in found.statement
 
 
 def test_an_incumbent_that_is_too_good_is_refused() -> None:
     solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
-    found = certify(solution.nlp, solution.x, claimed=solution.F * (1 + 1e-3))
+    found = certify_program(solution.nlp, solution.x, claimed=solution.F * (1 + 1e-3))
     assert found.status is CertificateStatus.REFUSED
     assert f"{solution.F:.10g}" in found.statement
     assert found.boxes == 0
@@ -253,7 +256,7 @@ def test_an_incumbent_that_is_too_good_is_refused() -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_incumbent_that_is_beaten_is_replaced(engine: str) -> None:
     solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
-    found = certify(solution.nlp, solution.nlp.centre, engine=engine)
+    found = certify_program(solution.nlp, solution.nlp.centre, engine=engine)
     assert found.status is CertificateStatus.PROVED
     assert found.was_beaten
     assert "better than the one given" in found.statement
@@ -264,9 +267,9 @@ def test_an_incumbent_that_is_beaten_is_replaced(engine: str) -> None:
 def test_an_empty_feasible_set_is_a_proof_of_its_own(engine: str) -> None:
     nlp = formulate(load_case("paper-4.1-helical"))
     impossible = replace(nlp, g_lower=np.array([0.9]), g_upper=np.array([0.95]))
-    found = certify(impossible, engine=engine)
+    found = certify_program(impossible, engine=engine)
     assert found.status is CertificateStatus.INFEASIBLE
-    assert found.as_data()["bound"] is None
+    assert json_data(certificate_data(found))["bound"] is None
 
 
 @pytest.mark.parametrize(("value", "status"), [(1.0, CertificateStatus.PROVED), (300.0, CertificateStatus.REFUSED)])
@@ -275,7 +278,7 @@ def test_f_is_above_a_value_on_the_whole_box_or_a_point_shows_otherwise(
 ) -> None:
     nlp = formulate(load_case("paper-4.1-helical-axis-z"))
     least = replace(nlp, sense=type(nlp.sense)("min"))
-    found = certify(least, above=value)
+    found = certify_program(least, above=value)
     assert found.status is status
     if status is CertificateStatus.PROVED:
         assert found.bound > value
@@ -286,12 +289,12 @@ def test_f_is_above_a_value_on_the_whole_box_or_a_point_shows_otherwise(
 
 def test_above_needs_a_minimisation() -> None:
     with pytest.raises(ValueError, match="min"):
-        certify(formulate(load_case("paper-4.1-helical")), above=0.0)
+        certify_program(formulate(load_case("paper-4.1-helical")), above=0.0)
 
 
 def test_stopping_early_still_gives_a_bound_that_holds() -> None:
     solution = solve(load_case("paper-4.1-helical"), starts=4)
-    found = certify(solution.nlp, solution.x, time_limit=0.15, engine="numpy")
+    found = certify_program(solution.nlp, solution.x, time_limit=0.15, engine="numpy")
     assert found.status is CertificateStatus.INCOMPLETE
     assert found.bound >= solution.F
     assert found.open > 0
@@ -309,7 +312,7 @@ def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -
         return examine(self, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(NumpyEngine, "examine", interrupted)
-    found = certify(solution.nlp, solution.x, engine="numpy")
+    found = certify_program(solution.nlp, solution.x, engine="numpy")
     assert found.status is CertificateStatus.INCOMPLETE
     assert math.isfinite(found.bound)
     assert found.bound >= solution.F
@@ -318,7 +321,7 @@ def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_case_with_nothing_free_is_its_own_bound() -> None:
     nlp = formulate(load_case("paper-4.4-snu"))
-    found = certify(nlp)
+    found = certify_program(nlp)
     assert found.status is CertificateStatus.PROVED
     assert found.boxes == 0
     assert found.bound == found.incumbent
@@ -332,7 +335,7 @@ def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() ->
     form = standard_form(nlp)
     assert form.has_epigraph
     assert (len(form.functions), form.n, len(form.conditions)) == (2, nlp.n - 1, 0)
-    found = certify(nlp, gap=1e-3)
+    found = certify_program(nlp, gap=1e-3)
     assert found.status is CertificateStatus.PROVED
     rng = np.random.default_rng(0)
     each = [formulate(case, j) for j in range(2)]
@@ -345,7 +348,7 @@ def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() ->
 def test_progress_and_history_shrink_to_the_gap() -> None:
     solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
     seen: list[tuple[float, float, float, int, int]] = []
-    found = certify(solution.nlp, solution.x, progress=lambda *row: seen.append(row))
+    found = certify_program(solution.nlp, solution.x, progress=lambda *row: seen.append(row))
     assert seen
     bounds = [bound for _, bound, _ in found.history]
     assert bounds == sorted(bounds, reverse=True)
@@ -407,7 +410,7 @@ def test_a_box_that_collapses_to_a_corner_is_examined_there(engine: str) -> None
     solution = solve(corner_case(), starts=8)
     assert solution.evidence is not None
     assert len(solution.evidence.active) == solution.nlp.n
-    proved = certify(solution.nlp, solution.x, claimed=solution.F, engine=engine, gap=1e-6)
+    proved = certify_program(solution.nlp, solution.x, claimed=solution.F, engine=engine, gap=1e-6)
     assert proved.status is CertificateStatus.PROVED
 
 

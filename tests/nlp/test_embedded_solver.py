@@ -15,7 +15,7 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.embedding import codegen
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
 from screwsynth.nlp.program.sampling import starting_points
-from screwsynth.nlp.solve.multistart import solve_nlp
+from screwsynth.nlp.solver.multistart import solve_program
 
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT = range(4)
 FEASIBLE, STATIONARY = 1e-9, 1e-7
@@ -37,7 +37,7 @@ def kkt(nlp: Nlp, x: np.ndarray) -> tuple[float, float]:
 def test_a_thousand_random_starts_end_at_the_global_optimum(name: str, embedded: EmbeddedCase) -> None:
     c, case = embedded(name), load_case(name)
     nlp = formulate(case)
-    best = solve_nlp(nlp, case.search).F
+    best = solve_program(nlp, case.search).F
     size = abs(best) if abs(best) > 1e-6 * nlp.objective_scale else nlp.objective_scale
     statuses: Counter[int] = Counter()
     for x in starting_points(nlp, 1001, 5)[1:] if nlp.n else [nlp.start] * 3:
@@ -55,7 +55,7 @@ def test_a_thousand_random_starts_end_at_the_global_optimum(name: str, embedded:
 def test_with_limits_each_optimum_is_one_and_the_seeds_reach_the_best(embedded: EmbeddedCase) -> None:
     c, case = embedded("hexapod-machining"), load_case("hexapod-machining")
     nlp = formulate(case)
-    best, reached = solve_nlp(nlp, case.search).F, 0
+    best, reached = solve_program(nlp, case.search).F, 0
     for x in starting_points(nlp, 101, 5)[1:]:
         solved = c.solve(x0=x, seeds=0)
         if solved.status == OK:
@@ -121,7 +121,7 @@ def test_random_robots_reach_the_best_optimum_known(model: str, embed: Embed) ->
         bounds = {"lower": nlp.lower, "upper": nlp.upper, "g_lower": nlp.g_lower, "g_upper": nlp.g_upper}
         bounds = {name: np.nan_to_num(each, posinf=1e300, neginf=-1e300) for name, each in bounds.items()}
         solved = c.solve(p=nlp.arguments, **bounds, maximise=int(nlp.sense.value == "max"), seeds=10)
-        reference = solve_nlp(nlp, Search(starts=20))
+        reference = solve_program(nlp, Search(starts=20))
         known = max([each.F for each in reference.optima], key=lambda F: -nlp.sign * F)
         scale = max(abs(known), 1e-6 * nlp.objective_scale)
         if solved.status == OK:
@@ -229,7 +229,7 @@ def test_bounds_may_change_at_run_time(embedded: EmbeddedCase) -> None:
 def test_the_other_sense_and_another_task(embedded: EmbeddedCase) -> None:
     c, case = embedded("paper-4.1-helical"), load_case("paper-4.1-rotation")
     nlp = formulate(case)
-    other = solve_nlp(nlp, case.search)
+    other = solve_program(nlp, case.search)
     assert abs(c.solve(p=nlp.arguments).F - other.F) <= 1e-9 * other.F
     least = c.solve(p=nlp.arguments, maximise=0)
     assert least.status == OK

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from screwsynth.models import Body, model_names
-from screwsynth.nlp import Solution, load_case, shipped_cases, solve, solve_tasks
+from screwsynth.nlp import Solution, load_case, shipped_cases, solve
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
@@ -22,7 +22,7 @@ Run = Callable[..., tuple[int, str, str]]
 def drawing(name: str) -> Drawing:
     case = load_case(name)
     case = replace(case, search=case.search.but(4, None))
-    return drawings_of(solve_tasks(case) if len(case.tasks) > 1 else solve(case))[0]
+    return drawings_of(solve(case))[0]
 
 
 def exponential(twist: np.ndarray, t: float) -> np.ndarray:

@@ -19,7 +19,7 @@ from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprin
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.certificate.prooftree import TreeReader, read_claims
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
-from screwsynth.nlp.solve.certified import CertifyOptions, certify_case, program_of, proof_of
+from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 Run = Callable[..., tuple[int, str, str]]
 NAME = "paper-4.1-helical-axis-z"
@@ -34,7 +34,7 @@ def text() -> str:
 def proof(text: str) -> Proof:
     """Axis held: four variables, no row, faces and contraction."""
     case = load_case(NAME)
-    return proof_of(certify_case(case, CertifyOptions(gap=1e-4), case.search.but(4, None), with_proof=True), text)
+    return proof_of(certify(case, gap=1e-4, starts=4, with_proof=True), text)
 
 
 def ball_case() -> Case:
@@ -49,7 +49,7 @@ def ball_case() -> Case:
 @pytest.fixture(scope="module")
 def ball() -> Proof:
     case = ball_case()
-    return proof_of(certify_case(case, CertifyOptions(gap=1e-5), case.search.but(4, None), with_proof=True), "")
+    return proof_of(certify(case, gap=1e-5, starts=4, with_proof=True), "")
 
 
 def test_a_proof_holds_and_survives_writing_and_reading(proof: Proof) -> None:

@@ -28,6 +28,7 @@ from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
 from screwsynth.nlp.output.report.webpage import page_of
+from screwsynth.nlp.solver import solve as solve_module
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -360,7 +361,7 @@ def sliding(*shifts: float) -> Case:
 def test_robots_with_loops_follow() -> None:
     for shifts in ((0.0,), (0.0, 1.0)):
         solution = solve(sliding(*shifts), starts=2)
-        report = report_of("sliding", "", solution, result_of(solution))
+        report = report_of("", solution, result_of(solution))
         assert report.parts[0].view is not None
         for frame in report.parts[0].view["frames"]:
             foot, head = np.array(frame["points"])
@@ -406,7 +407,7 @@ def test_charts_put_points_where_they_belong() -> None:
 
 def test_bound_against_time() -> None:
     history = [[0.5, 12.0, 9.0], [1.0, 11.0, 10.0], [2.0, 10.1, 10.0]]
-    chart, words = (str(part) for part in judgement.bound_chart({"history": history})[0].split("<figcaption>"))
+    chart, words = (str(part) for part in judgement.bound_chart(history)[0].split("<figcaption>"))
     bound, best = (points_of(path)[0] for path in re.findall(r'd="([^"]*)" class="curve(?: best)?"', chart))
     # Level up to each point, then down: a bound holds until a better one is there.
     assert [x for x, _ in bound] == [x for x, _ in best]
@@ -472,7 +473,7 @@ def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.solve.multistart.solve", lambda *_, **__: pytest.fail("it was solved"))
+    monkeypatch.setattr(solve_module, "solve", lambda *_, **__: pytest.fail("it was solved"))
     code, _, err = cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html"))
     assert code == 2
     assert err.count("\n") == 1

@@ -18,6 +18,7 @@ from screwsynth.nlp import (
     Status,
     Task,
     formulate,
+    json_data,
     load_case,
     result_of,
     solve,
@@ -166,7 +167,7 @@ def test_a_limb_that_cannot_have_a_length_is_refused() -> None:
 
 def test_progress_is_told_after_every_start() -> None:
     seen: list[tuple[int, int]] = []
-    solve(load_case("paper-4.3"), starts=3, progress=lambda done, total, _best: seen.append((done, total)))
+    solve(load_case("paper-4.3"), starts=3, progress=lambda _name, done, total, _best: seen.append((done, total)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
@@ -184,7 +185,7 @@ def test_an_infeasible_case_names_what_cannot_hold() -> None:
     solution = solve(case)
     assert solution.status is Status.INFEASIBLE
     assert solution.optima == ()
-    result = result_of(solution)
+    result = json_data(result_of(solution))
     assert result["F"] is None
     assert [side["name"] for side in result["reached"]["violated"]] == ["|u1_1|"]
     assert result["reached"]["violated"][0]["value"] == pytest.approx(math.sqrt(1.62), abs=1e-6)

@@ -16,16 +16,17 @@ from screwsynth.models import stewart_gough, three_upu
 from screwsynth.nlp import (
     Case,
     CaseError,
-    Compromise,
+    Combination,
+    EvaluationError,
     Free,
     Method,
     PointKind,
     Rotation,
+    Solution,
     Status,
     Task,
     load_case,
     solve,
-    solve_tasks,
 )
 from screwsynth.nlp.case.pose import Value
 
@@ -177,11 +178,16 @@ SETTINGS = [
 ]
 
 
-def solved(setting: Setting, method: Method) -> Compromise:
-    return solve_tasks(case_of(setting.free, setting.tasks(), method), starts=8, jobs=1)
+def solved(setting: Setting, method: Method) -> Solution:
+    return solve(case_of(setting.free, setting.tasks(), method), starts=8, jobs=1)
 
 
-def check_outcomes(found: Compromise, setting: Setting, own: Array) -> Array:
+def combination(found: Solution) -> Combination:
+    assert found.combination is not None
+    return found.combination
+
+
+def check_outcomes(found: Solution, setting: Setting, own: Array) -> Array:
     """Every task's F, rates, weight and loss at the combined point; returns the F by hand."""
     F = setting.F(found.x[None])[:, 0]
     for j, outcome in enumerate(found.outcomes):
@@ -208,10 +214,10 @@ def test_the_weighted_sum_is_the_best_there_is(setting: Setting) -> None:
     counted = np.array([-1.0 if sense == "min" and mixed else 1.0 for sense in setting.senses]) * setting.scaled()
     better = -1.0 if setting.senses[0] == "min" and not mixed else 1.0
     best = better * brute_force(lambda x: better * (counted @ setting.F(x)), setting.free)
-    assert found.value == pytest.approx(float(counted @ F), rel=1e-11)
-    assert found.value is not None
+    assert combination(found).value == pytest.approx(float(counted @ F), rel=1e-11)
+    assert combination(found).value is not None
     size = float(np.abs(counted) @ F)
-    assert -1e-9 * size <= better * (found.value - best) <= 1e-5 * size
+    assert -1e-9 * size <= better * (combination(found).value - best) <= 1e-5 * size
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
@@ -235,9 +241,9 @@ def test_the_worst_task_is_as_good_as_it_can_be(setting: Setting) -> None:
     best = brute_force(lambda x: level(setting.F(x)), setting.free)
     sign = 1.0 if set(setting.senses) == {"max"} else -1.0
     reached = float(level(F[:, None])[0])
-    assert found.value is not None
+    assert combination(found).value is not None
     size = max(abs(best), 1e-3 * max(outcome.own.nlp.objective_scale for outcome in found.outcomes))
-    assert sign * found.value == pytest.approx(reached, abs=1e-8 * size)
+    assert sign * combination(found).value == pytest.approx(reached, abs=1e-8 * size)
     assert -1e-8 * size <= reached - best <= 1e-5 * size
 
 
@@ -245,10 +251,10 @@ def test_averages_of_lengths_and_of_an_angle_about_a_held_axis_are_those_of_equa
     free = ("p_x", "p_y", "angle")
     tasks = random_tasks(21, ("max", "min", "max"), (1.0, 0.5, 1.5))
     alone = [solve(case_of(free, [task]), starts=12, jobs=1) for task in tasks]
-    found = solve_tasks(case_of(free, tasks), starts=12, jobs=1)
+    found = solve(case_of(free, tasks), starts=12, jobs=1)
     assert found.status is Status.AVERAGED
-    assert found.value is None
-    assert found.notices == ()
+    assert combination(found).value is None
+    assert combination(found).notices == ()
     assert all(outcome.unique for outcome in found.outcomes)
     by_hand = (1.0 * alone[0].x + 0.5 * alone[1].x + 1.5 * alone[2].x) / 3
     np.testing.assert_allclose(found.x, by_hand, atol=1e-12)
@@ -269,13 +275,13 @@ def test_averages_of_lengths_and_of_an_angle_about_a_held_axis_are_those_of_equa
 def test_only_the_proportions_of_weights_count_and_a_notice_says_so(method: Method, factor: float) -> None:
     free = ("p_x", "p_y")
     tasks = random_tasks(22, ("max", "max"), (0.5, 1.5))
-    plain = solve_tasks(case_of(free, tasks, method), starts=4, jobs=1)
+    plain = solve(case_of(free, tasks, method), starts=4, jobs=1)
     scaled = [replace(task, weight=factor * task.weight) for task in tasks]
-    found = solve_tasks(case_of(free, scaled, method), starts=4, jobs=1)
-    assert plain.notices == ()
-    assert len(found.notices) == 1
-    assert "scaled to sum to 2, the number of tasks: 0.5, 1.5" in found.notices[0]
-    assert f"sum to {2 * factor:g}" in found.notices[0]
+    found = solve(case_of(free, scaled, method), starts=4, jobs=1)
+    assert combination(plain).notices == ()
+    assert len(combination(found).notices) == 1
+    assert "scaled to sum to 2, the number of tasks: 0.5, 1.5" in combination(found).notices[0]
+    assert f"sum to {2 * factor:g}" in combination(found).notices[0]
     np.testing.assert_allclose(found.x, plain.x, atol=1e-9)
     assert [outcome.task.weight for outcome in found.outcomes] == pytest.approx([0.5, 1.5], rel=1e-15)
 
@@ -290,7 +296,7 @@ def free_axis(tasks: Sequence[Task], angle: Free) -> Case:
 def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: float) -> None:
     tasks = random_tasks(23, (["max", "min", "max"])[: len(weights)], weights)  # type: ignore[arg-type]
     case = free_axis(tasks, Free(-largest, largest))
-    found = solve_tasks(case, starts=6, jobs=1)
+    found = solve(case, starts=6, jobs=1)
     rotations = []
     for task in tasks:
         alone = solve(replace(case, tasks=[task]), starts=6, jobs=1).state
@@ -307,18 +313,18 @@ def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: f
     # It is not what averaging quaternion vectors or rotation vectors would give.
     assert np.max(np.abs(rotations[0] - rotations[1])) > 0.05
     assert found.status is Status.AVERAGED
-    assert found.violated == ()
+    assert combination(found).violated == ()
 
 
 def test_an_average_that_turns_too_little_is_reported() -> None:
     # Rotations of at least 0.3 about any axis are no convex set: about opposite axes they average to nothing.
     tasks = random_tasks(24, ("max", "min"), (1.0, 1.0))
-    found = solve_tasks(free_axis(tasks, Free(0.3, 0.5)), starts=6, jobs=1)
+    found = solve(free_axis(tasks, Free(0.3, 0.5)), starts=6, jobs=1)
     state = found.outcomes[0].state
     assert state is not None
     assert state.angle < 0.3 - 1e-3
     assert found.status is Status.INFEASIBLE
-    assert found.violated == ("angle",)
+    assert combination(found).violated == ("angle",)
     assert all(outcome.evidence.kind is PointKind.INFEASIBLE for outcome in found.outcomes)
 
 
@@ -343,10 +349,10 @@ def couple_case(axes: Literal["free", "limb"], parameters: dict[str, Any], seed:
 
 def test_averaging_breaks_orthogonality_and_that_is_reported() -> None:
     direction = [Free(-1, 1)] * 3
-    found = solve_tasks(couple_case("free", {**PARK, "u1_1": direction, "u2_1": direction}, 3, 3), starts=4, jobs=1)
+    found = solve(couple_case("free", {**PARK, "u1_1": direction, "u2_1": direction}, 3, 3), starts=4, jobs=1)
     assert found.status is Status.INFEASIBLE
     assert not found.status.is_answer
-    assert found.violated == ("u1_1 . u2_1",)
+    assert combination(found).violated == ("u1_1 . u2_1",)
     first, second = found.x[:3], found.x[3:]
     assert abs(float(first @ second)) > 1e-3
     # The directions themselves are unit vectors, along the mean of the tasks' own.
@@ -363,9 +369,9 @@ def test_averaging_breaks_orthogonality_and_that_is_reported() -> None:
 def test_one_program_for_all_tasks_keeps_what_averaging_breaks(method: Method) -> None:
     direction = [Free(-1, 1)] * 3
     case = couple_case("free", {**PARK, "u1_1": direction, "u2_1": direction}, 3, 2)
-    found = solve_tasks(replace(case, method=method), starts=4, jobs=1)
+    found = solve(replace(case, method=method), starts=4, jobs=1)
     assert found.status is Status.OPTIMAL
-    assert found.violated == ()
+    assert combination(found).violated == ()
     first, second = found.x[:3], found.x[3:]
     assert abs(float(first @ second)) < 1e-12
     # One couple u and two tasks; the fixed rest of F is the same for all u. Scan the sphere.
@@ -379,15 +385,15 @@ def test_one_program_for_all_tasks_keeps_what_averaging_breaks(method: Method) -
     sphere = np.stack([np.sqrt(1 - z**2) * np.cos(t), np.sqrt(1 - z**2) * np.sin(t), z], axis=-1).reshape(-1, 3)
     values = rest + (sphere @ omegas.T) ** 2
     combined = values.sum(axis=1) if method is Method.WEIGHTED_SUM else values.min(axis=1)
-    assert found.value is not None
-    assert found.value >= combined.max() - 1e-9
+    assert combination(found).value is not None
+    assert combination(found).value >= combined.max() - 1e-9
     # The grid's steps are 1/200 and 1/127; a kink loses a step's length times a slope of at most 2.
-    assert found.value <= combined.max() + (1e-3 if method is Method.WEIGHTED_SUM else 2e-2)
+    assert combination(found).value <= combined.max() + (1e-3 if method is Method.WEIGHTED_SUM else 2e-2)
 
 
 @pytest.mark.parametrize("method", list(Method))
 def test_the_peg_in_hole_robot_serves_both_of_its_tasks_in_full(method: Method) -> None:
-    found = solve_tasks(replace(load_case("paper-4.2"), method=method), starts=8, jobs=1)
+    found = solve(replace(load_case("paper-4.2"), method=method), starts=8, jobs=1)
     assert found.status is (Status.AVERAGED if method is Method.AVERAGE else Status.OPTIMAL)
     x1, x2, x3, x4 = found.x
     # F of the push falls by the square of these differences over the height of 40: 6e-9 of 6 is some 1e-4 of x1 - x2.
@@ -400,7 +406,7 @@ def test_the_peg_in_hole_robot_serves_both_of_its_tasks_in_full(method: Method) 
     assert turn.state.F < 1e-10
     assert not push.unique
     assert not turn.unique
-    assert sum("is not unique" in notice and "nearest" in notice for notice in found.notices) == 2
+    assert sum("is not unique" in notice and "nearest" in notice for notice in combination(found).notices) == 2
     # The member that was used is one and the same, on both optimal sets.
     np.testing.assert_allclose(push.x, turn.x, atol=1e-7)
     assert turn.x[2] == pytest.approx(turn.x[3], abs=1e-9)
@@ -430,7 +436,7 @@ def test_the_member_nearest_to_the_others_is_the_orthogonal_projection(radii: di
     # The turn about z meets no resistance wherever x3 = x4, whatever the radii: its moment arms are
     # x1 x2 sin(x4 - x3) / length. The other task has one optimum.
     skew = Task.screw("min", axis=[1, 2, 3], point=[3, -2, 5], pitch=2, name="skew")
-    found = solve_tasks(peg({**radii, **ANGLES}, [TURN, skew]), starts=8, jobs=1)
+    found = solve(peg({**radii, **ANGLES}, [TURN, skew]), starts=8, jobs=1)
     turn, other = found.outcomes
     assert other.unique
     assert not turn.unique
@@ -442,7 +448,7 @@ def test_the_member_nearest_to_the_others_is_the_orthogonal_projection(radii: di
     scale = np.asarray(turn.own.nlp.scale)
     np.testing.assert_allclose(turn.x / scale, expected / scale, atol=1e-5)
     np.testing.assert_allclose(found.x, (turn.x + other.x) / 2, atol=1e-14)
-    assert [notice for notice in found.notices if "not unique" in notice] == [
+    assert [notice for notice in combination(found).notices if "not unique" in notice] == [
         "the optimum of 'turn' is not unique: the one nearest to the other tasks' optima was used"
     ]
 
@@ -450,7 +456,7 @@ def test_the_member_nearest_to_the_others_is_the_orthogonal_projection(radii: di
 def same_but_for_order(case: Case, orders: Iterable[Sequence[Task]], starts: int, atol: float) -> None:
     points = []
     for order in orders:
-        found = solve_tasks(replace(case, tasks=list(order)), starts=starts, jobs=1)
+        found = solve(replace(case, tasks=list(order)), starts=starts, jobs=1)
         assert [outcome.task.name for outcome in found.outcomes] == [task.name for task in order]
         points.append(found.x)
     scale = found.outcomes[0].own.nlp.scale
@@ -474,23 +480,45 @@ def test_the_order_of_tasks_does_not_matter_to_an_average_of_optimal_sets() -> N
     same_but_for_order(peg({**radii, **ANGLES}, tasks), [tasks, tasks[::-1]], 6, 1e-5)
 
 
-def test_one_task_alone_is_refused() -> None:
-    case = case_of(("p_x",), random_tasks(26, ("max",), (1.0,)))
-    with pytest.raises(CaseError, match="several are needed"):
-        solve_tasks(case)
+def test_one_task_alone_has_one_outcome_and_no_combination() -> None:
+    found = solve(case_of(("p_x",), random_tasks(26, ("max",), (1.0,))), starts=4)
+    assert found.combination is None
+    (outcome,) = found.outcomes
+    assert (outcome.loss, outcome.unique) == (0.0, True)
+    assert outcome.F == found.F == outcome.own.F
+    assert (found.state, found.evidence, found.starts, found.optima) == (
+        outcome.own.state,
+        outcome.own.evidence,
+        outcome.own.starts,
+        outcome.own.optima,
+    )
+    assert found.nlp is outcome.own.nlp
+    assert found.decided_by is outcome.own
 
 
-def test_several_tasks_are_refused_by_the_solver_of_one() -> None:
-    case = case_of(("p_x",), random_tasks(26, ("max", "min"), (1.0, 1.0)))
-    with pytest.raises(CaseError, match="solve_tasks"):
-        solve(case)
+@pytest.mark.parametrize("method", list(Method))
+def test_the_answer_to_several_tasks_has_no_single_objective(method: Method) -> None:
+    found = solve(case_of(("p_x",), random_tasks(26, ("max", "min"), (1.0, 1.0)), method), starts=4)
+    with pytest.raises(EvaluationError, match="several tasks"):
+        _ = found.F
+    assert found.state is found.outcomes[0].state
+    assert found.decided_by is combination(found).combined
+    if method is Method.AVERAGE:
+        assert found.evidence is None
+        for name in ("nlp", "starts", "optima", "relaxation"):
+            with pytest.raises(EvaluationError, match="no single program"):
+                getattr(found, name)
+    else:
+        assert found.decided_by is not None
+        assert found.evidence is found.decided_by.evidence
+        assert found.starts == found.decided_by.starts
 
 
 @pytest.mark.parametrize("method", list(Method))
 def test_nothing_free_is_refused(method: Method) -> None:
     case = case_of((), random_tasks(26, ("max", "min"), (1.0, 1.0)), method)
     with pytest.raises(CaseError, match="nothing free"):
-        solve_tasks(case)
+        solve(case)
 
 
 @pytest.mark.parametrize("weight", [0.0, -1.0, math.nan, math.inf])

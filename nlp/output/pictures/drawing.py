@@ -20,10 +20,10 @@ from ....models import (
 )
 from ...case.case import Case
 from ...errors import EvaluationError
-from ...evidence.kkt import assembled
+from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...solve.multistart import state_or_none
+from ...solver.multistart import state_or_none
 from .posture import Linkage, Posture
 
 #: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
@@ -242,7 +242,7 @@ def _reference(nlp: Nlp, posture: Posture, size: float) -> Posture | None:
     """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
     if nlp.n == 0:
         return None
-    x = assembled(nlp, nlp.start)
+    x = close_equations(nlp, nlp.start)
     state = state_or_none(nlp, x)
     if state is None:
         return None

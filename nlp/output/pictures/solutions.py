@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 from ...case.task import Sense
-from ...solve.compromise import Compromise
-from ...solve.multistart import Solution, Status
+from ...solver.multistart import ProgramSolution, Status
+from ...solver.solution import Solution
 from .drawing import Drawing, drawing_of
 
 
-def drawings_of(found: Solution | Compromise) -> list[Drawing]:
+def drawings_of(found: Solution) -> list[Drawing]:
     """Return the robot with its task, or at the combined point with each of several tasks; at the first of its poses.
 
     Raises:
         EvaluationError: the robot does not exist at the point reached.
     """
-    if isinstance(found, Solution):
-        said = _headline(found)
-        return [drawing_of(found.nlp, found.x, found.state, headline=said, is_answer=found.status.is_answer)]
+    if found.combination is None:
+        headline = _headline(found.outcomes[0].own)
+        return [drawing_of(found.nlp, found.x, found.state, headline=headline, is_answer=found.status.is_answer)]
+    method = found.combination.method.value
     drawings = []
     for task, outcome in enumerate(found.outcomes):
         if found.is_made:
-            said = f"{outcome.task.name}: F = {outcome.F:.7g}, {found.method.value} of {len(found.outcomes)} tasks"
+            headline = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
         else:
-            said = f"{found.status.value}: this is not what was asked for"
+            headline = f"{found.status.value}: this is not what was asked for"
         drawing = drawing_of(
-            outcome.own.nlp, found.x, outcome.state, task, headline=said, is_answer=found.status.is_answer
+            outcome.own.nlp, found.x, outcome.state, task, headline=headline, is_answer=found.status.is_answer
         )
         drawings.append(drawing)
     return drawings
 
 
-def _headline(solution: Solution) -> str:
+def _headline(solution: ProgramSolution) -> str:
     """Return the result in one line."""
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"

@@ -1,7 +1,7 @@
-"""C compiled into shared libraries, kept by what is in them.
+"""C compiled into shared libraries, cached by content hash.
 
-A library is made once for its text, compiler and flags, under the user's cache folder (``XDG_CACHE_HOME``, or
-``~/.cache``), and found there the next time.
+A library is compiled once for its text, compiler and flags, and stored in the user's cache folder (``XDG_CACHE_HOME``,
+or ``~/.cache``).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 
 
 def shared_library(source: str) -> Path:
-    """The shared library that a C text becomes.
+    """Compile a C text into a shared library, or return the cached one.
 
     Raises:
         InputError: there is no C compiler, or it fails.
@@ -30,16 +30,21 @@ def shared_library(source: str) -> Path:
     library = folder / f"{key[:32]}.so"
     if library.exists():
         return library
-    with tempfile.TemporaryDirectory(dir=folder) as making:
-        text, made = Path(making) / "source.c", Path(making) / "made.so"
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+        text, compiled = Path(temporary) / "source.c", Path(temporary) / "compiled.so"
         text.write_text(source, encoding="utf-8")
-        _run([compiler, *_FLAGS, str(text), "-lm", "-o", str(made)])
-        # Whole or not at all, also when two programs make it at once.
-        made.replace(library)
+        _run([compiler, *_FLAGS, str(text), "-lm", "-o", str(compiled)])
+        # Whole or not at all, also when two programs compile it at once.
+        compiled.replace(library)
     return library
 
 
 def _compiler() -> str:
+    """Find a C compiler.
+
+    Raises:
+        InputError: there is none.
+    """
     import shutil
 
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
@@ -51,6 +56,11 @@ def _compiler() -> str:
 
 
 def _run(words: list[str]) -> str:
+    """Run the compiler and return its standard output.
+
+    Raises:
+        InputError: it cannot be run, or fails.
+    """
     import subprocess
 
     try:
@@ -64,7 +74,7 @@ def _run(words: list[str]) -> str:
 
 
 def _folder() -> Path:
-    """The user's cache; a fresh folder where there can be none."""
+    """Return the user's cache folder; a fresh folder where there can be none."""
     import tempfile
 
     base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"

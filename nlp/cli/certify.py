@@ -1,0 +1,56 @@
+"""The command ``certify``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
+from .progress import certify_with_progress
+
+
+def certify(
+    case: CaseName,
+    gap: Annotated[float, typer.Option(help="Part of the best F that the bound may be off by.")] = 1e-4,
+    time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Stop then, with the bound reached.")] = None,
+    above: Annotated[
+        float | None, typer.Option(metavar="F", help="Prove that F is above this value on the whole box.")
+    ] = None,
+    proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Starting points for the incumbent instead of the case's.")
+    ] = None,
+    jobs: Jobs = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Prove a bound of the global optimum over the whole box."""
+    from ..case.reader import find_case, load_case
+    from ..errors import InputError
+    from ..output.files import read_text, write_text
+    from ..results.certified import certified_of
+    from ..solver.certified import CertifyOptions, OptionError, proof_of
+
+    try:
+        CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
+        if proof == "-" and json_file == "-":
+            raise InputError("standard output can take one of --json - and --proof - only")
+        loaded = load_case(case)
+        for target in (json_file, proof):
+            check_target(target)
+        certified = certify_with_progress(
+            loaded, gap=gap, above=above, time=time, jobs=jobs, starts=starts, with_proof=proof is not None
+        )
+    except OptionError as error:
+        raise InputError(f"--{error}") from None
+    result = certified_of(certified)
+    if proof is not None and certified.tree is not None:
+        write_text(proof, proof_of(certified, read_text(str(find_case(case)))).as_text())
+    if json_file is not None:
+        write_json(json_file, result)
+    if "-" not in (json_file, proof):
+        from ..output.terminal import show
+        from ..results.summary import certified_summary
+
+        show(console(), certified_summary(loaded, result))
+    raise typer.Exit(0 if certified.is_proved else 1)

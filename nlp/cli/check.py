@@ -1,0 +1,43 @@
+"""The command ``check``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .options import JsonFile, check_target, console, write_json
+
+
+def check(
+    cases: Annotated[
+        list[str] | None, typer.Argument(metavar="[CASE]...", help="All shipped cases if left out.")
+    ] = None,
+    json_file: JsonFile = None,
+    junit: Annotated[str | None, typer.Option(metavar="FILE", help="Write JUnit XML for a CI; - is stdout.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
+) -> None:
+    """Hold cases to their expected and published values."""
+    from ..errors import InputError
+    from ..output.checks import checks_as_junit, checks_as_markdown
+    from ..output.files import write_text
+    from ..results.checks import checks_of
+    from ..results.regression import check as check_cases
+
+    if [json_file, junit, "-" if markdown else None].count("-") > 1:
+        raise InputError("standard output can take one of --json -, --junit - and --markdown only")
+    for target in (json_file, junit):
+        check_target(target)
+    checks = check_cases(cases)
+    if json_file is not None:
+        write_json(json_file, checks_of(checks))
+    if junit is not None:
+        write_text(junit, checks_as_junit(checks))
+    if markdown:
+        typer.echo(checks_as_markdown(checks), nl=False)
+    elif "-" not in (json_file, junit):
+        from ..output.terminal import show
+        from ..results.checkwording import checks_summary
+
+        show(console(), checks_summary(checks))
+    raise typer.Exit(0 if all(each.passed for each in checks) else 1)

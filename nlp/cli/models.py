@@ -1,0 +1,50 @@
+"""The command ``models``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .options import PlotFile, check_picture, console
+
+
+def models(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None,
+    plot: PlotFile = None,
+) -> None:
+    """List the robots, or show one with its parameters, options and wrenches."""
+    from ...models import model_names
+    from ..case.robots import build_model, model_options
+    from ..errors import InputError
+    from ..output.terminal import show
+    from ..results.robotwording import model_words, models_table
+
+    check_picture(plot)
+    if name is None:
+        if plot is not None:
+            raise InputError(f"--plot {plot}: needs the name of a robot")
+        show(console(), [models_table((each, _description(each)) for each in model_names())])
+        return
+    options = model_options(name)
+    needed = [option for option, _, default in options if default is None]
+    # Without the options that it cannot do without, a robot has no parameters to show yet.
+    model = None if needed else build_model(name)
+    if plot is not None:
+        from ..output.pictures.plot import plot as draw
+
+        if model is None:
+            raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
+        draw(model, plot)
+    show(console(), model_words(name, model, options))
+
+
+def _description(model: str) -> str:
+    """Return a robot's description, or why it cannot be used: another package's fault must not hide the others."""
+    from ..case.robots import build_model
+    from ..errors import CaseError
+
+    try:
+        return build_model(model).description
+    except CaseError as error:
+        return error.fault

@@ -1,0 +1,82 @@
+"""Solves and certificates with a line of progress on standard error, where that is a terminal."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..case.case import Case
+    from ..solver.certified import Certified
+    from ..solver.solution import Solution
+
+
+class Solved(NamedTuple):
+    """A solution, the same with certificates where they were asked for, and whether all of these are proved."""
+
+    solution: Solution
+    found: Solution | Certified
+    is_proved: bool
+
+
+def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> Solved:
+    """Solve a case, and certify it where that is asked for.
+
+    Raises:
+        CaseError: the case contradicts itself.
+        InputError: the objective is to be compiled, and cannot be.
+    """
+    from ..solver.solve import solve
+
+    if certify:
+        certified = certify_with_progress(case, jobs=jobs)
+        return Solved(certified.solution, certified, certified.is_proved)
+    if not sys.stderr.isatty():
+        solution = solve(case, jobs=jobs)
+        return Solved(solution, solution, True)
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("starts", total=None)
+
+        def show(name: str, done: int, total: int, best: float | None) -> None:
+            label = "starts" if len(case.tasks) == 1 else escape(name)
+            best_text = "" if best is None else f", best {best:.7g}"
+            bar.update(line, completed=done, total=total, description=f"{label}{best_text}")
+
+        solution = solve(case, jobs=jobs, progress=show)
+    return Solved(solution, solution, True)
+
+
+def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`
+    """Certify a case; the options are those of :func:`screwsynth.nlp.certify`.
+
+    Raises:
+        InputError: an option is outside of its range, or has no meaning for the case.
+        UncoveredError: the case's expressions hold an operation without a rule.
+    """
+    from ..solver.certified import certify
+
+    if not sys.stderr.isatty():
+        return certify(case, **options)
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    columns = SpinnerColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("solving for an incumbent", total=None)
+
+        def show(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
+            text = f"{escape(name)}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+            bar.update(line, description=f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
+
+        def progress_of(name: str) -> Callable[[float, float, float, int, int], None]:
+            return partial(show, name)
+
+        return certify(case, **options, progress=progress_of)

@@ -1,0 +1,23 @@
+"""The command ``schema``."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
+) -> None:
+    """Print the JSON Schema of case files, with which editors complete and check."""
+    if result:
+        from ..results.schema import result_schema
+
+        found: object = result_schema()
+    else:
+        from ..case.schema import Document
+
+        found = Document.model_json_schema()
+    typer.echo(json.dumps(found, indent=2))

@@ -1,0 +1,49 @@
+"""The command ``solve``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_picture, check_target, console, write_json
+from .progress import solve_with_progress
+
+
+def solve(
+    case: CaseName,
+    starts: Starts = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
+    ] = False,
+    json_file: JsonFile = None,
+    plot: PlotFile = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
+    ] = False,
+) -> None:
+    """Maximise or minimise F, and show the evidence."""
+    from ..case.reader import load_case
+    from ..results.result import result_of
+
+    loaded = load_case(case)
+    loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
+    check_target(json_file)
+    check_picture(plot)
+    solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
+    result = result_of(found)
+    if json_file is not None:
+        write_json(json_file, result)
+    if plot is not None:
+        from ..output.pictures.plot import plot as draw
+
+        draw(solution, plot)
+    if json_file != "-":
+        from ..output.terminal import show
+        from ..results.summary import case_summary
+
+        show(console(), case_summary(loaded, result))
+    raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

@@ -1,0 +1,225 @@
+"""Certificates of a case: an incumbent from a solve, the search of the whole box, and the proof that it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ..case.case import Case
+from ..case.task import Method, Sense
+from ..certificate.bounding import search_tape
+from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
+from ..certificate.certificate import Certificate, CertificateStatus
+from ..certificate.proof import Proof, Statement, fingerprint
+from ..certificate.proofwriter import ProofWriter
+from ..certificate.standardform import standard_form
+from ..errors import InputError
+from ..program.epigraph import formulate_worst
+from ..program.formulation import formulate, formulate_each, formulate_weighted
+from ..program.nlp import Nlp
+from .compromise import solution_of_one_task
+from .multistart import ProgramSolution, solve_program
+from .solution import Combination, Solution
+from .solve import solve_programs
+
+
+class OptionError(InputError):
+    """An option of a certificate that has no meaning for the case, or a value that it cannot have."""
+
+
+@dataclass(frozen=True)
+class CertifyOptions:
+    """Options of a certificate.
+
+    Attributes:
+        gap: part of the incumbent that the bound may be off by.
+        above: prove that F is above this value instead.
+        time: seconds for each program.
+        jobs: threads.
+
+    Raises:
+        OptionError: a number is outside of its range.
+    """
+
+    gap: float = GAP
+    above: float | None = None
+    time: float | None = None
+    jobs: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 1e-10 <= self.gap < 1:
+            raise OptionError(f"gap {self.gap:g}: must be at least 1e-10 and below 1")
+        if self.time is not None and not self.time > 0:
+            raise OptionError(f"time {self.time:g}: must be positive")
+        if self.above is not None and not abs(self.above) < float("inf"):
+            raise OptionError(f"above {self.above:g}: must be finite")
+
+
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A solution with its certificates.
+
+    Attributes:
+        solution: the solution.
+        tasks: a certificate for each task by itself.
+        combined: for the combined program of several tasks, where the method has one.
+        statement: names the program that ``tree`` is about.
+        tree: the proof's nodes; None when none was asked for or there is none.
+    """
+
+    solution: Solution
+    tasks: tuple[Certificate, ...]
+    combined: Certificate | None
+    statement: Statement
+    tree: bytes | None
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """Certificate of the program that decides: of the only task, or of the combined program."""
+        return self.tasks[0] if self.solution.combination is None else self.combined
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether everything that was asked for is proved."""
+        every = [*self.tasks, *([] if self.combined is None else [self.combined])]
+        return all(each.status is CertificateStatus.PROVED for each in every)
+
+
+def certify(
+    found: Case | Solution,
+    *,
+    gap: float = GAP,
+    above: float | None = None,
+    time: float | None = None,
+    jobs: int | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    with_proof: bool = False,
+    progress: Callable[[str], CertifyProgress] | None = None,
+) -> Certified:
+    """Prove bounds of a case's global optima over the whole box: of every task, and of their combined program.
+
+    Args:
+        found: a case, which is solved first, or its solution.
+        gap: part of the incumbent that the bound may be off by.
+        above: prove, instead, that F of a case's only task is above this value on the whole box.
+        time: seconds for each program, after which the search stops with what it has.
+        jobs: number of threads; the result does not depend on it.
+        starts: number of starting points instead of the case's.
+        seed: seed instead of the case's.
+        with_proof: keep the proof of the case's one task, or of its combined program, for :func:`proof_of`.
+        progress: returns, for the name of a program, the function that is called now and then during its search.
+
+    Raises:
+        OptionError: an option is outside of its range, or has no meaning for the case.
+        UncoveredError: the case's expressions hold an operation without a rule.
+    """
+    options = CertifyOptions(gap, above, time, jobs)
+    given = found if isinstance(found, Solution) else None
+    case = found.case if isinstance(found, Solution) else found
+    several = len(case.tasks) > 1
+    if several and above is not None:
+        raise OptionError("above: is for a case with one task")
+    if several and with_proof and case.method is Method.AVERAGE:
+        raise OptionError("proof: a case whose tasks are averaged has no one program to prove something of")
+    nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
+    if nlps[0].n:
+        search_tape(standard_form(nlps[0]))  # an operation without a rule is refused before anything is solved
+    search = case.search.but(starts, seed)
+
+    def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None) -> Certificate:
+        x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
+        return certify_program(
+            own.nlp,
+            x,
+            claimed=claimed,
+            gap=options.gap,
+            above=options.above,
+            time_limit=options.time,
+            jobs=options.jobs,
+            progress=None if progress is None else progress(name),
+            recorder=recorder,
+        )
+
+    if not several:
+        statement = Statement(minimise=above is not None)
+        nlp = _with_sense(nlps[0], statement)
+        own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
+        writer = _writer(nlp) if with_proof else None
+        certificate = certify_one(own, case.tasks[0].name, writer)
+        if certificate.was_beaten and certificate.x is not None:
+            own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
+        solution = solution_of_one_task(case, own)
+        return Certified(solution, (certificate,), None, statement, _tree(writer, certificate))
+    solution = given or solve_programs(case, nlps, search, jobs=jobs)
+    alone = tuple(certify_one(outcome.own, outcome.task.name, None) for outcome in solution.outcomes)
+    if solution.combination is None or solution.combination.combined is None:
+        return Certified(solution, alone, None, Statement(), None)
+    combined = solution.combination.combined
+    writer = _writer(combined.nlp) if with_proof else None
+    certificate = certify_one(combined, case.method.value, writer)
+    statement = _statement(solution.combination, combined)
+    return Certified(solution, alone, certificate, statement, _tree(writer, certificate))
+
+
+def program_of(case: Case, statement: Statement) -> Nlp:
+    """Formulate the program of a case that a proof is about.
+
+    Raises:
+        InputError: the case has no such program.
+    """
+    if statement.kind == "task":
+        if not 0 <= statement.task < len(case.tasks):
+            raise InputError(f"the proof is for task {statement.task + 1}, which the case does not have")
+        return _with_sense(formulate(case, statement.task), statement)
+    if not len(case.tasks) == len(statement.weights) > 1:
+        raise InputError("the proof is for several tasks, and not for those of the case")
+    if statement.kind == "weighted-sum":
+        return formulate_weighted(case, statement.weights)
+    return formulate_worst(case, statement.weights, statement.best, statement.ceiling)
+
+
+def proof_of(certified: Certified, text: str) -> Proof:
+    """Return the proof that belongs to a certificate.
+
+    Args:
+        certified: made with ``with_proof``.
+        text: the case file's text.
+
+    Raises:
+        OptionError: nothing was proved.
+    """
+    certificate = certified.certificate
+    if certificate is None or certified.tree is None:
+        raise OptionError("proof: nothing was proved, so nothing is written")
+    nlp = certificate.nlp
+    bound = None if certificate.status is CertificateStatus.INFEASIBLE else -nlp.sign * certificate.bound
+    return Proof(text, nlp.case.name, certified.statement, fingerprint(nlp), bound, certified.tree)
+
+
+def _with_sense(nlp: Nlp, statement: Statement) -> Nlp:
+    """Return the program of a task, minimised where the statement says so."""
+    return replace(nlp, sense=Sense.MIN) if statement.minimise and nlp.sense is not Sense.MIN else nlp
+
+
+def _writer(nlp: Nlp) -> ProofWriter | None:
+    return ProofWriter(len(standard_form(nlp).functions)) if nlp.n else None
+
+
+def _tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
+    """Return the nodes of a proof, where something is proved."""
+    complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
+    return writer.tree() if writer is not None and complete else None
+
+
+def _statement(combination: Combination, combined: ProgramSolution) -> Statement:
+    """Return the statement that names the combined program of several tasks."""
+    weights = combination.weights
+    if combination.method is Method.WEIGHTED_SUM:
+        return Statement("weighted-sum", weights=weights)
+    nlp = combined.nlp
+    epigraph = nlp.program.places.epigraph
+    if epigraph is None:
+        raise TypeError("the program of a worst case has an epigraph")
+    best = tuple(float(nlp.arguments[place]) for place in epigraph.best)
+    return Statement("worst-case", weights=weights, best=best, ceiling=float(nlp.arguments[epigraph.ceiling]))

@@ -1,0 +1,278 @@
+"""Several tasks for one robot: equation 15, the best weighted sum, and the best worst task.
+
+Every task is first solved by itself. Then the tasks are combined:
+
+* ``average`` (equation 15): ``Q = (1/n) sum_j w_j q_j`` of the tasks' own optima ``q_j``. As printed this is a mean
+  only when the weights sum to ``n``; they are scaled so, with a notice. Lengths and angles average linearly, a rotation
+  whose axis is free on SO(3), a free direction on the sphere. Nothing is optimised at ``Q``, and only bounds are sure
+  to hold there, because they are convex.
+* ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
+
+Each method states its cost: every task's F, rates and verdict at the combined point, its loss against its own optimum,
+and every limit that is violated.
+
+Where a task's optimum is not unique, its ``q_j`` is arbitrary. The rule is then *nearest to the others*: the member of
+the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once, repeated until
+no point moves, so that the order of the tasks means nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ...models import FloatArray, frozen_array
+from ..case.case import Case
+from ..case.task import Method, Sense, Task
+from ..evidence.kkt import FEASIBLE, correct_point, linearise
+from ..evidence.optimality import PointKind, examine
+from ..program.epigraph import formulate_worst, level_of_tasks
+from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
+from ..program.nlp import Nlp
+from ..program.places import FreeRotation
+from ..program.program import Program
+from .multistart import SAME_VALUE, ProgramSolution, Status, state_or_none
+from .solution import Combination, Solution, TaskOutcome
+from .starts import StartStatus
+
+#: Weights of the distance to the other tasks' points, in parts of F's scale, smaller and smaller, with which the
+#: nearest member of an optimal set is searched for: the point tends to that member, and the correction that follows
+#: removes the rest.
+_DISTANCE_WEIGHTS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+#: Most rounds of choosing members, and the movement in half ranges that ends them.
+_ROUNDS = 20
+_STILL = 1e-9
+
+
+class SolveOne(Protocol):
+    """A solve of one program, with the settings of the whole solve."""
+
+    def __call__(self, name: str, nlp: Nlp, first: Sequence[FloatArray] = ()) -> ProgramSolution:
+        """Solve a program, shown by a name, from points (n,) and from sampled ones."""
+        ...
+
+
+class Polish(Protocol):
+    """A search of one program that starts close to its solution."""
+
+    def __call__(self, nlp: Nlp, *, first: Sequence[FloatArray]) -> ProgramSolution:
+        """Solve a program from points (n,) and few others."""
+        ...
+
+
+def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
+    """Return the solution of a case whose only task is solved."""
+    F = own.nlp.evaluate(own.x)[0]
+    outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0)
+    return Solution(case, own.status, own.x, (outcome,), None, own.seconds)
+
+
+def combine(
+    case: Case, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], solve_one: SolveOne, polish: Polish
+) -> Solution:
+    """Combine several tasks, each solved by itself, by the method that the case names.
+
+    Args:
+        case: a case with at least two tasks and something free.
+        nlps: the program of each task.
+        own: the solution of each task's program.
+        solve_one: solves the combined program.
+        polish: searches for the nearest member of an optimal set.
+
+    Returns:
+        The solution, with no seconds yet.
+    """
+    weights, scaling_notices = _scaled_weights(case)
+    points, unique, notices = _choose_members(nlps, own, polish)
+    notices = [*scaling_notices, *notices]
+    combined: ProgramSolution | None = None
+    if not all(solution.status.is_answer for solution in own):
+        x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
+        notices.append("a task has no optimum by itself, so there is nothing to bring together")
+    elif case.method is Method.AVERAGE:
+        x, status, value = _average(nlps[0], points, weights), Status.AVERAGED, None
+    else:
+        combined = _solve_combined(case, nlps, own, points, weights, solve_one)
+        x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
+    at = linearise(nlps[0], x)
+    violated = tuple(dict.fromkeys(at.sides[j].name for j in np.flatnonzero(at.slack < -FEASIBLE)))
+    if violated and status.is_answer:
+        status = Status.INFEASIBLE
+    return Solution(
+        case=case,
+        status=status,
+        x=frozen_array(x, (nlps[0].n,)),
+        outcomes=tuple(
+            _outcome(nlp, replace(task, weight=weight), solution, alone, point, x)
+            for nlp, task, weight, solution, alone, point in zip(
+                nlps, case.tasks, weights, own, unique, points, strict=True
+            )
+        ),
+        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined),
+        seconds=0.0,
+    )
+
+
+class _Weights(NamedTuple):
+    values: list[float]
+    notices: list[str]
+
+
+def _scaled_weights(case: Case) -> _Weights:
+    """Return weights that sum to the number of tasks, as equation 15 needs them."""
+    given = [task.weight for task in case.tasks]
+    total, n = sum(given), len(given)
+    if abs(total - n) <= 1e-12 * n:
+        return _Weights(given, [])
+    scaled = [weight * n / total for weight in given]
+    shown = ", ".join(f"{weight:g}" for weight in scaled)
+    return _Weights(
+        scaled, [f"the weights sum to {total:g} and were scaled to sum to {n}, the number of tasks: {shown}"]
+    )
+
+
+def _outcome(nlp: Nlp, task: Task, own: ProgramSolution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:
+    """Return the outcome of a task at the combined point (n,)."""
+    state = state_or_none(nlp, x)
+    F = float("nan") if state is None else nlp.evaluate(x)[0]
+    best = nlp.evaluate(own.x)[0]
+    loss = best - F if task.sense is Sense.MAX else F - best
+    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss)
+
+
+def _solve_combined(
+    case: Case,
+    nlps: Sequence[Nlp],
+    own: Sequence[ProgramSolution],
+    points: Sequence[FloatArray],
+    weights: Sequence[float],
+    solve_one: SolveOne,
+) -> ProgramSolution:
+    """Solve the combined program from the tasks' own optima, their average, and the search's starts."""
+    first = [*points, _average(nlps[0], points, weights)]
+    if case.method is Method.WEIGHTED_SUM:
+        return solve_one(case.method.value, formulate_weighted(case, weights), first)
+    best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
+    levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
+    # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
+    senses = {task.sense for task in case.tasks}
+    ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
+    floor = 1e-3 * max(nlp.objective_scale for nlp in nlps)
+    nlp = formulate_worst(case, weights, best, max(ceiling, floor))
+    bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
+    starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
+    return solve_one(case.method.value, nlp, starts)
+
+
+class _Members(NamedTuple):
+    """A point of each task's optimal set, whether it is the only one, and notices about those that are not."""
+
+    points: list[FloatArray]
+    unique: list[bool]
+    notices: list[str]
+
+
+def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish) -> _Members:
+    """Choose the point of each task's optimal set that is nearest to the other tasks' points."""
+    points = [np.array(solution.x) for solution in own]
+    members = [_known_members(solution) for solution in own]
+    unique = [_is_unique(solution) for solution in own]
+    notices = [
+        f"the optimum of {solution.nlp.case.tasks[j].name!r} is not unique: "
+        "the one nearest to the other tasks' optima was used"
+        for j, solution in enumerate(own)
+        if not unique[j] and solution.status.is_answer
+    ]
+    extended = proximity_program(nlps[0].program)  # one program serves all tasks: they differ by their numbers
+    for _ in range(_ROUNDS if notices else 0):
+        following = list(points)
+        for j in range(len(own)):
+            if not unique[j]:
+                target = np.mean([point for k, point in enumerate(points) if k != j], axis=0)
+                following[j] = _nearest_member(nlps[j], own[j], members[j], target, extended, polish)
+        moved = max(float(np.max(np.abs(a - b) / nlps[0].scale)) for a, b in zip(following, points, strict=True))
+        points = following
+        if moved <= _STILL:
+            break
+    return _Members(points, unique, notices)
+
+
+def _is_set(solution: ProgramSolution) -> bool:
+    """Return whether the optimum may belong to a connected set of optima."""
+    return solution.evidence is not None and solution.evidence.kind in (PointKind.NOT_ISOLATED, PointKind.UNDECIDED)
+
+
+def _is_unique(solution: ProgramSolution) -> bool:
+    """Return whether no other optimum with the same F is known."""
+    return len(_known_members(solution)) == 1 and not _is_set(solution)
+
+
+def _known_members(solution: ProgramSolution) -> list[FloatArray]:
+    """Return known members of an optimal set: one of each isolated optimum, every start's point on a connected set."""
+    if not solution.optima:
+        return [np.array(solution.x)]
+    tolerance = SAME_VALUE * solution.nlp.objective_scale
+    best = solution.optima[0].F
+    if _is_set(solution):
+        converged = [start for start in solution.starts if start.status is StartStatus.CONVERGED]
+        return [start.x for start in converged if abs(start.F - best) <= tolerance]
+    return [optimum.x for optimum in solution.optima if abs(optimum.F - best) <= tolerance]
+
+
+def _nearest_member(
+    nlp: Nlp,
+    solution: ProgramSolution,
+    members: Sequence[FloatArray],
+    target: FloatArray,
+    extended: Program,
+    polish: Polish,
+) -> FloatArray:
+    """Return the member of a task's optimal set nearest to a point (n,), as far as the known members lead to it."""
+
+    def distance(x: FloatArray) -> float:
+        return float(np.linalg.norm((x - target) / nlp.scale))
+
+    closest = min(members, key=distance)
+    if not _is_set(solution):
+        return closest
+    best = nlp.evaluate(solution.x)[0]
+    points = [closest, target]
+    for weight in _DISTANCE_WEIGHTS:
+        found = polish(with_proximity_term(nlp, extended, target, weight), first=points)
+        points = [found.x]
+        for start in found.starts:
+            back = correct_point(nlp, start.x, linearise(nlp, start.x).active())
+            kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
+            if kept and distance(back.x) < distance(closest):
+                closest = back.x
+    return closest
+
+
+def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -> FloatArray:
+    """Return ``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
+    shares = np.array(weights) / len(weights)
+    Q = shares @ np.array(points)
+    for triple in nlp.program.places.directions:
+        size = float(np.linalg.norm(Q[list(triple)]))
+        if size > 0:
+            Q[list(triple)] /= size
+    for rotation in nlp.program.places.rotations:
+        if isinstance(rotation, FreeRotation):
+            q = list(rotation.q)
+            Q[q] = _mean_rotation([point[q] for point in points], shares)
+    return np.asarray(Q, dtype=np.float64)
+
+
+def _mean_rotation(vectors: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
+    """Return the quaternion vector (3,) of the weighted chordal mean of rotations given by theirs.
+
+    The chordal mean of matrices is that of unit quaternions without their signs: the eigenvector of ``sum w q q'`` with
+    the largest eigenvalue (F. L. Markley et al., *Averaging Quaternions*, J. Guidance 30 (2007)).
+    """
+    q = np.array([[np.sqrt(max(1 - float(v @ v), 0.0)), *v] for v in vectors])
+    _, directions = np.linalg.eigh((q * shares[:, None]).T @ q)
+    mean = directions[:, -1]
+    return np.asarray(mean[1:] * (1.0 if mean[0] >= 0 else -1.0), dtype=np.float64)

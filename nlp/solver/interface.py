@@ -1,0 +1,70 @@
+"""Interface of a local solver: any function of the type :class:`Solver` can search a program.
+
+A solver says where it stopped, with which multipliers, why, and after how many iterations. Its word is never taken for
+it: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the program's own conditions.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from ...models import FloatArray
+from ..case.settings import Search
+from ..program.nlp import Nlp
+
+
+class StopReason(enum.Enum):
+    """Why a local solver stopped."""
+
+    SUCCEEDED = "succeeded"
+    ITERATION_LIMIT = "iteration limit"
+    INFEASIBLE = "infeasible"
+    UNDEFINED = "undefined"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, eq=False)
+class SolverResult:
+    """The point at which a local solver stopped.
+
+    Multipliers belong to the scaled problem of :mod:`screwsynth.nlp.evidence.kkt`: variables in half ranges, and the
+    objective in parts of its scale, minimised. They are positive at an upper limit and negative at a lower one.
+
+    Attributes:
+        x: (n,) the point, in the program's units.
+        bound_multipliers: (n,) of the variables' bounds, per half range.
+        constraint_multipliers: (c,) of the constraints, per unit of their expressions.
+        reason: why the solver stopped there.
+        iterations: number of iterations.
+    """
+
+    x: FloatArray
+    bound_multipliers: FloatArray
+    constraint_multipliers: FloatArray
+    reason: StopReason
+    iterations: int
+
+
+#: A search from one starting point (n,), in the program's units.
+LocalSearch = Callable[[FloatArray], SolverResult]
+
+
+class Solver(Protocol):
+    """A function that prepares searches of a program."""
+
+    def __call__(self, nlp: Nlp, search: Search, points: FloatArray, count: int) -> Sequence[LocalSearch]:
+        """Return ``count`` searches that may run at the same time, each in one thread only.
+
+        Args:
+            nlp: the program, with at least one variable.
+            search: the limit of iterations, and whether functions are to be compiled.
+            points: (k, n) the starting points to come, for a solver that scales the problem by them.
+            count: number of searches.
+
+        Raises:
+            InputError: the program is to be compiled, and cannot be.
+        """
+        ...

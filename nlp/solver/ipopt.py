@@ -1,0 +1,114 @@
+"""The call of Ipopt through CasADi, over scaled variables and a scaled objective.
+
+Ipopt's strings end in this module.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray
+from ..case.settings import Search
+from ..program.nlp import Nlp
+from .compiled import shared_library
+from .interface import LocalSearch, SolverResult, StopReason
+
+#: Ipopt's tolerance. The Newton correction that follows converges quadratically: tighter would only cost iterations.
+TOLERANCE = 1e-8
+#: Number of starting points at which the size of each constraint is measured.
+_SAMPLED = 4
+_REASONS = {
+    "Solve_Succeeded": StopReason.SUCCEEDED,
+    "Maximum_Iterations_Exceeded": StopReason.ITERATION_LIMIT,
+    "Infeasible_Problem_Detected": StopReason.INFEASIBLE,
+    "Invalid_Number_Detected": StopReason.UNDEFINED,
+}
+
+
+def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[LocalSearch]:
+    """Return searches by Ipopt; see :class:`screwsynth.nlp.solver.interface.Solver`.
+
+    CasADi's symbols are not safe to share between threads: every function is built here, and only called later.
+
+    Raises:
+        InputError: the objective is to be compiled, and cannot be.
+    """
+    symbols = _scaled_problem(nlp)
+    problem = _compiled_problem(symbols) if search.compiled else symbols
+    functions = [ca.nlpsol("solver", "ipopt", problem, _options(search.max_iterations)) for _ in range(count)]
+    sizes = _constraint_sizes(nlp, points)
+    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale], sizes])
+    lower, upper = nlp.g_lower / sizes, nlp.g_upper / sizes
+
+    def search_with(function: ca.Function) -> LocalSearch:
+        def search_one(point: FloatArray) -> SolverResult:
+            scaled = (point - nlp.centre) / nlp.scale
+            result = function(x0=scaled, p=parameters, lbx=-1, ubx=1, lbg=lower, ubg=upper)
+            stats = function.stats()
+            return SolverResult(
+                x=nlp.centre + nlp.scale * result["x"].full().ravel(),
+                bound_multipliers=result["lam_x"].full().ravel(),
+                constraint_multipliers=result["lam_g"].full().ravel() / sizes,
+                reason=_REASONS.get(str(stats["return_status"]), StopReason.OTHER),
+                iterations=int(stats.get("iter_count", 0)),
+            )
+
+        return search_one
+
+    return [search_with(function) for function in functions]
+
+
+def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
+    """Return (c,) typical lengths of each limit's gradient in scaled variables, so that Ipopt sees rows of order 1.
+
+    The program's other constraints are written that way already and have 1.
+    """
+    jacobians = [nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_SAMPLED]]
+    rows = np.array(jacobians) * nlp.scale
+    lengths = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
+    lengths = np.where(np.isfinite(lengths), lengths, 0.0).max(axis=0, initial=0.0)
+    limits = np.array([any(constraint.keys) for constraint in nlp.program.constraints], dtype=bool)
+    return np.where(limits & (lengths > 0), lengths, 1.0)
+
+
+def _scaled_problem(nlp: Nlp) -> dict[str, SX]:
+    """Return the program's structure over scaled variables, with a scaled objective to be minimised."""
+    program = nlp.program
+    s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
+    sizes = SX.sym("sizes", len(program.constraints))
+    F, g = program.values.call([centre + scale * s, program.p])
+    return {"x": s, "p": ca.vertcat(program.p, centre, scale, weight, sizes), "f": weight * F, "g": g / sizes}
+
+
+def _compiled_problem(problem: dict[str, SX]) -> str:
+    """Return the path of a library with every function that Ipopt calls, for CasADi to load as external functions."""
+    solver = ca.nlpsol("solver", "ipopt", problem, _options(1))
+    generator = ca.CodeGenerator("problem.c")
+    for function in (solver.oracle(), *(solver.get_function(name) for name in solver.get_function())):
+        generator.add(function)
+    return str(shared_library(generator.dump()))
+
+
+def _options(max_iterations: int) -> dict[str, Any]:
+    """Return CasADi's and Ipopt's options, by their own names."""
+    return {
+        "print_time": False,
+        "show_eval_warnings": False,
+        "error_on_fail": False,
+        "calc_multipliers": False,
+        "calc_lam_p": False,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": TOLERANCE,
+            "max_iter": max_iterations,
+            # Ipopt would otherwise widen every bound by 1e-8 and return values that no feasible point has.
+            "bound_relax_factor": 0.0,
+            # The objective and variables are scaled already, by the same numbers for every start.
+            "nlp_scaling_method": "none",
+        },
+    }

@@ -1,0 +1,154 @@
+"""The answer to a case: one type for one task or several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...models import FloatArray
+from ..case.case import Case
+from ..case.task import Method, Task
+from ..errors import EvaluationError
+from ..evidence.optimality import Evidence
+from ..evidence.state import RobotState
+from ..program.nlp import Nlp
+from ..program.relaxation import RelaxedLimit
+from .multistart import Optimum, ProgramSolution, Status
+from .starts import Start
+
+
+@dataclass(frozen=True, eq=False)
+class TaskOutcome:
+    """One task at the point of a solution.
+
+    Attributes:
+        task: the task, its weight as used.
+        own: the solution of the task's own program.
+        unique: whether the task's own optimum is the only one.
+        x: (n,) the member of its optimal set that was used.
+        state: the robot at the solution's point, with this task's rates; None where it does not exist. At the first
+            pose, where there are several.
+        F: the task's objective at the solution's point; NaN where it does not exist.
+        evidence: the evidence at the solution's point for this task alone; None when nothing is free.
+        loss: how much worse F is than the task's own optimum; negative where the combined search came upon a better
+            one, and 0 for a case with one task.
+    """
+
+    task: Task
+    own: ProgramSolution
+    unique: bool
+    x: FloatArray
+    state: RobotState | None
+    F: float
+    evidence: Evidence | None
+    loss: float
+
+
+@dataclass(frozen=True, eq=False)
+class Combination:
+    """The part of a solution that only several tasks have.
+
+    Attributes:
+        method: how the tasks were combined.
+        value: of the combined objective: the weighted sum, or the level that every task keeps; None for an average.
+        weights: one for each task, scaled to sum to the number of tasks.
+        violated: names of the limits that the combined point lies outside of.
+        notices: sentences for the user about scaled weights and optima that are not unique.
+        combined: the solution of the combined program; None for an average, or where a task has no optimum of its own.
+    """
+
+    method: Method
+    value: float | None
+    weights: tuple[float, ...]
+    violated: tuple[str, ...]
+    notices: tuple[str, ...]
+    combined: ProgramSolution | None
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The answer to a case.
+
+    Attributes:
+        case: the case.
+        status: how the solve ended.
+        x: (n,) the best point, in the variables of a single task's program: optimal, or merely reached when the status
+            says so.
+        outcomes: one for each task.
+        combination: how several tasks were combined; None for one task.
+        seconds: wall time.
+    """
+
+    case: Case
+    status: Status
+    x: FloatArray
+    outcomes: tuple[TaskOutcome, ...]
+    combination: Combination | None
+    seconds: float
+
+    @property
+    def decided_by(self) -> ProgramSolution | None:
+        """Solution of the program that decided: of the only task, or of the combined program; None for an average."""
+        return self.outcomes[0].own if self.combination is None else self.combination.combined
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the point is the one that the method yields, be it within the limits or not."""
+        alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
+        decisive = self.decided_by
+        return alone and (decisive is None or decisive.status.is_answer)
+
+    @property
+    def F(self) -> float:  # noqa: N802 - the objective's name
+        """Objective at the optimum, for a case with one task.
+
+        Raises:
+            EvaluationError: the solve failed, or the case has several tasks.
+        """
+        if self.combination is not None:
+            raise EvaluationError("the case has several tasks, each with its own F: see outcomes and combination.value")
+        return self.outcomes[0].own.F
+
+    @property
+    def state(self) -> RobotState | None:
+        """The robot at the point, with the rates of the first task; None where it does not exist."""
+        return self.outcomes[0].state
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """Evidence of the program that decided; None for an average, and when nothing is free."""
+        return None if self.decided_by is None else self.decided_by.evidence
+
+    @property
+    def nlp(self) -> Nlp:
+        """The program that decided; see :meth:`_decisive` for the errors of this and the following properties."""
+        return self._decisive().nlp
+
+    @property
+    def starts(self) -> tuple[Start, ...]:
+        """Every start of the program that decided, in order."""
+        return self._decisive().starts
+
+    @property
+    def optima(self) -> tuple[Optimum, ...]:
+        """Distinct optima of the program that decided, best first."""
+        return self._decisive().optima
+
+    @property
+    def relaxation(self) -> tuple[RelaxedLimit, ...]:
+        """Smallest movement found that makes the limits of an infeasible program feasible."""
+        return self._decisive().relaxation
+
+    @property
+    def seed(self) -> int:
+        """Seed of the starting points."""
+        return self.outcomes[0].own.seed
+
+    def _decisive(self) -> ProgramSolution:
+        """Return the solution of the program that decided.
+
+        Raises:
+            EvaluationError: no single program decided, as for an average.
+        """
+        if self.decided_by is None:
+            raise EvaluationError("no single program gave this point: see outcomes for each task's own")
+        return self.decided_by
