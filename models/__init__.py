@@ -19,12 +19,14 @@ from .model import Model, ModelError
 from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
 from .rotation import axis_angle_from_matrix, matrix_from_axis_angle, matrix_from_cayley, matrix_from_quaternion_vector
 from .screws import (
+    Displacement,
     Screw,
     axis_from_screw,
     displacement,
     line_through,
     moved_screw,
     reciprocal_product,
+    screw_displacement,
     screw_from_axis,
     unit_vector,
 )
@@ -38,6 +40,7 @@ __all__ = [
     "Closure",
     "Dimension",
     "Direction",
+    "Displacement",
     "FloatArray",
     "Leg",
     "LegInstance",
@@ -83,6 +86,7 @@ __all__ = [
     "reason_for_zero_row",
     "reciprocal_product",
     "robot_function",
+    "screw_displacement",
     "screw_from_axis",
     "stewart_gough",
     "three_upu",

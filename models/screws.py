@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -182,7 +182,49 @@ def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -
     return frozen_array(np.concatenate([direction, moment]), (6,))
 
 
-def displacement(twist: ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
+class Displacement(NamedTuple):
+    """A displacement of a body in the world frame: a point ``x`` goes to ``Q x + t``.
+
+    Attributes:
+        rotation: (3, 3) ``Q``.
+        translation: (3,) ``t``, length.
+    """
+
+    rotation: FloatArray
+    translation: FloatArray
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether every point stays in its place."""
+        return bool(np.array_equal(self.rotation, np.eye(3)) and not self.translation.any())
+
+    @classmethod
+    def by(cls, rotation: ArrayLike, translation: ArrayLike) -> Displacement:
+        """Return the displacement with read-only copies of a rotation matrix (3, 3) and a translation (3,).
+
+        Raises:
+            ValueError: a shape is wrong.
+        """
+        return cls(frozen_array(rotation, (3, 3)), frozen_array(translation, (3,)))
+
+
+def screw_displacement(screw: Screw, amount: float) -> Displacement:
+    """Return the finite screw motion about an axis.
+
+    Args:
+        screw: its axis, point and pitch count, and not its intensity.
+        amount: angle about the axis, radians; for an infinite pitch the way along it, length.
+    """
+    s = screw.axis
+    if math.isinf(screw.pitch):
+        return Displacement.by(np.eye(3), amount * s)
+    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
+    # Rodrigues' formula.
+    Q = np.eye(3) + math.sin(amount) * cross + (1 - math.cos(amount)) * (cross @ cross)
+    return Displacement.by(Q, screw.point - Q @ screw.point + screw.pitch * amount * s)
+
+
+def displacement(twist: ArrayLike, t: float) -> Displacement:
     """Return the finite motion ``exp(t [twist])`` of a body that moves with a constant twist for a time ``t``.
 
     The motion is the screw motion about the twist's axis, which does not change the twist itself.
@@ -191,16 +233,8 @@ def displacement(twist: ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
         twist: (6,) angular velocity, then velocity of the body's point at the world origin.
         t: time.
 
-    Returns:
-        (3, 3) rotation ``R`` and (3,) translation ``d``, length: a point ``x`` goes to ``R x + d``.
-
     Raises:
         ValueError: the twist is zero or not finite.
     """
     screw = axis_from_screw(twist)
-    if math.isinf(screw.pitch):
-        return frozen_array(np.eye(3), (3, 3)), frozen_array(screw.axis * screw.intensity * t, (3,))
-    angle, s = screw.intensity * t, screw.axis
-    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
-    R = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    return frozen_array(R, (3, 3)), frozen_array(screw.point - R @ screw.point + screw.pitch * angle * s, (3,))
+    return screw_displacement(screw, screw.intensity * t)

@@ -20,7 +20,6 @@ from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
 from .case.pose import Pose as Pose
 from .case.pose import Rotation as Rotation
-from .case.pose import Step as Step
 from .case.pose import along_screw as along_screw
 from .case.pose import over_grid as over_grid
 from .case.reader import case_from_tables as case_from_tables

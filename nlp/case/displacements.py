@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...models import Dimension, axis_from_screw
+from ...models import Dimension, Displacement, axis_from_screw
 from ..errors import CaseError, listing
 from ..units import Units
-from .pose import HERE, Step, along_screw, over_grid
+from .pose import HERE, along_screw, over_grid
 from .schema import AlongTable, GridTable, OffsetsTable, PoseTable
 from .task import Task
 
@@ -18,7 +18,7 @@ from .task import Task
 _MOST = 200
 
 
-def displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Step, ...]:
+def displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
     """Return the displacements of a stated pose, one for each pose that the robot takes.
 
     Args:
@@ -37,7 +37,7 @@ def displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: 
     return (HERE,) if written.grid is None else _grid(written.grid, f"{key}.grid")
 
 
-def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Step, ...]:
+def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
     names = [task.name for task in tasks]
     if written.task is None and len(tasks) > 1:
         raise CaseError(f"{key}.task", f"is missing: there are several tasks, {listing(names)}")
@@ -53,7 +53,7 @@ def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -
     return along_screw(twist, [float(each) for each in np.linspace(first, last, written.count)])
 
 
-def _grid(written: GridTable, key: str) -> tuple[Step, ...]:
+def _grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
     offsets = [
         _offsets(axis, f"{key}.{name}") for name, axis in zip("xyz", (written.x, written.y, written.z), strict=True)
     ]

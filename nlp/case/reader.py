@@ -135,7 +135,7 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         },
         position=first.position,
         rotation=first.rotation,
-        steps=first.steps,
+        displacements=first.displacements,
         further=further,
         over_poses=over_poses,
         limits=Limits.from_table(written.limits, model, units),

@@ -8,9 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...models import FloatArray, axis_angle_from_matrix, frozen_array, homogenised, reason_for_zero_row
+from ...models import Displacement, FloatArray, axis_angle_from_matrix, frozen_array, homogenised, reason_for_zero_row
 from ..case.case import Case
-from ..case.pose import Step
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
@@ -167,9 +166,9 @@ def _stated_axis_angle(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArra
     return frozen_array(axis, (3,)), float(vector[places.angle.index])
 
 
-def _pose_displacements(case: Case) -> list[tuple[int, Step]]:
+def _pose_displacements(case: Case) -> list[tuple[int, Displacement]]:
     """Return the index of the stated pose and the displacement from it, for each pose of the robot."""
-    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.steps]
+    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.displacements]
 
 
 def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:

@@ -28,6 +28,7 @@ from casadi import SX
 
 from ...models import (
     Dimension,
+    Displacement,
     Parameter,
     RobotInstance,
     Substitution,
@@ -37,7 +38,7 @@ from ...models import (
 )
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
-from ..case.pose import Free, Pose, Step, Value, sizes_of_turn
+from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
 from .limits import ProgramNumbers, limit_constraints
@@ -90,7 +91,7 @@ class _StatedPoseSymbols(NamedTuple):
         symbols: symbols of these numbers.
         places: places of the rotation's variables.
         constraints: constraints on the rotation.
-        steps: displacements of the pose.
+        displacements: of the pose.
     """
 
     rotation: SX
@@ -99,7 +100,7 @@ class _StatedPoseSymbols(NamedTuple):
     symbols: SX
     places: RotationPlaces
     constraints: list[BoundedConstraint]
-    steps: tuple[Step, ...]
+    displacements: tuple[Displacement, ...]
 
 
 def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
@@ -137,7 +138,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
     ]
     values = ca.vertcat(SX(0, 1), *[placed.symbols for placed in parameters])
     robots = []
-    poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.steps]
+    poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.displacements]
     for k, (rotation, position) in enumerate(poses):
         own_unknowns = ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]])
         substitution = Substitution(values, own_unknowns, rotation, position)
@@ -182,7 +183,7 @@ def _unknown_prefixes(case: Case) -> list[str]:
     return [f"at{k + 1}_" for k in range(count)] if count > 1 else [""]
 
 
-def _displace(rotation: SX, position: SX, step: Step) -> tuple[SX, SX]:
+def _displace(rotation: SX, position: SX, step: Displacement) -> tuple[SX, SX]:
     """Return ``R`` (3, 3) and ``p`` (3, 1) of a stated pose after one of its displacements."""
     if step.is_identity:
         return rotation, position
@@ -249,14 +250,16 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
         rotation = matrix_from_axis_angle(n.symbols, size.symbols)
         symbols, places = ca.vertcat(position.symbols, size.symbols), (*position.places, *size.places)
         return _StatedPoseSymbols(
-            rotation, position.symbols, places, symbols, HeldRotation(size.places[0]), [], pose.steps
+            rotation, position.symbols, places, symbols, HeldRotation(size.places[0]), [], pose.displacements
         )
     smallest, largest = sizes_of_turn(angle)
     radius = math.sin(largest / 2)
     if radius == 0:
         q = table.add_vector(f"{prefix}q", Dimension.NUMBER, (0.0, 0.0, 0.0)).symbols
         rotation = matrix_from_quaternion_vector(q)
-        return _StatedPoseSymbols(rotation, position.symbols, position.places, position.symbols, None, [], pose.steps)
+        return _StatedPoseSymbols(
+            rotation, position.symbols, position.places, position.symbols, None, [], pose.displacements
+        )
     inner = math.sin(smallest / 2)
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
     # The ball implies |q_x| <= radius and so on: a bound that touches the ball would share its multiplier where the
@@ -273,5 +276,5 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
         position.symbols,
         FreeRotation((x, y, z), ball),
         [BoundedConstraint(ball, inner**2 if inner else -math.inf, radius**2)],
-        pose.steps,
+        pose.displacements,
     )

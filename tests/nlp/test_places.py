@@ -69,7 +69,7 @@ def test_internal_names_as_parameter_names_change_nothing(names: tuple[str, ...]
           for c, d in [(one, other)]),
     ]  # fmt: skip
     steps = along_screw(HELICAL.twist, [0.0, 0.1, 0.2])
-    several = {"steps": steps, "over_poses": OverPoses.WORST, "tasks": [HELICAL], "held": held}
+    several = {"displacements": steps, "over_poses": OverPoses.WORST, "tasks": [HELICAL], "held": held}
     pairs.append((formulate(case_of(PLAIN, **several)), formulate(case_of(names, **several))))  # type: ignore[arg-type]
     for first, second in pairs:
         for x in (first.start, first.lower + 0.3 * (first.upper - first.lower)):

@@ -20,8 +20,20 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from screwsynth.models import Body, Closure, Dimension, Link, Model, Point, PoseSymbols, Scene, Unknown, force_along
-from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
+from screwsynth.models import (
+    Body,
+    Closure,
+    Dimension,
+    Displacement,
+    Link,
+    Model,
+    Point,
+    PoseSymbols,
+    Scene,
+    Unknown,
+    force_along,
+)
+from screwsynth.nlp import Case, Task, formulate, load_case, result_of, solve
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -354,8 +366,8 @@ def sliding(*shifts: float) -> Case:
         ),
     )
     task = Task([0, 0, 0, 0.6, 0, 0.8])
-    steps = tuple(Step(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
-    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], steps=steps)
+    steps = tuple(Displacement.by(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
+    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], displacements=steps)
 
 
 def test_robots_with_loops_follow() -> None:
