@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
-from .progress import certify_with_progress
 
 
 def certify(
@@ -30,6 +29,7 @@ def certify(
     from ..output.files import read_text, write_text
     from ..results.data import certified_of
     from ..solve.certified import CertifyOptions, OptionError, proof_of
+    from .progress import certify_with_progress
 
     try:
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case

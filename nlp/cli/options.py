@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -52,6 +51,8 @@ def write_json(target: str, result: dict[str, Any]) -> None:
     Raises:
         InputError: it cannot be written.
     """
+    import json
+
     from ..output.files import write_text
 
     write_text(target, json.dumps(result, indent=2, allow_nan=False) + "\n")

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from .options import CaseName, Jobs, Seed, Starts, check_target
-from .progress import solve_with_progress
 
 
 def report(
@@ -25,6 +24,7 @@ def report(
     from ..case.reader import load_case
     from ..output.files import write_text
     from ..output.pictures.extras import check_library
+    from .progress import solve_with_progress
 
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
