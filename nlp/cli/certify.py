@@ -39,7 +39,7 @@ def certify(
         for target in (json_file, proof):
             check_target(target)
         certified = certify_with_progress(
-            loaded, gap=gap, above=above, time=time, jobs=jobs, starts=starts, with_proof=proof is not None
+            loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
         )
     except OptionError as error:
         raise InputError(f"--{error}") from None
