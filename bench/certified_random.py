@@ -17,7 +17,7 @@ from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
 from screwsynth.nlp.case.case import Search
 from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.solve.multistart import solve_program
+from screwsynth.nlp.solver.multistart import solve_program
 
 
 def random_case(seed: int) -> Case:

@@ -1,21 +1,32 @@
-"""Symbolic robots and the screw algebra they are written in."""
+"""Symbolic robots, and the screw algebra in which they are written."""
 
 from .arrays import FloatArray, frozen_array, frozen_vector
 from .catalog import RobotFunction, UnknownModelError, model_names, robot_function
 from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
-from .instance import LegInstance, RobotInstance, Substitution, homogenised, instantiate, jacobian, objective, vanished
+from .instance import (
+    LegInstance,
+    RobotInstance,
+    Substitution,
+    homogenised,
+    instantiate,
+    jacobian,
+    objective,
+    reason_for_zero_row,
+)
 from .legs import LeggedPlatform, legged_platform
 from .model import Model, ModelError
 from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
 from .rotation import axis_angle_from_matrix, matrix_from_axis_angle, matrix_from_cayley, matrix_from_quaternion_vector
 from .screws import (
+    Displacement,
     Screw,
     axis_from_screw,
     displacement,
     line_through,
     moved_screw,
     reciprocal_product,
+    screw_displacement,
     screw_from_axis,
     unit_vector,
 )
@@ -29,6 +40,7 @@ __all__ = [
     "Closure",
     "Dimension",
     "Direction",
+    "Displacement",
     "FloatArray",
     "Leg",
     "LegInstance",
@@ -71,11 +83,12 @@ __all__ = [
     "model_names",
     "moved_screw",
     "objective",
+    "reason_for_zero_row",
     "reciprocal_product",
     "robot_function",
+    "screw_displacement",
     "screw_from_axis",
     "stewart_gough",
     "three_upu",
     "unit_vector",
-    "vanished",
 ]

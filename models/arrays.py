@@ -22,7 +22,7 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
         shape: the shape that the array must have.
 
     Raises:
-        ValueError: the shape is another one.
+        ValueError: the values have another shape.
     """
     array = np.array(values, dtype=np.float64)
     if array.shape != shape:
@@ -32,5 +32,12 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 
 def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
-    """Return a read-only vector of any length, float64."""
+    """Return a read-only copy of a vector (n,) of any length as float64.
+
+    Args:
+        values: (n,) numbers.
+
+    Raises:
+        ValueError: the values are no vector.
+    """
     return frozen_array(values, (len(values),))

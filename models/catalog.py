@@ -1,7 +1,7 @@
-"""Finding a robot by name: the shipped ones, and those that other packages offer.
+"""Robots by name: the shipped ones, and those that other packages offer.
 
 Another package offers a robot by an entry point in the group ``screwsynth.models``: its name is the robot's name in
-case files, its object a function that takes the robot's options as keyword arguments and returns a
+case files, its object is a function that takes the robot's options as keyword arguments and returns a
 :class:`~screwsynth.models.model.Model`.
 """
 
@@ -17,7 +17,7 @@ from .three_upu import three_upu
 
 
 class UnknownModelError(KeyError):
-    """No robot has that name."""
+    """Error of a name that no robot has."""
 
 
 RobotFunction = Callable[..., Model]
@@ -30,21 +30,24 @@ SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of all robots on this machine, the shipped ones first; nothing is imported to find out."""
-    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs never ask
+    """Return the names of all robots on this machine, the shipped ones first, without importing any robot."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs do not need it
 
     return (*SHIPPED, *sorted({point.name for point in entry_points(group=GROUP)} - set(SHIPPED)))
 
 
 def robot_function(name: str) -> RobotFunction:
-    """The function that builds the named robot. A shipped name cannot be taken over by another package.
+    """Return the function that builds the named robot. Another package cannot replace a shipped robot.
+
+    Args:
+        name: the robot's name in case files.
 
     Raises:
         UnknownModelError: no robot has that name.
     """
     if name in SHIPPED:
         return SHIPPED[name]
-    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs never ask
+    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs do not need it
 
     for point in entry_points(group=GROUP, name=name):
         function: RobotFunction = point.load()

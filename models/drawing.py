@@ -1,4 +1,4 @@
-"""The drawing of a robot, symbolically: what a picture in true proportion needs, and nothing of how it is painted."""
+"""The drawing of a robot as symbols: points, links, circles, directions and marks, without colours or line widths."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from casadi import SX
 
 
 class Body(enum.Enum):
-    """What a point of the drawing moves with."""
+    """Body that a part of the drawing moves with."""
 
     BASE = "base"
     PLATFORM = "platform"
@@ -28,7 +28,13 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A straight line of the drawing between two named points; ``limb`` names the limb it is part of, if any."""
+    """A straight line of the drawing between two named points.
+
+    Attributes:
+        start, end: names of the two points.
+        body: the body that the link moves with.
+        limb: name of the limb that the link is part of, if any.
+    """
 
     start: str
     end: str
@@ -38,7 +44,14 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """A circle that joints lie on: (3, 1) centre, one of its points, and normal, in world coordinates."""
+    """A circle that joints lie on, in world coordinates.
+
+    Attributes:
+        centre: (3, 1) length.
+        through: (3, 1) a point of the circle, length.
+        normal: (3, 1) normal of the circle's plane, of any length but zero.
+        body: the body that the circle moves with.
+    """
 
     centre: SX
     through: SX
@@ -51,11 +64,11 @@ class Direction:
     """A named direction at a point, such as a joint's axis.
 
     Attributes:
-        name: unique within the drawing; that of a parameter where the direction is one.
+        name: unique within the drawing; the name of a parameter where the direction is that parameter.
         origin: (3, 1) world coordinates, length.
         vector: (3, 1) in world coordinates, of any length but zero.
-        body: what it moves with.
-        limb: the limb it is part of, if any.
+        body: the body that the direction moves with.
+        limb: name of the limb that the direction is part of, if any.
     """
 
     name: str
@@ -66,7 +79,7 @@ class Direction:
 
 
 class MarkKind(enum.Enum):
-    """How a parameter shows in the drawing."""
+    """Kind of quantity that a mark shows."""
 
     LENGTH = "length"
     ANGLE = "angle"
@@ -74,20 +87,20 @@ class MarkKind(enum.Enum):
 
     @property
     def size(self) -> int:
-        """Number of points of such a mark."""
+        """Number of points of a mark of this kind."""
         return {MarkKind.LENGTH: 2, MarkKind.ANGLE: 3, MarkKind.POINT: 1}[self]
 
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """Where a parameter is seen in the drawing, so that nobody must guess what it measures.
+    """A parameter's place in the drawing, which shows the length, angle or point that the parameter measures.
 
     Attributes:
         parameter: name of the parameter.
-        kind: what is measured.
+        kind: length, angle or point.
         points: each (3, 1) in world coordinates: start and end of a length; vertex, start and end of an angle; the
             point itself.
-        body: what it moves with.
+        body: the body that the mark moves with.
     """
 
     parameter: str
@@ -98,7 +111,7 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The robot as points and straight links, with circles, directions and marks where they say more."""
+    """The drawing of a robot: points and straight links, and optionally circles, directions and marks."""
 
     points: tuple[Point, ...] = ()
     links: tuple[Link, ...] = ()
@@ -108,24 +121,32 @@ class Scene:
 
     @property
     def expressions(self) -> tuple[tuple[str, SX], ...]:
-        """Every (3, 1) expression of the drawing, with what it is, in the order of the fields."""
+        """Every (3, 1) expression of the drawing with a name for messages, in the order of the fields."""
         return (
             *((f"point {point.name}", point.position) for point in self.points),
-            *((f"circle {i} {what}", part) for i, circle in enumerate(self.circles) for what, part in _parts(circle)),
+            *((f"circle {i} {name}", part) for i, circle in enumerate(self.circles) for name, part in _vectors(circle)),
             *((f"direction {item.name}", part) for item in self.directions for part in (item.origin, item.vector)),
             *((f"mark of {mark.parameter}", part) for mark in self.marks for part in mark.points),
         )
 
     def faults(self, limbs: Iterable[str], parameters: Iterable[str]) -> Iterable[str]:
-        """What contradicts the rest of the model: ends, limbs and parameters that do not exist, and wrong counts."""
+        """Yield a sentence for every contradiction between the drawing and the rest of the model.
+
+        Contradictions are ends of links, limbs and parameters that do not exist, and marks with a wrong number of
+        points.
+
+        Args:
+            limbs: names of the model's limbs.
+            parameters: names of the model's parameters.
+        """
         points, limbs, parameters = {point.name for point in self.points}, set(limbs), set(parameters)
         for link in self.links:
             for end in (link.start, link.end):
                 if end not in points:
                     yield f"a link ends at {end!r}, which is no point of the drawing"
-        for what, item in [("link", link) for link in self.links] + [("direction", each) for each in self.directions]:
+        for kind, item in [("link", link) for link in self.links] + [("direction", each) for each in self.directions]:
             if item.limb is not None and item.limb not in limbs:
-                yield f"a {what} belongs to limb {item.limb!r}, which has no wrench"
+                yield f"a {kind} belongs to limb {item.limb!r}, which has no wrench"
         for mark in self.marks:
             if mark.parameter not in parameters:
                 yield f"a mark shows {mark.parameter!r}, which is no parameter"
@@ -133,5 +154,6 @@ class Scene:
                 yield f"the mark of {mark.parameter!r} should have {mark.kind.size} points, got {len(mark.points)}"
 
 
-def _parts(circle: Circle) -> tuple[tuple[str, SX], ...]:
+def _vectors(circle: Circle) -> tuple[tuple[str, SX], ...]:
+    """Return the three (3, 1) vectors of a circle with their names."""
     return ("centre", circle.centre), ("through", circle.through), ("normal", circle.normal)

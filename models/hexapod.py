@@ -1,4 +1,4 @@
-"""A hexapod given joint by joint: twelve joint centres, any coordinate of which a case fixes or frees.
+"""A hexapod given by twelve joint centres, any coordinate of which a case fixes or frees.
 
 Letters: ``base_i`` is the centre of leg i's base joint in the world frame, ``platform_i`` the centre of its platform
 joint in the platform frame.
@@ -18,15 +18,19 @@ from .parts import Dimension, Leg, Parameter, PoseSymbols
 
 
 def hexapod() -> Model:
-    """Six legs between twelve joint centres given by their coordinates."""
+    """Return a robot with six legs between twelve joint centres, given by their coordinates."""
     pose = PoseSymbols()
     base, platform, legs = [], [], []
     for i in range(6):
         name = str(i + 1)
         b, a = SX.sym(f"base_{name}", 3), SX.sym(f"platform_{name}", 3)
-        base.append(Parameter(f"base_{name}", b, Dimension.LENGTH, f"base joint of leg {name}", _typical(i, 12.0, 20)))
+        base.append(
+            Parameter(f"base_{name}", b, Dimension.LENGTH, f"base joint of leg {name}", _typical_joint(i, 12.0, 20))
+        )
         platform.append(
-            Parameter(f"platform_{name}", a, Dimension.LENGTH, f"platform joint of leg {name}", _typical(i, 8.0, 45))
+            Parameter(
+                f"platform_{name}", a, Dimension.LENGTH, f"platform joint of leg {name}", _typical_joint(i, 8.0, 45)
+            )
         )
         legs.append(Leg(name, b, a))
     parts = legged_platform(legs, pose)
@@ -48,7 +52,13 @@ def hexapod() -> Model:
     )
 
 
-def _typical(i: int, radius: float, half_angle: float) -> tuple[float, float, float]:
-    """A joint of an octahedral arrangement: pairs at 0, 120 and 240 degrees, to a tenth of a length unit."""
+def _typical_joint(i: int, radius: float, half_angle: float) -> tuple[float, float, float]:
+    """Return a joint of an octahedral arrangement, pairs at 0, 120 and 240 degrees, to a tenth of a length unit.
+
+    Args:
+        i: index of the leg.
+        radius: of the joints' circle, length.
+        half_angle: half of the angle between the joints of a pair, degrees.
+    """
     azimuth = math.radians(120 * (i // 2) + half_angle * (1 if i % 2 else -1))
     return round(radius * math.cos(azimuth), 1), round(radius * math.sin(azimuth), 1), 0.0

@@ -1,4 +1,4 @@
-"""A model with symbols or numbers in place of its own: its rows, their rates and F at one pose.
+"""A model with other expressions or numbers in place of its symbols: its rows, their rates and F at one pose.
 
 F is written here and nowhere else. For rows ``L_i = (f_i, m_i) / sqrt(square_i)`` and a twist ``chi = (omega, v)``
 
@@ -12,24 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import casadi as ca
 from casadi import SX
 
+from .arrays import FloatArray
 from .model import Model
 from .wrench import Wrench, WrenchKind
+
+#: A matrix or vector of symbols or of numbers.
+Matrix = TypeVar("Matrix", SX, FloatArray)
 
 
 @dataclass(frozen=True, eq=False)
 class Substitution:
-    """Expressions that take the place of a model's symbols.
+    """Expressions that replace a model's symbols.
 
     Attributes:
         parameters: (n, 1) components of all parameters, in the model's order.
         unknowns: (u, 1) internal unknowns, in the model's order.
-        rotation: (3, 3) ``R``.
-        position: (3, 1) ``p``, length.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
     """
 
     parameters: SX
@@ -39,7 +43,7 @@ class Substitution:
 
     @classmethod
     def identity(cls, model: Model) -> Substitution:
-        """Return the model's own symbols."""
+        """Return the model's own symbols, so that nothing is replaced."""
         return cls(
             ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
             ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
@@ -61,7 +65,7 @@ class LegInstance:
         name: the limb's name.
         base: (3, 1) centre of its base joint in the world frame, length.
         platform: (3, 1) centre of its platform joint in the platform frame, length.
-        span: (3, 1) from base joint to platform joint in the world frame, length.
+        span: (3, 1) vector from base joint to platform joint in the world frame, length.
     """
 
     name: str
@@ -76,16 +80,17 @@ class RobotInstance:
 
     Attributes:
         parameters: (n, 1) components of all parameters, in the model's order.
-        rotation: (3, 3) ``R``.
-        position: (3, 1) ``p``, length.
-        jacobian: (m, 6) unit wrenches ``J``, couple rows multiplied by the characteristic length.
-        rates: (m, tasks) ``L_i ^ chi_j``.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
+        jacobian: (m, 6) unit wrenches ``J``, force, then moment about the world origin; couple rows multiplied by the
+            characteristic length.
+        rates: (m, tasks) work rates ``L_i ^ chi_j``.
         F: (tasks, 1) objective of each task (equation 14).
-        squares: (m, 1) squared length of each row's direction: a limb of zero length has 0.
-        magnitude: (tasks, 1) upper bound of F, see :func:`magnitude`.
-        quantities: each of the model's quantities.
+        squares: (m, 1) squared length of each row's direction; 0 for a limb of zero length.
+        magnitude: (tasks, 1) F without cancellation, never below F; see :func:`magnitude`.
+        quantities: (n, 1) values of each of the model's quantities.
         legs: the model's legs.
-        closure: (c, 1) closure equations, zero where the loops are closed.
+        closure: (c, 1) left sides of the closure equations, zero where the loops are closed.
     """
 
     parameters: SX
@@ -101,14 +106,14 @@ class RobotInstance:
     closure: SX
 
 
-def instantiate(model: Model, put: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
+def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
     """Return a model's expressions with its symbols replaced.
 
     Args:
         model: the model.
-        put: what takes the place of its symbols.
+        substitution: the expressions that replace its symbols.
         length: (1, 1) characteristic length, by which couple rows are multiplied.
-        twists: (6, 1) each, angular velocity, then velocity at the world origin.
+        twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
     """
     outputs = [
         ca.horzcat(*[row.force for row in model.wrenches]),
@@ -118,22 +123,22 @@ def instantiate(model: Model, put: Substitution, length: SX, twists: Sequence[SX
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
     ]
-    inlined = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, *others = inlined.call(put.all)
+    function = ca.Function("model", Substitution.identity(model).all, outputs)
+    force, moment, square, closure, *others = function.call(substitution.all)
     quantities, joints = others[: len(model.quantities)], others[len(model.quantities) :]
     rows = [Wrench(row.limb, row.kind, force[:, i], moment[:, i], square[i]) for i, row in enumerate(model.wrenches)]
     return RobotInstance(
-        parameters=put.parameters,
-        rotation=put.rotation,
-        position=put.position,
+        parameters=substitution.parameters,
+        rotation=substitution.rotation,
+        position=substitution.position,
         jacobian=jacobian(rows, length),
         rates=ca.horzcat(*[rates(rows, twist, length) for twist in twists]),
         F=ca.vertcat(*[objective(rows, twist, length) for twist in twists]),
         squares=square,
-        magnitude=ca.vertcat(*[magnitude(rows, twist, put.position, length) for twist in twists]),
+        magnitude=ca.vertcat(*[magnitude(rows, twist, substitution.position, length) for twist in twists]),
         quantities=tuple(quantities),
         legs=tuple(
-            LegInstance(leg.name, base, platform, put.position + put.rotation @ platform - base)
+            LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
         closure=closure,
@@ -141,24 +146,34 @@ def instantiate(model: Model, put: Substitution, length: SX, twists: Sequence[SX
 
 
 def jacobian(rows: Sequence[Wrench], length: SX) -> SX:
-    """Return (m, 6) unit wrenches, force, then moment about the world origin; couples times the length."""
+    """Return the Jacobian (m, 6): unit wrenches, force, then moment about the world origin; couples times the length.
+
+    Args:
+        rows: m wrenches.
+        length: (1, 1) characteristic length.
+    """
     return ca.vertcat(
-        *[_scale(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
+        *[_row_factor(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
     )
 
 
 def rates(rows: Sequence[Wrench], twist: SX, length: SX) -> SX:
-    """Return (m, 1) work rates ``L_i ^ chi`` in a twist (6, 1); couples times the length."""
-    return ca.vertcat(*[_product(row, twist, length) / ca.sqrt(row.square) for row in rows])
+    """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); couples times the length."""
+    return ca.vertcat(*[_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows])
 
 
 def objective(rows: Sequence[Wrench], twist: SX, length: SX) -> SX:
-    """Return F, (1, 1), in a twist (6, 1).
+    """Return F, (1, 1), in a twist (6, 1) (equation 14).
 
-    It is written as a sum of ``(m . omega + f . v)^2 / square`` and not of squared unit products: smoother, and with
-    tighter interval enclosures.
+    F is written as a sum of ``(m . omega + f . v)^2 / square`` and not as a sum of squared products of unit vectors:
+    the former is smoother and has tighter interval enclosures.
+
+    Args:
+        rows: m wrenches.
+        twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
+        length: (1, 1) characteristic length, by which couple rows are multiplied.
     """
-    return sum((_product(row, twist, length) ** 2 / row.square for row in rows), SX(0))
+    return sum((_scaled_rate(row, twist, length) ** 2 / row.square for row in rows), SX(0))
 
 
 def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX) -> SX:
@@ -166,12 +181,18 @@ def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX) -> SX
 
     Moments and velocity are taken at the platform's origin, so that the number does not depend on where the world's
     origin is.
+
+    Args:
+        rows: m wrenches.
+        twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
+        position: (3, 1) origin of the platform frame in the world frame, length.
+        length: (1, 1) characteristic length, by which couple rows are multiplied.
     """
     omega, v = twist[:3], twist[3:]
     at_origin = ca.norm_2(v + ca.cross(omega, position))
     return sum(
         (
-            _scale(row, length) ** 2
+            _row_factor(row, length) ** 2
             * (
                 ca.norm_2(row.moment - ca.cross(position, row.force)) * ca.norm_2(omega)
                 + ca.norm_2(row.force) * at_origin
@@ -184,33 +205,37 @@ def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX) -> SX
     )
 
 
-def homogenised(jacobian: Any, centre: Any, length: Any) -> tuple[Any, ...]:  # noqa: ANN401 - SX or NumPy alike
+def homogenised(jacobian: Matrix, centre: Matrix, length: float) -> tuple[Matrix, ...]:
     """Return the columns of a Jacobian made homogeneous: moments about a point, divided by a length.
 
     Args:
         jacobian: (m, 6) rows force, then moment about the world origin; symbols or numbers.
-        centre: (3,) the point, length.
-        length: what moments are divided by.
+        centre: (3,) or, as symbols, (3, 1) the point in the world frame, length.
+        length: divisor of the moments, length.
 
     Returns:
-        Six columns of m entries each: forces, then moments.
+        Six columns, each (m,) or, as symbols, (m, 1): forces, then moments.
     """
-    fx, fy, fz, mx, my, mz = (jacobian[:, k] for k in range(6))
-    x, y, z = (centre[k] for k in range(3))
-    moments = (mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx))
-    return (fx, fy, fz, *(moment / length for moment in moments))
+    columns: list[Matrix] = [jacobian[:, k] for k in range(6)]
+    coordinates: list[Matrix] = [centre[k] for k in range(3)]
+    fx, fy, fz, mx, my, mz = columns
+    x, y, z = coordinates
+    mx, my, mz = mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx)
+    return fx, fy, fz, mx / length, my / length, mz / length
 
 
-def vanished(row: Wrench) -> str:
-    """Return why a row whose direction is zero is none, for messages."""
+def reason_for_zero_row(row: Wrench) -> str:
+    """Return the reason why a row has zero direction and so no unit wrench, as a clause for messages."""
     if row.kind is WrenchKind.COUPLE:
         return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
     return f"limb {row.limb!r} has zero length: its two joints coincide"
 
 
-def _scale(row: Wrench, length: SX) -> SX:
+def _row_factor(row: Wrench, length: SX) -> SX:
+    """Return the factor of a row: the characteristic length for a couple, 1 for a force."""
     return length if row.kind is WrenchKind.COUPLE else SX(1)
 
 
-def _product(row: Wrench, twist: SX, length: SX) -> SX:
-    return _scale(row, length) * row.rate(twist)
+def _scaled_rate(row: Wrench, twist: SX, length: SX) -> SX:
+    """Return the work rate of a row in a twist times the factor of the row, before division by ``sqrt(square)``."""
+    return _row_factor(row, length) * row.rate(twist)

@@ -1,4 +1,4 @@
-"""What platforms on extensible legs share: rows, measures and drawing, from their joint centres."""
+"""Platforms on extensible legs: rows, quantities and drawing from the joint centres of the legs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,15 @@ from .wrench import Wrench, force_along
 
 @dataclass(frozen=True, eq=False)
 class LeggedPlatform:
-    """Rows, measures, drawing and joint centres of legs between a base and a platform."""
+    """The parts of a model that legs between a base and a platform determine.
+
+    Attributes:
+        legs: the legs, in drawing order around the plates.
+        wrenches: one row for each leg.
+        built: the same rows with the errors of the legs' joint centres.
+        quantities: length of each leg, and its angles against the normals of base and platform.
+        scene: points at joint centres and platform origin, links along legs and outlines of both plates.
+    """
 
     legs: tuple[Leg, ...]
     wrenches: tuple[Wrench, ...]
@@ -25,7 +33,7 @@ class LeggedPlatform:
 
 
 def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
-    """Assemble the legs at a pose.
+    """Return the rows, quantities and drawing of legs at a pose.
 
     With ``d = p + R a - b`` from base joint ``b`` to platform joint ``a``, the row of a leg is the unit force along
     ``d`` through ``b`` (equation 10), and its work rate in a twist is the rate of change of the leg's length.
@@ -41,8 +49,8 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
     lengths = [ca.norm_2(span) for span in spans]
     return LeggedPlatform(
         legs=tuple(legs),
-        wrenches=_rows(legs, pose),
-        built=_rows([leg.built for leg in legs], pose),
+        wrenches=_leg_rows(legs, pose),
+        built=_leg_rows([leg.built for leg in legs], pose),
         quantities=(
             Quantity("leg_length", names, ca.vertcat(*lengths), Dimension.LENGTH, "distance between a leg's joints"),
             Quantity(
@@ -64,17 +72,28 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
     )
 
 
-def _rows(legs: Sequence[Leg], pose: PoseSymbols) -> tuple[Wrench, ...]:
+def _leg_rows(legs: Sequence[Leg], pose: PoseSymbols) -> tuple[Wrench, ...]:
+    """Return the row of each leg at a pose."""
     spans = (pose.position + pose.rotation @ leg.platform - leg.base for leg in legs)
     return tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True))
 
 
 def _angle_between(normal: SX, span: SX) -> SX:
-    """Angle of a leg against a plate's normal; unlike the arc cosine accurate, and defined, for a leg along it."""
+    """Return the angle in radians, (1, 1), of a leg (3, 1) against a plate's normal (3, 1).
+
+    Unlike the arc cosine, the angle is accurate and has a derivative for a leg that is nearly along the normal.
+    """
     return ca.atan2(ca.norm_2(ca.cross(normal, span)), ca.dot(normal, span))
 
 
 def _scene(legs: Sequence[Leg], ends: Sequence[SX], pose: PoseSymbols) -> Scene:
+    """Return the drawing of legs and plates.
+
+    Args:
+        legs: the legs, in drawing order around the plates.
+        ends: (3, 1) each, centres of the platform joints in the world frame, length.
+        pose: symbols of the platform's pose.
+    """
     base = [Point(f"B{leg.name}", leg.base, Body.BASE) for leg in legs]
     platform = [Point(f"A{leg.name}", end, Body.PLATFORM) for leg, end in zip(legs, ends, strict=True)]
     origin = Point("P", pose.position, Body.PLATFORM)

@@ -1,8 +1,8 @@
-"""What a robot function returns: a :class:`Model`, frozen and checked once.
+"""The :class:`Model` that a robot function returns, frozen and checked once.
 
-A model is symbolic throughout. It says which unit wrenches the robot's limbs apply to the platform, as expressions of
-its parameters, of the pose and, for robots given joint by joint, of internal unknowns that closure equations tie down.
-It knows no values, bounds, tasks or solvers; those come from a case.
+A model is symbolic throughout. It gives the unit wrenches that the robot's limbs apply to the platform as expressions
+of its parameters, of the pose and, for robots given joint by joint, of internal unknowns that closure equations
+determine. A model contains no values, bounds of variables, tasks or solvers; these come from a case.
 """
 
 from __future__ import annotations
@@ -21,31 +21,33 @@ from .wrench import Wrench, WrenchKind
 
 
 class ModelError(ValueError):
-    """A robot function built a model that contradicts itself; the message names the robot and the fault."""
+    """Error in a robot function: its model contradicts itself. The message names the robot and the fault."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A parallel robot, symbolically.
+    """A parallel robot as symbols and expressions.
 
     Attributes:
         name: the name in case files.
         description: one sentence for people.
-        options: the options that the robot function was called with.
-        legs: the legs between joint centres, for limits on joints, plates and clearances; none for other limbs.
-        built: the rows of a machine whose joint centres are off by the legs' errors; none where that is not said.
+        options: the options with which the robot function was called.
+        legs: the legs between joint centres, for limits on joints, plates and clearances; empty for other limbs.
+        built: the rows with the legs' errors added to the joint centres, for manufacturing tolerances; empty for a
+            robot that does not give them.
         parameters: dimensions that a case fixes or frees.
         pose: symbols of the platform's pose.
-        home: (3,) a sensible platform position beside the parameters' typical values.
+        home: (3,) a sensible platform position for the typical values of the parameters, length.
         wrenches: the rows of the Jacobian, any number of them.
-        quantities: named measures for results and limits.
+        quantities: named quantities for results and limits.
         scene: the drawing.
-        unknowns: internal unknowns, none for robots whose rows follow from parameters and pose.
-        closure: as many equations as it takes to determine the unknowns.
+        unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
+        closure: the equations that determine the unknowns.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
-            or a drawing refers to a point or limb that does not exist.
+            an unknown has no finite bounds, a leg has no row, the built rows do not match the rows, or a drawing
+            refers to a point, limb or parameter that does not exist.
     """
 
     name: str
@@ -67,7 +69,7 @@ class Model:
         _check_names(self)
         _check_shapes(self)
         _check_symbols(self)
-        _check_scene(self)
+        _check_references(self)
 
     @property
     def limbs(self) -> tuple[str, ...]:
@@ -80,13 +82,15 @@ class Model:
         return any(row.kind is WrenchKind.COUPLE for row in self.wrenches)
 
 
-def _fail(model: Model, fault: str) -> ModelError:
+def _model_error(model: Model, fault: str) -> ModelError:
+    """Return the error of a fault in a model."""
     return ModelError(f"model {model.name!r}: {fault}")
 
 
 def _check_names(model: Model) -> None:
+    """Refuse a model without wrenches, names that appear twice and unknowns without finite bounds."""
     if not model.wrenches:
-        raise _fail(model, "it has no wrenches, so it has no Jacobian")
+        raise _model_error(model, "it has no wrenches, so it has no Jacobian")
     names = [name for parameter in model.parameters for name in parameter.components]
     names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
     names += [quantity.name for quantity in model.quantities]
@@ -94,16 +98,17 @@ def _check_names(model: Model) -> None:
     names += [f"direction {item.name}" for item in model.scene.directions]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
-        raise _fail(model, f"names appear twice: {', '.join(repeated)}")
+        raise _model_error(model, f"names appear twice: {', '.join(repeated)}")
     for unknown in model.unknowns:
         if not -math.inf < unknown.lower < unknown.upper < math.inf:
-            raise _fail(model, f"unknown {unknown.name!r} needs finite bounds, lower below upper")
+            raise _model_error(model, f"unknown {unknown.name!r} needs finite bounds, lower below upper")
 
 
 def _check_shapes(model: Model) -> None:
+    """Refuse an expression of a wrong shape."""
     for parameter in model.parameters:
         if len(parameter.typical) not in (1, 3):
-            raise _fail(model, f"parameter {parameter.name!r} should have 1 or 3 components")
+            raise _model_error(model, f"parameter {parameter.name!r} should have 1 or 3 components")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),
@@ -120,23 +125,24 @@ def _check_shapes(model: Model) -> None:
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
-    expected += [(what, expression, (3, 1)) for what, expression in model.scene.expressions]
+    expected += [(name, expression, (3, 1)) for name, expression in model.scene.expressions]
     for leg in model.legs:
         expected += [(f"leg {leg.name} base", leg.base, (3, 1)), (f"leg {leg.name} platform", leg.platform, (3, 1))]
-    for what, expression, shape in expected:
+    for name, expression, shape in expected:
         if expression.shape != shape:
-            raise _fail(model, f"{what} should have shape {shape}, got {expression.shape}")
+            raise _model_error(model, f"{name} should have shape {shape}, got {expression.shape}")
 
 
 def _check_symbols(model: Model) -> None:
+    """Refuse expressions in place of symbols, symbols with two meanings and symbols that are not declared."""
     declared = [parameter.symbol for parameter in model.parameters] + [unknown.symbol for unknown in model.unknowns]
     declared += [model.pose.rotation, model.pose.position]
     for symbol in declared:
         if not symbol.is_valid_input():
-            raise _fail(model, f"{symbol} is an expression where a symbol must stand")
+            raise _model_error(model, f"{symbol} is an expression where a symbol must stand")
     scalars = ca.vertcat(*[ca.vec(symbol) for symbol in declared])
     if len({scalars[i].element_hash() for i in range(scalars.numel())}) < scalars.numel():
-        raise _fail(model, "a symbol stands for two things")
+        raise _model_error(model, "a symbol stands for two things")
     used: Iterable[SX] = [
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
         *(equation.expression for equation in model.closure),
@@ -151,16 +157,17 @@ def _check_symbols(model: Model) -> None:
     for expressions, allowed in ((used, known), (built, known_if_built)):
         stray = sorted({str(s) for s in ca.symvar(ca.veccat(SX(0), *expressions)) if s.element_hash() not in allowed})
         if stray:
-            raise _fail(model, f"symbols are used but not declared: {', '.join(stray)}")
+            raise _model_error(model, f"symbols are used but not declared: {', '.join(stray)}")
 
 
-def _check_scene(model: Model) -> None:
+def _check_references(model: Model) -> None:
+    """Refuse legs, built rows and drawings that do not match the rows of the model."""
     for leg in model.legs:
         if leg.name not in model.limbs:
-            raise _fail(model, f"leg {leg.name!r} is no limb: it has no wrench")
+            raise _model_error(model, f"leg {leg.name!r} is no limb: it has no wrench")
     if model.built and [(row.limb, row.kind) for row in model.built] != [
         (row.limb, row.kind) for row in model.wrenches
     ]:
-        raise _fail(model, "the rows of the built machine are not those of the designed one")
+        raise _model_error(model, "the rows of the built machine are not those of the designed one")
     for fault in model.scene.faults(model.limbs, [parameter.name for parameter in model.parameters]):
-        raise _fail(model, fault)
+        raise _model_error(model, fault)

@@ -11,7 +11,7 @@ _AXES = ("x", "y", "z")
 
 
 class Dimension(enum.Enum):
-    """What a number measures, and so which unit of a case it is in."""
+    """Physical dimension of a number, which decides its unit in a case."""
 
     LENGTH = "length"
     ANGLE = "angle"
@@ -19,7 +19,12 @@ class Dimension(enum.Enum):
 
 
 def component_names(name: str, size: int) -> tuple[str, ...]:
-    """Names of the scalars of a quantity: itself when it is one, ``name_x, name_y, name_z`` for a vector."""
+    """Return the names of a quantity's scalars: its own name for one scalar, ``name_x, name_y, name_z`` for a vector.
+
+    Args:
+        name: name of the quantity.
+        size: number of its scalars, 1 to 3.
+    """
     return (name,) if size == 1 else tuple(f"{name}_{axis}" for axis in _AXES[:size])
 
 
@@ -30,11 +35,12 @@ class Parameter:
     Attributes:
         name: the name in case files.
         symbol: (1, 1) or (3, 1) CasADi symbol.
-        dimension: what it measures; angles are radians inside.
+        dimension: length, angle (radians) or plain number.
         description: a few words for people.
-        typical: a sensible value for each component, in some length unit and radians: what a starter case begins with.
-        lower, upper: the values for which the robot exists, ends included.
-        is_direction: whether it is a unit vector: a fixed one is brought to unit length, a free one held there.
+        typical: a sensible value of each component for a starter case, in some length unit and radians.
+        lower, upper: least and largest value with which the robot exists.
+        is_direction: whether the parameter is a unit vector. A fixed one is normalised; a free one has its unit length
+            as an equation of the program.
     """
 
     name: str
@@ -59,9 +65,9 @@ class Unknown:
     Attributes:
         name: unique within the model.
         symbol: (1, 1) CasADi symbol.
-        dimension: what it measures; angles are radians.
+        dimension: length, angle (radians) or plain number.
         description: a few words for people.
-        lower, upper: finite range in which the assembly is looked for.
+        lower, upper: finite bounds between which the program searches the assembly.
     """
 
     name: str
@@ -74,7 +80,12 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """An equation that the robot's loops impose: ``expression == 0``."""
+    """An equation of the robot's closed loops: ``expression == 0``.
+
+    Attributes:
+        name: unique within the model.
+        expression: (1, 1) left side of the equation.
+    """
 
     name: str
     expression: SX
@@ -95,13 +106,13 @@ class PoseSymbols:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """A named measure of the robot, one number for each limb or joint, that limits may bound.
+    """A named quantity of the robot, one number for each limb or joint, that a case may limit.
 
     Attributes:
         name: the name in results and limits, such as ``leg_length``.
-        owners: what each number belongs to, in order.
+        owners: name of the limb or joint to which each number belongs, in order.
         values: (n, 1) expressions.
-        dimension: what they measure.
+        dimension: length, angle (radians) or plain number.
         description: a few words for people.
     """
 
@@ -114,13 +125,14 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A straight leg between two passive joints, driven along its own axis.
+    """A straight leg between two passive joints, driven along its own axis; a limb is any chain to the platform.
 
     Attributes:
-        name: the limb's name.
+        name: name of the limb that the leg is.
         base: (3, 1) centre of its base joint in the world frame, length.
         platform: (3, 1) centre of its platform joint in the platform frame, length.
-        base_error, platform_error: (3, 1) symbols for how far off these a machine's joint centres are built.
+        base_error, platform_error: (3, 1) symbols of the error of each joint centre in the machine as it is built, in
+            the frame of that centre, length.
     """
 
     name: str
@@ -131,5 +143,5 @@ class Leg:
 
     @property
     def built(self) -> Leg:
-        """The leg between the joint centres as they are built."""
+        """The leg between joint centres with their errors."""
         return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)

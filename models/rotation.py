@@ -1,9 +1,9 @@
-"""Rotations: symbolic matrices from three coordinate sets, and back from a matrix of numbers.
+"""Rotation matrices: symbolic, from three sets of coordinates; numeric, back to axis and angle.
 
-Which coordinates to choose: the vector part ``q`` of a unit quaternion is smooth without trigonometry for every angle
-below 180 degrees, and turns a limit on the angle into one ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector
-``tan(angle / 2) n`` is smooth on the same set and unbounded. Axis and angle (equation 9) are for a held axis only:
-freed together they are redundant, and singular at zero angle.
+Choice of coordinates: the vector part ``q`` of a unit quaternion is smooth without trigonometry for every angle below
+180 degrees, and turns a limit on the angle into one ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector
+``tan(angle / 2) n`` is smooth on the same set and unbounded. Axis and angle (equation 9) serve where the axis is held
+fixed: as variables together they are redundant, and singular at zero angle.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def matrix_from_quaternion_vector(q: SX) -> SX:
-    """Rotation matrix from the vector part of a unit quaternion.
+    """Return the rotation matrix from the vector part of a unit quaternion.
 
     Args:
         q: (3, 1) ``sin(angle / 2) * axis`` with ``|q| < 1``; the scalar part is the positive root ``sqrt(1 - |q|^2)``.
@@ -36,7 +36,7 @@ def matrix_from_quaternion_vector(q: SX) -> SX:
 
 
 def matrix_from_cayley(c: SX) -> SX:
-    """Rotation matrix from the Cayley (Rodrigues) vector.
+    """Return the rotation matrix from the Cayley (Rodrigues) vector.
 
     Args:
         c: (3, 1) ``tan(angle / 2) * axis``.
@@ -49,18 +49,18 @@ def matrix_from_cayley(c: SX) -> SX:
 
 
 def matrix_from_axis_angle(axis: SX, angle: SX) -> SX:
-    """Rotation matrix ``exp(angle [axis]x)`` (equation 9, Rodrigues' formula).
+    """Return the rotation matrix ``exp(angle [axis]x)``, (3, 3) (equation 9, Rodrigues' formula).
 
     Args:
         axis: (3, 1) unit vector.
-        angle: scalar, radians.
+        angle: (1, 1) radians.
     """
     cross = ca.skew(axis)
     return SX.eye(3) + ca.sin(angle) * cross + (1 - ca.cos(angle)) * cross @ cross
 
 
 def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
-    """Unit axis and angle of a rotation matrix.
+    """Return the unit axis and the angle of a rotation matrix.
 
     Args:
         matrix: (3, 3) rotation matrix of numbers.
@@ -68,6 +68,9 @@ def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
     Returns:
         (3,) unit axis and the angle in [0, pi]. Without rotation the axis is z by convention; at half a turn the
         axis's first component that is not zero is positive.
+
+    Raises:
+        ValueError: the matrix has another shape.
     """
     R = frozen_array(matrix, (3, 3))
     sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
@@ -77,7 +80,8 @@ def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
     if cosine > 0:
         axis = sine / size if size > 0 else np.array([0.0, 0.0, 1.0])
         return frozen_array(axis, (3,)), angle
-    # Past a right angle the symmetric part holds the axis, n n' (1 - cos), better than the vanishing sine does.
+    # Beyond a right angle the symmetric part, n n' (1 - cos), gives the axis more accurately than the sine, which tends
+    # to zero at half a turn.
     outer = (R + R.T) / 2 - cosine * np.eye(3)
     axis = outer[:, int(np.argmax(np.diag(outer)))]
     axis = axis / np.linalg.norm(axis)

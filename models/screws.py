@@ -8,7 +8,7 @@ Every screw is six numbers in ray order, direction first, with its moment taken 
 
 A screw of intensity ``q`` about the unit axis ``s`` through the point ``s0`` with pitch ``h`` is
 ``q (s, s0 x s + h s)``; infinite pitch is ``q (0, s)``: a pure translation as a twist, a pure couple as a wrench.
-A line is a screw of zero pitch. Because both kinds have the same coordinates, one set of functions serves them.
+A line is a screw of zero pitch. Twists and wrenches have the same coordinates, so the functions here serve both.
 
 Source: R. S. Ball, *A Treatise on the Theory of Screws*, Cambridge University Press, 1900, and equations 3 to 6 of the
 paper that :mod:`screwsynth.nlp.program.formulation` cites.
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,19 +27,19 @@ from .arrays import FloatArray, frozen_array
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: A direction part shorter than this times the moment part is rounding error: the pitch is infinite. Lengths of a
-#: screw's two parts differ by the distance of its axis, and no machine is 1e12 of its own length units away.
+#: A direction part shorter than this times the moment part is rounding error: the pitch is infinite. The ratio of the
+#: two lengths is about the distance of the axis from the origin, and no machine is 1e12 of its own length units away.
 _INFINITE_PITCH = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Screw:
-    """A screw taken apart.
+    """A screw as axis, point, pitch and intensity.
 
     Attributes:
         axis: (3,) unit direction of the screw axis.
-        point: (3,) point of the axis nearest to the world origin, length; the origin when the pitch is infinite, where
-            the axis has a direction but no place.
+        point: (3,) point of the axis nearest to the world origin, length; the origin when the pitch is infinite, since
+            the axis then has a direction but no position.
         pitch: translation per rotation (twist) or couple per force (wrench), length; ``math.inf`` for a pure
             translation or a pure couple.
         intensity: magnitude, at least 0: of the direction part, or of the moment part when the pitch is infinite.
@@ -52,13 +52,13 @@ class Screw:
 
 
 def unit_vector(vector: ArrayLike) -> FloatArray:
-    """A vector's direction, (3,) read-only; neither very large nor very small components overflow.
+    """Return a vector's direction, (3,) read-only, without overflow for very large or very small components.
 
     Args:
         vector: (3,) finite numbers, not all zero.
 
     Raises:
-        ValueError: the vector is zero or not finite.
+        ValueError: the vector has another shape, is zero or is not finite.
     """
     v = frozen_array(vector, (3,))
     if not (np.isfinite(v).all() and v.any()):
@@ -68,7 +68,7 @@ def unit_vector(vector: ArrayLike) -> FloatArray:
 
 
 def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: float = 1.0) -> FloatArray:
-    """Coordinates of a screw from its axis (equations 3 and 4).
+    """Return the coordinates of a screw from its axis (equations 3 and 4).
 
     Args:
         axis: (3,) direction, any length but zero.
@@ -80,7 +80,7 @@ def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: 
         (6,) read-only array, ``intensity * (s, point x s + pitch * s)``, or ``intensity * (0, s)``.
 
     Raises:
-        ValueError: the axis is zero, or a number is not finite (the pitch may be ``+inf``).
+        ValueError: a shape is wrong, the axis is zero, or a number is not finite (the pitch may be ``+inf``).
     """
     s = np.array(axis, dtype=np.float64)
     s0 = np.array(point, dtype=np.float64)
@@ -99,13 +99,13 @@ def screw_from_axis(axis: ArrayLike, point: ArrayLike, pitch: float, intensity: 
 
 
 def axis_from_screw(screw: ArrayLike) -> Screw:
-    """Axis, point, pitch and intensity of a twist or wrench: the inverse of :func:`screw_from_axis`.
+    """Return axis, point, pitch and intensity of a twist or wrench: the inverse of :func:`screw_from_axis`.
 
     Args:
         screw: (6,) direction part, then moment part about the world origin.
 
     Raises:
-        ValueError: all six numbers are zero, or one is not finite.
+        ValueError: there are not six numbers, all are zero, or one is not finite.
     """
     coordinates = frozen_array(screw, (6,))
     if not np.isfinite(coordinates).all():
@@ -113,7 +113,7 @@ def axis_from_screw(screw: ArrayLike) -> Screw:
     largest = float(np.abs(coordinates).max())
     if largest == 0.0:
         raise ValueError("a screw of six zeros has no axis")
-    # Scaled first, so that squares neither overflow nor vanish.
+    # The coordinates are scaled first, so that squares neither overflow nor underflow.
     direction, moment = coordinates[:3] / largest, coordinates[3:] / largest
     intensity, couple = float(np.linalg.norm(direction)), float(np.linalg.norm(moment))
     if intensity <= _INFINITE_PITCH * couple:
@@ -128,7 +128,7 @@ def axis_from_screw(screw: ArrayLike) -> Screw:
 
 
 def line_through(first: ArrayLike, second: ArrayLike) -> FloatArray:
-    """Unit line from one point to another (equation 1, normalised).
+    """Return the unit line from one point to another (equation 1, normalised).
 
     Args:
         first: (3,) point, length.
@@ -145,14 +145,17 @@ def line_through(first: ArrayLike, second: ArrayLike) -> FloatArray:
 
 
 def reciprocal_product(wrenches: ArrayLike, twist: ArrayLike) -> FloatArray:
-    """Work rate ``m . omega + f . v`` of each wrench in a twist (equations 5 and 14).
+    """Return the work rate ``m . omega + f . v`` of each wrench in a twist (equations 5 and 14).
 
     Args:
-        wrenches: (6,) or (m, 6), force then moment.
-        twist: (6,), angular velocity then velocity.
+        wrenches: (6,) or (m, 6), force, then moment about the world origin.
+        twist: (6,) angular velocity, then velocity of the body's point at the world origin.
 
     Returns:
         () or (m,) array, force * length / time.
+
+    Raises:
+        ValueError: the twist has not six numbers.
     """
     rows = np.asarray(wrenches, dtype=np.float64)
     omega, v = np.split(frozen_array(twist, (6,)), 2)
@@ -160,15 +163,18 @@ def reciprocal_product(wrenches: ArrayLike, twist: ArrayLike) -> FloatArray:
 
 
 def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -> FloatArray:
-    """The screw after the body that carries it was turned by ``rotation`` and then moved by ``translation``.
+    """Return a screw after its body is rotated by ``rotation`` and then translated by ``translation``.
 
     Args:
-        screw: (6,) twist or wrench.
-        rotation: (3, 3) rotation matrix.
-        translation: (3,) length.
+        screw: (6,) twist or wrench ``(s, s_o)``.
+        rotation: (3, 3) rotation matrix ``R``.
+        translation: (3,) ``t``, length.
 
     Returns:
         (6,) read-only array, ``(R s, R s_o + t x R s)``.
+
+    Raises:
+        ValueError: a shape is wrong.
     """
     coordinates, matrix = frozen_array(screw, (6,)), frozen_array(rotation, (3, 3))
     direction = matrix @ coordinates[:3]
@@ -176,22 +182,59 @@ def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -
     return frozen_array(np.concatenate([direction, moment]), (6,))
 
 
-def displacement(twist: ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
-    """The finite motion of a body that moves with a constant twist for a time ``t``: ``exp(t [twist])``.
+class Displacement(NamedTuple):
+    """A displacement of a body in the world frame: a point ``x`` goes to ``Q x + t``.
 
-    It is the screw motion about the twist's axis; the twist itself is not changed by it.
+    Attributes:
+        rotation: (3, 3) ``Q``.
+        translation: (3,) ``t``, length.
+    """
+
+    rotation: FloatArray
+    translation: FloatArray
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether every point stays in its place."""
+        return bool(np.array_equal(self.rotation, np.eye(3)) and not self.translation.any())
+
+    @classmethod
+    def by(cls, rotation: ArrayLike, translation: ArrayLike) -> Displacement:
+        """Return the displacement with read-only copies of a rotation matrix (3, 3) and a translation (3,).
+
+        Raises:
+            ValueError: a shape is wrong.
+        """
+        return cls(frozen_array(rotation, (3, 3)), frozen_array(translation, (3,)))
+
+
+def screw_displacement(screw: Screw, amount: float) -> Displacement:
+    """Return the finite screw motion about an axis.
+
+    Args:
+        screw: its axis, point and pitch count, and not its intensity.
+        amount: angle about the axis, radians; for an infinite pitch the way along it, length.
+    """
+    s = screw.axis
+    if math.isinf(screw.pitch):
+        return Displacement.by(np.eye(3), amount * s)
+    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
+    # Rodrigues' formula.
+    Q = np.eye(3) + math.sin(amount) * cross + (1 - math.cos(amount)) * (cross @ cross)
+    return Displacement.by(Q, screw.point - Q @ screw.point + screw.pitch * amount * s)
+
+
+def displacement(twist: ArrayLike, t: float) -> Displacement:
+    """Return the finite motion ``exp(t [twist])`` of a body that moves with a constant twist for a time ``t``.
+
+    The motion is the screw motion about the twist's axis, which does not change the twist itself.
 
     Args:
         twist: (6,) angular velocity, then velocity of the body's point at the world origin.
         t: time.
 
-    Returns:
-        (3, 3) rotation and (3,) translation: a point ``x`` goes to ``R x + d``.
+    Raises:
+        ValueError: the twist is zero or not finite.
     """
     screw = axis_from_screw(twist)
-    if math.isinf(screw.pitch):
-        return frozen_array(np.eye(3), (3, 3)), frozen_array(screw.axis * screw.intensity * t, (3,))
-    angle, s = screw.intensity * t, screw.axis
-    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
-    R = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    return frozen_array(R, (3, 3)), frozen_array(screw.point - R @ screw.point + screw.pitch * angle * s, (3,))
+    return screw_displacement(screw, screw.intensity * t)

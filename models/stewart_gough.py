@@ -6,8 +6,8 @@ a pair, seen from the centre, on the base and on the platform. Pair ``k = 1, 2, 
 
 The paper draws the platform pairs above the base pairs (``aligned``): leg ``k+`` joins base joint ``k+`` at azimuth
 ``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` likewise with minus signs. In the
-``octahedral`` layout, usual in machines, the platform pairs are turned by 60 degrees and each leg goes to the nearer
-neighbour: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
+``octahedral`` layout, usual in machines, the platform pairs are rotated by 60 degrees and each leg goes to the nearer
+pair: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
 """
 
 from __future__ import annotations
@@ -30,10 +30,13 @@ _HEXAGON = math.radians(30)
 
 
 def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Model:
-    """6-6 Stewart-Gough platform with joints on two circles (Fig. 3).
+    """Return the 6-6 Stewart-Gough platform with joints on two circles (Fig. 3).
 
     Args:
         layout: ``aligned`` as in the paper, or ``octahedral``.
+
+    Raises:
+        ModelError: there is no such layout.
     """
     if layout not in ("aligned", "octahedral"):
         raise ModelError(f"model 'stewart-gough': layout must be 'aligned' or 'octahedral', got {layout!r}")
@@ -41,13 +44,13 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
     pose = PoseSymbols()
     legs = []
     for k in range(3):
-        # Counter-clockwise around the base, so that the drawn outline does not cross itself.
+        # Counter-clockwise around the base, so that the outline in the drawing does not cross itself.
         for sign, mark in ((-1, "-"), (1, "+")):
             centre = k * _THIRD
             platform = centre + sign * (x4 if layout == "aligned" else _SIXTH - x4)
-            legs.append(Leg(f"{k + 1}{mark}", _on_circle(x1, centre + sign * x3), _on_circle(x2, platform)))
+            legs.append(Leg(f"{k + 1}{mark}", _point_on_circle(x1, centre + sign * x3), _point_on_circle(x2, platform)))
     parts = legged_platform(legs, pose)
-    # Azimuths of a base pair and of a platform pair, where the drawing shows the half angles.
+    # Azimuths of a base pair and of a platform pair at which the drawing shows the half angles.
     centres = (0.0, 0.0 if layout == "aligned" else _SIXTH)
     plates = (
         (Body.BASE, SX.eye(3), SX.zeros(3), x1, x3, centres[0], ("x1", "x3")),
@@ -69,7 +72,7 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
         quantities=parts.quantities,
         scene=replace(
             parts.scene,
-            circles=tuple(Circle(p, p + R @ _on_circle(r, 0), R[:, 2], body) for body, R, p, r, *_ in plates),
+            circles=tuple(Circle(p, p + R @ _point_on_circle(r, 0), R[:, 2], body) for body, R, p, r, *_ in plates),
             marks=tuple(mark for plate in plates for mark in _marks(*plate)),
         ),
         legs=parts.legs,
@@ -77,17 +80,28 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
     )
 
 
-def _on_circle(radius: SX, azimuth: SX | float) -> SX:
+def _point_on_circle(radius: SX, azimuth: SX | float) -> SX:
+    """Return a point (3, 1) of a circle about the origin, in the plane z = 0, at an azimuth in radians."""
     return ca.vertcat(radius * ca.cos(azimuth), radius * ca.sin(azimuth), 0)
 
 
 def _marks(
     body: Body, R: SX, p: SX, radius: SX, half_angle: SX, centre: float, names: tuple[str, str]
 ) -> tuple[Mark, ...]:
-    """Radius and half angle of a plate, the one at its second pair and the other at its first."""
+    """Return the marks of a plate's radius, at its third pair, and of its half angle, at its first pair.
+
+    Args:
+        body: the plate.
+        R: (3, 3) orientation of the plate in the world frame.
+        p: (3, 1) centre of the plate in the world frame, length.
+        radius: (1, 1) of the joints' circle, length.
+        half_angle: (1, 1) half of the angle between the joints of a pair, radians.
+        centre: azimuth of the first pair, radians.
+        names: names of the parameters for radius and half angle.
+    """
 
     def at(azimuth: SX | float) -> SX:
-        return p + R @ _on_circle(radius, azimuth)
+        return p + R @ _point_on_circle(radius, azimuth)
 
     length = Mark(names[0], MarkKind.LENGTH, (p, at(centre - _THIRD)), body)
     return length, Mark(names[1], MarkKind.ANGLE, (p, at(centre), at(centre + half_angle)), body)

@@ -2,8 +2,8 @@
 
 Letters, for limb ``i``: ``s_i`` the direction of the limb from its base joint to its platform joint; ``u1_i``, ``u2_i``
 unit vectors along the two axes of its upper universal joint, orthogonal to each other, in platform coordinates; ``u_i``
-their common normal. A limb drives the platform by a force along ``s_i`` and keeps it from turning about ``u_i``
-(equations 16 to 18), so the Jacobian has three rows of force and three of couple.
+their common normal. A limb applies a force along ``s_i`` and a couple about ``u_i``, which resists rotation about
+``u_i`` (equations 16 to 18), so the Jacobian has three rows of force and three of couple.
 
 The joints lie on two circles at azimuths 0, 120 and 240 degrees. Two known machines fix the first axis on the platform:
 radially (``snu``, the robot of Seoul National University that Park showed in 2001) and tangentially (``tsai``, Tsai's
@@ -30,12 +30,16 @@ _THIRD = 2 * math.pi / 3
 
 
 def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model:
-    """3-UPU robot with the axes of its upper universal joints (Section 4.4).
+    """Return the 3-UPU robot (Section 4.4).
 
     Args:
-        axes: ``free`` makes the axes parameters ``u1_i`` and ``u2_i``, orthogonal within a limb. ``limb`` makes the
-            first axes parameters and takes the second perpendicular to the first and to the limb. ``snu`` and ``tsai``
-            fix the first axes radially or tangentially, with the second as in ``limb``.
+        axes: axes of the upper universal joints. ``free`` makes the axes parameters ``u1_i`` and ``u2_i``, orthogonal
+            within a limb. ``limb`` makes the first axes parameters and takes the second perpendicular to the first and
+            to the limb. ``snu`` and ``tsai`` fix the first axes radially or tangentially, with the second as in
+            ``limb``.
+
+    Raises:
+        ModelError: there is no such choice of axes.
     """
     if axes not in ("free", "limb", "snu", "tsai"):
         raise ModelError(f"model 'three-upu': axes must be 'free', 'limb', 'snu' or 'tsai', got {axes!r}")
@@ -47,14 +51,18 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
     ]
     legs = [Leg(str(k + 1), base_radius * _radial(k), platform_radius * _radial(k)) for k in range(3)]
     parts = legged_platform(legs, pose)
-    couples, built, closure, axes_drawn = [], [], [], []
+    couples, built, closure, directions = [], [], [], []
     for k, (row, row_built) in enumerate(zip(parts.wrenches, parts.built, strict=True)):
         first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
         if first is None:
-            parameters.append(_axis(f"u1_{row.limb}", f"first axis of limb {row.limb}'s upper joint", _radial(k)))
+            parameters.append(
+                _direction_parameter(f"u1_{row.limb}", f"first axis of limb {row.limb}'s upper joint", _radial(k))
+            )
             first = parameters[-1].symbol
         if axes == "free":
-            parameters.append(_axis(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k)))
+            parameters.append(
+                _direction_parameter(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k))
+            )
             second = parameters[-1].symbol
             u1, u2 = pose.rotation @ first, pose.rotation @ second
             closure.append(Closure(f"u1_{row.limb} . u2_{row.limb}", ca.dot(first, second)))
@@ -63,7 +71,7 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
             u1, u2 = pose.rotation @ first, ca.cross(pose.rotation @ first, row.force)
             normals = [_normal(u1, each.force) for each in (row, row_built)]
         joint = pose.position + pose.rotation @ legs[k].platform
-        axes_drawn += [
+        directions += [
             Direction(f"{name}_{row.limb}", joint, u, Body.PLATFORM, row.limb) for name, u in (("u1", u1), ("u2", u2))
         ]
         couples.append(couple_about(row.limb, normals[0]))
@@ -77,7 +85,7 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         home=(0.0, 0.0, 50.0),
         wrenches=(*parts.wrenches, *couples),
         quantities=parts.quantities,
-        scene=replace(_with_circles(parts.scene, legs, pose), directions=tuple(axes_drawn)),
+        scene=replace(_add_circles(parts.scene, legs, pose), directions=tuple(directions)),
         legs=parts.legs,
         built=(*parts.built, *built),
         closure=tuple(closure),
@@ -85,12 +93,12 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
 
 
 def _normal(u1: SX, s: SX) -> SX:
-    """Common normal of u1 and u2 = u1 x s: the part of s that is perpendicular to u1."""
+    """Return the common normal (3, 1) of u1 and ``u1 x s``: ``|u1|^2`` times the part of s perpendicular to u1."""
     return s * ca.sumsqr(u1) - u1 * ca.dot(u1, s)
 
 
-def _with_circles(scene: Scene, legs: Sequence[Leg], pose: PoseSymbols) -> Scene:
-    """The drawing with both joint circles, and with their radii marked at the first limb."""
+def _add_circles(scene: Scene, legs: Sequence[Leg], pose: PoseSymbols) -> Scene:
+    """Return the drawing with both joint circles added, and with marks of their radii at the first limb."""
     R, p = pose.rotation, pose.position
     base = Circle(SX.zeros(3), legs[0].base, SX([0, 0, 1]), Body.BASE)
     platform = Circle(p, p + R @ legs[0].platform, R[:, 2], Body.PLATFORM)
@@ -100,13 +108,16 @@ def _with_circles(scene: Scene, legs: Sequence[Leg], pose: PoseSymbols) -> Scene
 
 
 def _radial(k: int) -> SX:
+    """Return the radial unit vector (3, 1) at the azimuth of limb k."""
     return SX([math.cos(k * _THIRD), math.sin(k * _THIRD), 0.0])
 
 
 def _tangential(k: int) -> SX:
+    """Return the tangential unit vector (3, 1) at the azimuth of limb k."""
     return SX([-math.sin(k * _THIRD), math.cos(k * _THIRD), 0.0])
 
 
-def _axis(name: str, description: str, typical: SX) -> Parameter:
+def _direction_parameter(name: str, description: str, typical: SX) -> Parameter:
+    """Return a parameter that is a unit vector."""
     x, y, z = (float(typical[i]) for i in range(3))
     return Parameter(name, SX.sym(name, 3), Dimension.NUMBER, description, (x, y, z), -1.0, 1.0, is_direction=True)

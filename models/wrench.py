@@ -10,7 +10,7 @@ from casadi import SX
 
 
 class WrenchKind(enum.Enum):
-    """What a limb applies to the platform along one row of the Jacobian."""
+    """Kind of wrench that a row of the Jacobian stands for."""
 
     FORCE = "force"
     COUPLE = "couple"
@@ -18,16 +18,16 @@ class WrenchKind(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """One row of the Jacobian: the wrench that a limb applies to the platform, before it is made a unit wrench.
+    """One row of the Jacobian before normalisation: the wrench that a limb applies to the platform.
 
-    The unit wrench is ``(force, moment) / sqrt(square)``. Rows are kept in this form because
+    The unit wrench is ``(force, moment) / sqrt(square)``. Rows have this form because
     ``(m . omega + f . v)^2 / square`` is smoother and has a tighter interval enclosure than the product of unit
     vectors.
 
     Attributes:
         limb: name of the limb that applies it.
         kind: a force along a line, or a constraint couple.
-        force: (3, 1) in world coordinates; zero for a couple.
+        force: (3, 1) in world coordinates, of any length but zero; zero for a couple.
         moment: (3, 1) about the world origin; the direction of the couple for a couple.
         square: (1, 1) squared length of ``force``, or of ``moment`` for a couple.
     """
@@ -39,23 +39,26 @@ class Wrench:
     square: SX
 
     def rate(self, twist: SX) -> SX:
-        """Reciprocal product ``m . omega + f . v`` with a (6, 1) twist, not yet divided by ``sqrt(square)``."""
+        """Return the reciprocal product ``m . omega + f . v``, (1, 1), with a twist (6, 1).
+
+        The product is not divided by ``sqrt(square)``.
+        """
         return ca.dot(self.moment, twist[:3]) + ca.dot(self.force, twist[3:])
 
 
 def force_along(limb: str, point: SX, direction: SX) -> Wrench:
-    """Row of a limb that pushes the platform along a line.
+    """Return the row of a limb that applies a force along a line.
 
     Args:
         limb: name of the limb.
         point: (3, 1) any point of the line in the world frame, length.
-        direction: (3, 1) along the line towards the platform, of any length but zero.
+        direction: (3, 1) along the line towards the platform in the world frame, of any length but zero.
     """
     return Wrench(limb, WrenchKind.FORCE, direction, ca.cross(point, direction), ca.sumsqr(direction))
 
 
 def couple_about(limb: str, direction: SX) -> Wrench:
-    """Row of a limb that keeps the platform from turning about a direction.
+    """Return the row of a limb that applies a couple, which resists rotation about a direction.
 
     Args:
         limb: name of the limb.

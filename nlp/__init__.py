@@ -5,9 +5,7 @@ first used, so that the command line starts at once. The stub is read here line 
 ``lazy_loader.attach_stub`` does, takes longer than importing the rest of this package.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 
 with open(f"{__file__.removesuffix('.py')}.pyi", encoding="utf-8") as _stub:
     _lines = [line.split() for line in _stub if line.startswith("from .")]
@@ -19,21 +17,10 @@ def __getattr__(name: str) -> object:
     if name not in _modules:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(_modules[name], __name__), name)
-    # Found without this function from now on, and instead of a room of the same name.
+    # The next look-up finds the name without this function.
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
     return list(__all__)
-
-
-class _Package(ModuleType):
-    """The package, in which a public name such as ``solve`` stands before the room of the same name."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _modules and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -1,14 +1,14 @@
-"""What can go wrong.
+"""Errors of the package.
 
 The tree::
 
     ScrewsynthError
-    ├── InputError          what the user gave is wrong; the command line exits with status 2
-    │   └── CaseError       ... in a case: carries the file, the dotted key, the value and what is allowed
+    ├── InputError          wrong input by the user; the command line exits with status 2
+    │   └── CaseError       wrong input in a case, with the file, the dotted key, the value and the allowed values
     ├── EvaluationError     the robot does not exist at a point: a limb of zero length, a joint out of reach
-    └── UncoveredError      a proof would need bounds of an operation that there is no rule for
+    └── UncoveredError      a proof needs bounds of an operation that has no rule
 
-A search that fails is no exception: its outcome is the status of the solution.
+A search that fails raises no exception: its outcome is the status of the solution.
 """
 
 from __future__ import annotations
@@ -18,35 +18,39 @@ from collections.abc import Iterable
 
 
 class ScrewsynthError(Exception):
-    """Base class of the errors that this package raises on purpose. The message is one sentence, on one line."""
+    """Base class of the errors that this package raises on purpose, with a message of one sentence on one line."""
 
     def __str__(self) -> str:
         return one_line(super().__str__())
 
 
 class InputError(ScrewsynthError):
-    """What the user gave is wrong."""
+    """Error in the user's input."""
 
 
 class EvaluationError(ScrewsynthError):
-    """The robot's equations give no finite number at a point."""
+    """Error of a point at which the robot's equations have no finite value."""
 
 
 class UncoveredError(ScrewsynthError):
-    """The expression graph holds something that a proof has no rule for; it is named."""
+    """Error of an expression graph with an operation that has no rule in a proof.
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"no bound can be proved: the robot's expressions hold {what}, which has no rule")
+    Args:
+        operation: the operation, in words for people.
+    """
+
+    def __init__(self, operation: str) -> None:
+        super().__init__(f"no bound can be proved: the robot's expressions hold {operation}, which has no rule")
 
 
 class CaseError(InputError):
-    """A case says something that is not allowed.
+    """Error in a case.
 
     Attributes:
         key: dotted key of the fault, in the words of a case file.
-        fault: what is wrong with it, and what is allowed.
-        value: the value as the user wrote it, where it helps.
-        source: name of the file, once known.
+        fault: the fault, and the allowed values.
+        value: the value as the user wrote it; None where the message does not show it.
+        source: name of the file; None where it is not known.
     """
 
     def __init__(self, key: str, fault: str, value: object = None, source: str | None = None) -> None:
@@ -55,30 +59,31 @@ class CaseError(InputError):
 
     def __str__(self) -> str:
         where = f"{self.source}: " if self.source else ""
-        return one_line(f"{where}{self.key}{'' if self.value is None else f' = {_shown(self.value)}'}: {self.fault}")
+        return one_line(f"{where}{self.key}{'' if self.value is None else f' = {_text_of(self.value)}'}: {self.fault}")
 
     def within(self, source: str) -> CaseError:
-        """The same fault, found in a named file."""
+        """Return the same error with the name of the file in which it is."""
         return CaseError(self.key, self.fault, self.value, source)
 
 
 def one_line(text: str) -> str:
-    """The text with line breaks and other control characters written as escapes."""
+    """Return a text with line breaks and other control characters as escape sequences."""
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
 
 
 def listing(names: Iterable[str]) -> str:
-    """Names for a sentence, in the order given."""
+    """Return names as a list for a sentence, in the order given; ``none`` where there is none."""
     return ", ".join(names) or "none"
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:
-    """A hint at the allowed name that a misspelt one probably means, then all that is allowed."""
+    """Return a hint for a name that is not allowed: the most similar allowed name, if any, then all allowed names."""
     names = list(allowed)
     close = difflib.get_close_matches(name, names, n=1)
     return f"{f'did you mean {close[0]!r}? ' if close else ''}allowed: {listing(names)}"
 
 
-def _shown(value: object) -> str:
+def _text_of(value: object) -> str:
+    """Return a value as a case file writes it, at most 60 characters long."""
     text = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value}"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,4 +1,4 @@
-"""Units of a case: labels for lengths, and degrees or radians for people; inside, angles are always radians."""
+"""Units of a case: a label for lengths, and degrees or radians for people. Computations are in radians."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Literal
 
 from ..models import Dimension
 
-#: A twist whose size is within this of 1 is a unit screw: its motion is measured by its angle, or by its way.
+#: Largest distance from 1 of the size of a unit screw, whose motion is measured by its angle, or by its translation.
 _UNIT = 1e-9
 
 
 @dataclass(frozen=True)
 class Units:
-    """The units a case is written in.
+    """The units of a case.
 
     Attributes:
-        length: label of the length unit; numbers are never converted, it is carried to every output.
+        length: label of the length unit for every output; lengths are never converted.
         angle: ``"deg"`` or ``"rad"``, the unit of angles in files, tables and messages.
     """
 
@@ -26,22 +26,22 @@ class Units:
     angle: Literal["deg", "rad"] = "deg"
 
     def to_internal(self, value: float, dimension: Dimension) -> float:
-        """A number in the case's unit, as it is used in computations."""
+        """Return a number in the case's unit as computations use it, in radians for an angle."""
         return math.radians(value) if self._is_degrees(dimension) else float(value)
 
     def shown(self, value: float, dimension: Dimension) -> float:
-        """A number from a computation, in the case's unit.
+        """Return a number from a computation in the case's unit.
 
-        Degrees are rounded to 15 significant digits, so that 30 comes back as 30 and not as 29.999999999999996.
+        Degrees are rounded to 15 significant digits, so that 30 stays 30 and does not become 29.999999999999996.
         """
         return float(f"{math.degrees(value):.15g}") if self._is_degrees(dimension) else float(value)
 
     def label(self, dimension: Dimension) -> str:
-        """Label of the unit; empty for a plain number."""
+        """Return the label of the unit; an empty one for a plain number."""
         return {Dimension.LENGTH: self.length, Dimension.ANGLE: self.angle, Dimension.NUMBER: ""}[dimension]
 
     def text(self, value: float, dimension: Dimension) -> str:
-        """A number with its unit, for messages."""
+        """Return a number from a computation with its unit, for messages."""
         return f"{self.shown(value, dimension):.10g} {self.label(dimension)}".strip()
 
     def _is_degrees(self, dimension: Dimension) -> bool:
@@ -49,7 +49,12 @@ class Units:
 
 
 def rate_unit(twist: Iterable[float], units: Units) -> str:
-    """Unit of a limb's rate in a twist (6,): length per radian of a unit screw, or else per unit of time."""
+    """Return the unit of a limb's rate: length per radian or length of a unit screw, or else per unit of time.
+
+    Args:
+        twist: (6,) angular velocity, then velocity at the world origin.
+        units: units of the case.
+    """
     parts = [float(part) for part in twist]
     omega, v = math.hypot(*parts[:3]), math.hypot(*parts[3:])
     if abs(omega - 1) <= _UNIT:

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...models import Dimension, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
+from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ..errors import CaseError, nearest
 from ..units import Units
-from .limits.grammar import SentenceError, parse
-from .limits.limitcheck import checked_limits
+from .limits.limit import LimitedCase
 from .limits.limits import Limits
-from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Step, Value
+from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
 from .task import Method, Sense, Task
 
@@ -43,7 +42,7 @@ class Case:
         characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
             constraint couples.
         limits: what a design must keep to be built.
-        steps: displacements of the pose above, one for each pose that the robot takes.
+        displacements: of the pose above, one for each pose that the robot takes.
         further: other poses, with their displacements. The robot's dimensions are the same at all of them.
         over_poses: what F is over several poses.
         joint_centre_tolerance: how far off a joint centre may be built, length; None leaves it out.
@@ -67,7 +66,7 @@ class Case:
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
     limits: Limits = field(default_factory=Limits)
-    steps: tuple[Step, ...] = (HERE,)
+    displacements: tuple[Displacement, ...] = (HERE,)
     further: Sequence[Pose] = ()
     over_poses: OverPoses = OverPoses.SUM
     joint_centre_tolerance: float | None = None
@@ -86,7 +85,8 @@ class Case:
         settle(self, "rotation", _rotation(self, self.rotation, "pose"))
         settle(self, "further", _further(self))
         settle(self, "tasks", _tasks(self))
-        _check_buildable(self)
+        self.limits.check(self.as_limited)
+        _check_tolerance(self)
         if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
@@ -118,12 +118,12 @@ class Case:
     @property
     def poses(self) -> tuple[Pose, ...]:
         """The poses as they are stated, each with its displacements."""
-        return (Pose(self.position, self.rotation, self.steps), *self.further)
+        return (Pose(self.position, self.rotation, self.displacements), *self.further)
 
     @property
     def pose_count(self) -> int:
         """How many poses the robot takes."""
-        return sum(len(pose.steps) for pose in self.poses)
+        return sum(len(pose.displacements) for pose in self.poses)
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
@@ -143,6 +143,11 @@ class Case:
             if pose.rotation.axis is not None:
                 names[f"{prefix}angle"] = Dimension.ANGLE
         return names
+
+    @property
+    def as_limited(self) -> LimitedCase:
+        """The case as far as its limits read it."""
+        return LimitedCase(self.model, self.units, self.scalars)
 
 
 def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
@@ -192,26 +197,19 @@ def _position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, 
 def _further(case: Case) -> tuple[Pose, ...]:
     keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
     settled = [
-        Pose(_position(case, pose.position, key), _rotation(case, pose.rotation, key), tuple(pose.steps))
+        Pose(_position(case, pose.position, key), _rotation(case, pose.rotation, key), tuple(pose.displacements))
         for pose, key in zip(case.further, keys, strict=True)
     ]
-    steps = [case.steps, *(pose.steps for pose in settled)]
-    for key, own in zip(["pose", *keys], steps, strict=True):
+    displacements = [case.displacements, *(pose.displacements for pose in settled)]
+    for key, own in zip(["pose", *keys], displacements, strict=True):
         if not own:
             raise CaseError(key, "must have at least one pose")
-    if sum(map(len, steps)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
+    if sum(map(len, displacements)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
         raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
     return tuple(settled)
 
 
-def _check_buildable(case: Case) -> None:
-    """Check the limits against the robot, and that each sentence among them can be understood."""
-    checked_limits(case.limits, case.model, case.units)
-    for index, text in enumerate(case.limits.custom):
-        try:
-            parse(text, case.scalars)
-        except SentenceError as error:
-            raise CaseError(f"limits.custom[{index}]", str(error), text) from None
+def _check_tolerance(case: Case) -> None:
     tolerance = case.joint_centre_tolerance
     if tolerance is not None and not (0 < tolerance <= LARGEST):
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)

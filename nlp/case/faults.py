@@ -65,8 +65,6 @@ def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
     match fault["type"]:
         case "unknown_key" | "reason":
             sentence = str(context["fault"])
-        case "literal_error" if key == "<word>":
-            sentence = f"must be {context['expected']}, a list of 3 numbers, or a list of such lists"
         case "literal_error":
             sentence = f"must be one of {context['expected']}"
         case "list_type" if key in _FORMS:

@@ -18,7 +18,8 @@ from ..errors import CaseError, InputError, nearest
 from ..units import Units
 from . import schema as document
 from .case import Case
-from .limits import buildcase
+from .displacements import displacements
+from .limits.limits import Limits
 from .overrides import _set
 from .pose import LARGEST, Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
@@ -120,7 +121,7 @@ def _case(written: document.Document, name: str, source: str) -> Case:
     search = written.solve
     poses = written.pose if isinstance(written.pose, list) else [written.pose]
     tasks = _tasks(written.task)
-    steps = [buildcase.steps(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
+    steps = [displacements(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
     method, over_poses = _combination(written, sum(map(len, steps)))
     first, *further = [
         Pose([_value(part, units, Dimension.LENGTH) for part in pose.position], _rotation(pose.rotation, units), moves)
@@ -134,10 +135,10 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         },
         position=first.position,
         rotation=first.rotation,
-        steps=first.steps,
+        displacements=first.displacements,
         further=further,
         over_poses=over_poses,
-        limits=buildcase.limits(written.limits, model, units),
+        limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         tasks=tasks,
         units=units,

@@ -21,7 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from .faults import _case_error
-from .limits.buildtables import AlongTable, GridTable, LimitsTable, ToleranceTable
+from .limits.limits import LimitsTable
 from .table import Table, Vector
 
 
@@ -93,6 +93,31 @@ class RotationTable(Table):
     angle: Value = Field(description="angle, fixed or free")
 
 
+class AlongTable(Table):
+    """Poses along the finite screw motion of a task, evenly spaced."""
+
+    task: str | None = Field(default=None, description="name of the task; needed where there are several")
+    first: FiniteFloat = Field(description="where it begins: an angle, or a length for a translation")
+    last: FiniteFloat = Field(description="where it ends")
+    count: int = Field(ge=2, le=50, description="number of poses")
+
+
+class OffsetsTable(Table):
+    """Offsets of the platform's position along one axis, evenly spaced."""
+
+    min: FiniteFloat = Field(description="first offset")
+    max: FiniteFloat = Field(description="last offset")
+    count: int = Field(ge=2, le=20, description="number of offsets")
+
+
+class GridTable(Table):
+    """Poses over a box about the stated one: every combination of offsets along the world's axes."""
+
+    x: OffsetsTable | None = Field(default=None, description="offsets along x; none if left out")
+    y: OffsetsTable | None = Field(default=None, description="offsets along y")
+    z: OffsetsTable | None = Field(default=None, description="offsets along z")
+
+
 class PoseTable(Table):
     """Pose of the platform in the world frame."""
 
@@ -136,6 +161,12 @@ class CombineTable(Table):
     over_poses: Literal["sum", "mean", "worst"] | None = Field(
         default=None, description="what F is over several poses; the sum if left out"
     )
+
+
+class ToleranceTable(Table):
+    """Manufacturing tolerances."""
+
+    joint_centre: FiniteFloat = Field(description="how far off each joint centre may be built, in any direction")
 
 
 class SolveTable(Table):

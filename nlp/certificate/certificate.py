@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from ...models import FloatArray
 from ..case.task import Sense
@@ -94,23 +93,3 @@ class Certificate:
         if self.status is CertificateStatus.PROVED:
             return f"proved: {what}, {SCOPE}"
         return f"incomplete ({self.reason}), but proved: {what}, {SCOPE}"
-
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON; a number that does not exist is None."""
-        return {
-            "status": self.status.value,
-            "bound": _finite(self.bound),
-            "incumbent": _finite(self.incumbent),
-            "gap": _finite(self.gap),
-            "relative_gap": self.relative_gap,
-            "engine": self.engine,
-            "boxes": self.boxes,
-            "open": self.open,
-            "seconds": self.seconds,
-            "statement": self.statement,
-            "history": [list(row) for row in self.history],
-        }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

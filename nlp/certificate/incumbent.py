@@ -8,7 +8,7 @@ import numpy as np
 
 from ...models import FloatArray
 from ..errors import InputError
-from ..evidence.kkt import FEASIBLE, assembled, correct, linearise
+from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..program.sampling import starting_points
 from .standardform import StandardForm
 
@@ -81,12 +81,12 @@ class Incumbent:
         value = self._form.level_of(point)
         if not math.isfinite(value):
             return
-        whole = assembled(nlp, self._whole(point, value))
+        whole = close_equations(nlp, self._whole(point, value))
         at = linearise(nlp, whole)
         if not math.isfinite(at.violation):
             return
         self._offer(whole[: self._form.n])
-        corrected = correct(nlp, whole, at.active())
+        corrected = correct_point(nlp, whole, at.active())
         self._offer(np.clip(corrected.x, nlp.lower, nlp.upper)[: self._form.n])
 
     def _whole(self, point: FloatArray, value: float) -> FloatArray:

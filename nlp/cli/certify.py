@@ -27,8 +27,8 @@ def certify(
     from ..case.reader import find_case, load_case
     from ..errors import InputError
     from ..output.files import read_text, write_text
-    from ..results.data import certified_of
-    from ..solve.certified import CertifyOptions, OptionError, proof_of
+    from ..results.certified import certified_of
+    from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 
     try:
@@ -49,7 +49,8 @@ def certify(
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):
-        from ..output.terminal import print_certified
+        from ..output.terminal import show
+        from ..results.summary import certified_summary
 
-        print_certified(console(), loaded, result)
+        show(console(), certified_summary(loaded, result))
     raise typer.Exit(0 if certified.is_proved else 1)

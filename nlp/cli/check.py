@@ -19,8 +19,9 @@ def check(
 ) -> None:
     """Hold cases to their expected and published values."""
     from ..errors import InputError
-    from ..output.checks import checks_as_data, checks_as_junit, checks_as_markdown
+    from ..output.checks import checks_as_junit, checks_as_markdown
     from ..output.files import write_text
+    from ..results.checks import checks_of
     from ..results.regression import check as check_cases
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
@@ -29,13 +30,14 @@ def check(
         check_target(target)
     checks = check_cases(cases)
     if json_file is not None:
-        write_json(json_file, checks_as_data(checks))
+        write_json(json_file, checks_of(checks))
     if junit is not None:
         write_text(junit, checks_as_junit(checks))
     if markdown:
         typer.echo(checks_as_markdown(checks), nl=False)
     elif "-" not in (json_file, junit):
-        from ..output.terminal import print_checks
+        from ..output.terminal import show
+        from ..results.checkwording import checks_summary
 
-        print_checks(console(), checks)
+        show(console(), checks_summary(checks))
     raise typer.Exit(0 if all(each.passed for each in checks) else 1)

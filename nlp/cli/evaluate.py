@@ -23,23 +23,24 @@ def evaluate(
     """
     from ..case.reader import load_case
     from ..evidence import state
-    from ..evidence.kkt import assembled
+    from ..evidence.kkt import close_equations
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
-    from ..results.data import evaluation_of
+    from ..results.evaluation import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
     check_target(json_file)
     nlps = formulate_each(loaded)
-    x = with_exact_level(nlps[0], assembled(nlps[0], nlps[0].start))
+    x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         write_json(json_file, result)
     if json_file != "-":
-        from ..output.terminal import print_state
+        from ..output.terminal import show
+        from ..results.summary import evaluation_summary
 
-        print_state(console(), loaded, result)
-    raise typer.Exit(1 if result["violated"] else 0)
+        show(console(), evaluation_summary(loaded, result))
+    raise typer.Exit(1 if result.violated else 0)
 
 
 def _setting(text: str) -> tuple[str, float | list[float]]:

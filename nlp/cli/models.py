@@ -17,13 +17,14 @@ def models(
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
-    from ..output.terminal import print_model, print_models
+    from ..output.terminal import show
+    from ..results.robotwording import model_words, models_table
 
     check_picture(plot)
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")
-        print_models(console(), [(each, _description(each)) for each in model_names()])
+        show(console(), [models_table((each, _description(each)) for each in model_names())])
         return
     options = model_options(name)
     needed = [option for option, _, default in options if default is None]
@@ -35,7 +36,7 @@ def models(
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
         draw(model, plot)
-    print_model(console(), name, model, options)
+    show(console(), model_words(name, model, options))
 
 
 def _description(model: str) -> str:

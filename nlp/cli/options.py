@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from ..results.jsondata import JsonObject
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -45,7 +47,7 @@ def check_picture(target: str | None) -> None:
         check_target(target)
 
 
-def write_json(target: str, result: dict[str, Any]) -> None:
+def write_json(target: str, result: JsonObject) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
@@ -54,8 +56,9 @@ def write_json(target: str, result: dict[str, Any]) -> None:
     import json
 
     from ..output.files import write_text
+    from ..results.jsondata import json_data
 
-    write_text(target, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
 
 
 def console() -> Console:

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..case.case import Case
-    from ..solve.certified import Certified
-    from ..solve.solution import Solution
+    from ..solver.certified import Certified
+    from ..solver.solution import Solution
 
 
 class Solved(NamedTuple):
@@ -29,7 +29,7 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
         CaseError: the case contradicts itself.
         InputError: the objective is to be compiled, and cannot be.
     """
-    from ..solve.solve import solve
+    from ..solver.solve import solve
 
     if certify:
         certified = certify_with_progress(case, jobs=jobs)
@@ -60,7 +60,7 @@ def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN
         InputError: an option is outside of its range, or has no meaning for the case.
         UncoveredError: the case's expressions hold an operation without a rule.
     """
-    from ..solve.certified import certify
+    from ..solver.certified import certify
 
     if not sys.stderr.isatty():
         return certify(case, **options)

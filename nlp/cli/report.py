@@ -21,19 +21,23 @@ def report(
     jobs: Jobs = None,
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
-    from ..case.reader import load_case
-    from ..output.files import write_text
+    from ..case.reader import find_case, load_case
+    from ..output.files import read_text, write_text
     from ..output.pictures.extras import check_library
     from .progress import solve_with_progress
 
     loaded = load_case(case)
+    text = read_text(str(find_case(case)))
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_target(out)
     check_library("plotly", "reports")
     from ..output.report.html import report as page_about
+    from ..results.regression import check_case
+    from ..results.result import result_of
 
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
-    write_text(out, page_about(found, case))
+    check = check_case(case, {case: result_of(found)}) if loaded.published else None
+    write_text(out, page_about(found, text=text, check=check))
     if out != "-":
         typer.echo(f"{out}: {solution.status.value}")
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

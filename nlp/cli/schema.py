@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 
-def schema() -> None:
+def schema(
+    result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
+) -> None:
     """Print the JSON Schema of case files, with which editors complete and check."""
     import json
 
-    from ..case.schema import Document
+    if result:
+        from ..results.schema import result_schema
 
-    typer.echo(json.dumps(Document.model_json_schema(), indent=2))
+        found: object = result_schema()
+    else:
+        from ..case.schema import Document
+
+        found = Document.model_json_schema()
+    typer.echo(json.dumps(found, indent=2))

@@ -26,7 +26,7 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
-    from ..results.data import result_of
+    from ..results.result import result_of
     from .progress import solve_with_progress
 
     loaded = load_case(case)
@@ -42,7 +42,8 @@ def solve(
 
         draw(solution, plot)
     if json_file != "-":
-        from ..output.terminal import print_compromise, print_solution
+        from ..output.terminal import show
+        from ..results.summary import case_summary
 
-        (print_solution if solution.combination is None else print_compromise)(console(), loaded, result)
+        show(console(), case_summary(loaded, result))
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

@@ -20,7 +20,7 @@ def verify_proof(
     from ..certificate.proof import ProofError, read_proof
     from ..certificate.proofcheck import check_proof
     from ..output.files import read_text
-    from ..solve.certified import program_of
+    from ..solver.certified import program_of
 
     given = read_proof(read_text(proof), proof)
     if case is not None:

@@ -24,7 +24,7 @@ from ..errors import CaseError, InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from ..solve.multistart import Status, solve_program
+from ..solver.multistart import Status, solve_program
 from .ctext import comment, identifier, integers, matrix, numbers, texts
 from .staged import Staged, stage
 

@@ -7,7 +7,7 @@ stationary when
 
     grad phi + sum_j mu_j a_j = 0,    mu_j >= 0 on inequalities,    mu_j = 0 where slack_j > 0.
 
-Nothing here knows of a solver: all of it comes from the program and the point.
+The module uses no solver: every number comes from the program and the point.
 """
 
 from __future__ import annotations
@@ -21,45 +21,44 @@ from ...models import FloatArray
 from ..program.nlp import Nlp, Side
 from .linalg import nonnegative_least_squares
 
-#: A side closer than this, in scaled variables, is active: well above the rounding error of a corrected point, well
-#: below any clearance that means something in a design.
+#: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
+#: any distance that matters in a design.
 ACTIVE = 1e-7
-#: Largest scaled derivative of the Lagrangian that counts as none: F can then still improve by about this part of its
-#: size, at most, over the whole range of a variable along which it is straight.
+#: Largest scaled derivative of the Lagrangian at a stationary point: F can then still improve by at most about this
+#: part of its size over the whole range of a variable along which it is linear.
 STATIONARY = 1e-7
-#: Largest distance outside a limit, in half ranges, of a point that is feasible.
+#: Largest distance outside a side, in scaled variables, of a feasible point.
 FEASIBLE = 1e-9
-#: Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a change of the
-#: active set, or an optimum where F is flatter than a parabola, takes more.
+#: Largest number of Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a
+#: change of the active set, or an optimum where F is flatter than a parabola, takes more.
 _NEWTON_STEPS = 40
-#: A correction moves no variable by more than this part of half its range at once: it polishes, it does not search.
+#: Largest step of a correction in a scaled variable: a correction improves a point and does not search.
 _LONGEST_STEP = 0.1
 #: Singular values below this part of the largest are zero in the Newton system, which is singular at optima that are
-#: not isolated. Where second derivatives are nearly zero but not quite, the first cut gives too long a step and the
-#: next one is taken.
+#: not isolated. Where second derivatives are nearly zero, the first value gives too long a step, and the next value is
+#: tried.
 _NEWTON_RCOND = (1e-11, 1e-8, 1e-6)
-#: A residual of the stationarity conditions that is rounding error. Newton's method is quadratic: the step that gets
-#: below this mostly lands at 1e-16.
+#: Residual of the stationarity conditions that is rounding error. Newton's method converges quadratically: the step
+#: that reaches this value mostly reaches 1e-16.
 _ROUNDING = 1e-13
-#: Newton's method has settled on its active set when the residual is below this, and a multiplier is negative when it
-#: is below minus this.
-_SETTLED = 1e-10
+#: Residual below which Newton's method has converged on its active set; a multiplier below minus this is negative.
+_CONVERGED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The program at a point, to first order.
+    """A program linearised at a point, in scaled variables.
 
     Attributes:
         x: (n,) the point, unscaled.
-        F: objective as it stands.
-        phi: objective that is minimised, scaled.
-        gradient: (n,) of phi in scaled variables.
-        sides: every side of every bound and constraint.
-        slack: (k,) distance to each side; negative outside. For an equation, minus the size of the residual.
-        residual: (k,) signed residual ``expression - limit``, as the same distance.
+        F: objective, unscaled.
+        phi: scaled objective, which is minimised.
+        gradient: (n,) gradient of phi in scaled variables.
+        sides: the k sides of all bounds and constraints.
+        slack: (k,) distance to each side, negative outside; for an equation, minus the size of the residual.
+        residual: (k,) signed residual ``expression - limit``, positive outside, as the same distance.
         normals: (k, n) outward unit normals in scaled variables; for an equation, the gradient's direction.
-        per_unit: (k,) distance per unit by which a side's limit is moved.
+        per_unit: (k,) change of the slack per unit by which the limit of a side is relaxed.
     """
 
     x: FloatArray
@@ -74,23 +73,27 @@ class Linearisation:
 
     @property
     def violation(self) -> float:
-        """Largest distance outside a side; 0 when feasible, ``inf`` where the program is not defined."""
+        """Largest distance outside a side; 0 at a feasible point, ``inf`` where the program is not defined."""
         if not (np.isfinite(self.phi) and np.isfinite(self.slack).all()):
             return float("inf")
         return float(max(0.0, -self.slack.min(initial=0.0)))
 
     def active(self, tolerance: float = ACTIVE) -> tuple[int, ...]:
-        """Indices of the sides that the point lies on, or outside of."""
+        """Return the indices of the active set: the sides on which, or outside of which, the point lies.
+
+        Args:
+            tolerance: largest slack of an active side.
+        """
         return tuple(int(j) for j in np.flatnonzero(self.slack <= tolerance))
 
 
 def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
-    """The program at a point (n,), to first order."""
+    """Return the program linearised at a point (n,)."""
     F, gradient, g, jacobian = nlp.program.kernels.derivatives(x, nlp.arguments)
     table, scale = nlp.sides, nlp.scale
     rows = jacobian * scale
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    # Where a constraint has no gradient there is no distance to it; its own residual then stands for one.
+    # Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
     sizes = np.where(sizes > 1e-9, sizes, 1.0)
     per_unit = 1 / np.concatenate([scale, sizes])[table.place]
     residual = table.sign * (np.concatenate([x, g.ravel()])[table.place] - table.limit) * per_unit
@@ -111,15 +114,16 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
 
 
 def multipliers(at: Linearisation, active: Sequence[int]) -> tuple[FloatArray, float]:
-    """The multipliers that make a point as stationary as it can be, and what is left.
+    """Return the multipliers that make a point as nearly stationary as possible, and the residual of stationarity.
 
     Args:
-        at: the point.
-        active: indices of the sides that may carry a multiplier.
+        at: the program at the point.
+        active: indices of the sides whose multipliers may differ from zero.
 
     Returns:
         (k,) multipliers, not negative on inequalities and zero on inactive sides, and the largest component of
-        ``grad phi + sum mu a``: the distance of ``-grad phi`` from the cone of outward normals.
+        ``grad phi + sum mu a``, which is zero where ``-grad phi`` lies in the cone of the outward normals; ``inf``
+        where the gradient is not finite.
     """
     mu = np.zeros(len(at.sides))
     if not np.isfinite(at.gradient).all():
@@ -134,86 +138,114 @@ def multipliers(at: Linearisation, active: Sequence[int]) -> tuple[FloatArray, f
     return mu, float(np.max(np.abs(left), initial=0.0))
 
 
-def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArray:
-    """Hessian of ``phi + sum mu slack-side`` in scaled variables, (n, n)."""
+def constraint_weights(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArray:
+    """Return the weight of each constraint's expression, (c,), in the Lagrangian ``phi + sum mu residual``.
+
+    Args:
+        nlp: the program.
+        at: the program at the point.
+        mu: (k,) multipliers of the sides.
+    """
     table = nlp.sides
-    carried = np.bincount(table.place, table.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
-    weights = carried[nlp.n :].astype(np.float64)
+    weights = np.bincount(table.place, table.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
+    return np.asarray(weights[nlp.n :], dtype=np.float64)
+
+
+def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArray:
+    """Return the Hessian of the Lagrangian ``phi + sum mu residual`` in scaled variables, (n, n).
+
+    Args:
+        nlp: the program.
+        at: the program at the point.
+        mu: (k,) multipliers of the sides.
+    """
+    weights = constraint_weights(nlp, at, mu)
     full = nlp.program.kernels.hessian(at.x, nlp.arguments, nlp.sign / nlp.objective_scale, weights)
     return full * np.outer(nlp.scale, nlp.scale)
 
 
-def correct(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisation:
-    """Newton's method on the stationarity conditions with an active set, from a point close to a solution.
+def correct_point(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisation:
+    """Correct a point near a stationary one by Newton's method on the stationarity conditions with an active set.
 
-    A side that a step would cross joins the active set; one that ends up with a multiplier of the wrong sign leaves it.
-    The steps are least-norm, so a point on a manifold of optima stays where it is along it.
+    A side that a step would cross joins the active set; a side whose multiplier becomes negative leaves the active set.
+    The steps are least-norm, so that a point on a manifold of optima does not move along the manifold.
 
     Args:
         nlp: the program.
         x: (n,) point near a stationary one.
-        active: indices (into ``nlp.sides``) of the sides to hold at first.
+        active: indices (into ``nlp.sides``) of the first active set.
 
     Returns:
-        The corrected point, inside the variables' bounds; where Newton's method does not help, the best one met.
+        The program at the corrected point, inside the variables' bounds; where Newton's method does not converge, at
+        the iterate with the smallest residual since the last change of the active set.
     """
-    held = list(active)
-    at = linearise(nlp, _pinned(nlp, np.clip(x, nlp.lower, nlp.upper), held))
+    active_set = list(active)
+    at = linearise(nlp, _move_onto_bounds(nlp, np.clip(x, nlp.lower, nlp.upper), active_set))
     best, least = at, np.inf
     for _ in range(_NEWTON_STEPS):
-        mu, error = _residual(at, held)
+        mu, error = _residual(at, active_set)
         if error <= least:
             best, least = at, error
-        count = len(held)
-        following = None if error <= _ROUNDING else _newton_step(nlp, at, held, mu, error)
+        count = len(active_set)
+        following = None if error <= _ROUNDING else _newton_step(nlp, at, active_set, mu, error)
         if following is not None:
             at = following
-            least = least if len(held) == count else np.inf
+            least = least if len(active_set) == count else np.inf
             continue
         wrong = np.where(nlp.sides.equal, 0.0, mu)
-        if not error <= _SETTLED or wrong.min(initial=0.0) >= -_SETTLED:
+        if not error <= _CONVERGED or wrong.min(initial=0.0) >= -_CONVERGED:
             break
-        held.remove(int(np.argmin(wrong)))
+        active_set.remove(int(np.argmin(wrong)))
         least = np.inf
     return best
 
 
-def _residual(at: Linearisation, held: list[int]) -> tuple[FloatArray, float]:
-    """Least-squares multipliers (k,) of the held sides, and the largest error of the stationarity conditions.
+def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, float]:
+    """Return least-squares multipliers (k,) of an active set, and the residual of the KKT conditions.
 
-    A held side counts by its distance: it is to be lain on, and not only kept.
+    The residual is the largest of the derivatives of the Lagrangian, the distances from the sides of the active set,
+    inside as well as outside, and the violation.
     """
     mu = np.zeros(len(at.sides))
-    if held and np.isfinite(at.gradient).all():
-        A = at.normals[held]
-        # Bounds alone have orthonormal normals, and most active sets are bounds alone.
-        orthonormal = np.array_equal(A @ A.T, np.eye(len(held)))
-        mu[held] = -A @ at.gradient if orthonormal else np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
+    if active_set and np.isfinite(at.gradient).all():
+        A = at.normals[active_set]
+        # Normals of variables' bounds are orthonormal, and most active sets consist of such bounds alone.
+        orthonormal = np.array_equal(A @ A.T, np.eye(len(active_set)))
+        mu[active_set] = -A @ at.gradient if orthonormal else np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
     left = at.gradient + at.normals.T @ mu
-    off = float(np.max(np.abs(at.residual[held]), initial=0.0)) if held else 0.0
+    off = float(np.max(np.abs(at.residual[active_set]), initial=0.0)) if active_set else 0.0
     return mu, max(float(np.max(np.abs(left), initial=0.0)), off, at.violation)
 
 
-def _pinned(nlp: Nlp, x: FloatArray, held: Sequence[int]) -> FloatArray:
-    """The point with the variables whose bounds are held exactly on them."""
+def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> FloatArray:
+    """Return a point (n,) with the variables whose bounds are in the active set exactly on these bounds."""
     table, moved = nlp.sides, x.copy()
-    for j in held:
+    for j in active_set:
         variable = table.sides[j].variable
         if variable is not None:
             moved[variable] = table.limit[j]
     return moved
 
 
-def _newton_step(nlp: Nlp, at: Linearisation, held: list[int], mu: FloatArray, error: float) -> Linearisation | None:
-    """The point after one Newton step; None when no small step brings the residual down.
+def _newton_step(
+    nlp: Nlp, at: Linearisation, active_set: list[int], mu: FloatArray, error: float
+) -> Linearisation | None:
+    """Return the program after one Newton step; None when no short step reduces the residual.
 
-    Where the step would cross a side, it ends there and the side joins ``held``.
+    Where the step would cross a side, it ends there, and the side joins the active set.
+
+    Args:
+        nlp: the program.
+        at: the program before the step.
+        active_set: active set, to which the crossed side is added in place.
+        mu: (k,) multipliers.
+        error: residual before the step.
     """
-    n, k, A = nlp.n, len(held), at.normals[held]
+    n, k, A = nlp.n, len(active_set), at.normals[active_set]
     left = at.gradient + at.normals.T @ mu
     matrix = np.zeros((n + k, n + k))
     matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = lagrangian_hessian(nlp, at, mu), A.T, A
-    right = -np.concatenate([left, at.residual[held]])
+    right = -np.concatenate([left, at.residual[active_set]])
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
     for rcond in _NEWTON_RCOND:
@@ -221,24 +253,30 @@ def _newton_step(nlp: Nlp, at: Linearisation, held: list[int], mu: FloatArray, e
         if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
             continue
         towards = at.normals @ step
-        towards[held] = 0.0
+        towards[active_set] = 0.0
         reach = np.where(towards > 1e-12, np.maximum(at.slack, 0.0) / np.maximum(towards, 1e-12), np.inf)
         part = min(1.0, float(reach.min(initial=1.0)))
-        met = [int(np.argmin(reach))] if part < 1.0 else []
+        crossed = [int(np.argmin(reach))] if part < 1.0 else []
         moved = np.clip(at.x + part * nlp.scale * step, nlp.lower, nlp.upper)
-        after = linearise(nlp, _pinned(nlp, moved, [*held, *met]))
-        # Newton's error is about the square of its step: one that grows no further than that falls at the next step.
-        if met or _residual(after, held)[1] < max(error, 4 * float(step @ step)):
-            held += met
+        after = linearise(nlp, _move_onto_bounds(nlp, moved, [*active_set, *crossed]))
+        # Newton's error is about the square of its step: a residual that grows no further decreases at the next step.
+        if crossed or _residual(after, active_set)[1] < max(error, 4 * float(step @ step)):
+            active_set += crossed
             return after
     return None
 
 
-def assembled(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """The point (n,) nearest to the given one, to first order, at which the program's equations hold.
+def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """Return the point, nearest to the given one to first order, at which the program's equations hold.
 
-    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
-    it does not get there, what it reached.
+    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+
+    Returns:
+        (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
     """
     at = linearise(nlp, x)
     for _ in range(_NEWTON_STEPS):

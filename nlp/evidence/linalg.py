@@ -1,4 +1,4 @@
-"""Two pieces of linear algebra that NumPy lacks."""
+"""Linear algebra that NumPy lacks: non-negative least squares and reduced echelon form."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ import numpy as np
 from ...models import FloatArray
 
 #: An entry of a basis below this part of the largest is rounding error.
-_TRACE = 1e-9
+_NEGLIGIBLE = 1e-9
 
 
 def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
-    """``argmin |A y - b|`` over ``y >= 0`` by the active-set method of Lawson and Hanson (1974, chapter 23).
+    """Return ``argmin |A y - b|`` over ``y >= 0``, (k,).
+
+    The method is the active-set method of C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems*, 1974,
+    chapter 23.
 
     Args:
         A: (n, k) matrix, possibly rank deficient.
         b: (n,) vector.
     """
     k = A.shape[1]
-    # Mostly the columns are independent and the unconstrained solution is the answer.
+    # In most cases the columns are independent and the unconstrained solution is not negative.
     whole, _, rank, _ = np.linalg.lstsq(A, b, rcond=None)
     if rank == k and whole.min(initial=0.0) >= 0:
         return np.asarray(whole, dtype=np.float64)
@@ -44,20 +47,20 @@ def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
     return y
 
 
-def plain_basis(vectors: FloatArray) -> FloatArray:
-    """A basis of the same span with as few entries in each vector as elimination gives.
+def echelon_basis(vectors: FloatArray) -> FloatArray:
+    """Return a basis of the span of vectors with few entries that are not zero, by Gauss-Jordan elimination.
 
     Args:
-        vectors: (k, n) rows, none of them nearly zero.
+        vectors: (k, n) rows, k >= 1, none of them nearly zero.
 
     Returns:
-        (rank, n) rows in reduced echelon form, each with its largest entry 1 and rounding errors cleared.
+        (rank, n) rows in reduced echelon form, each with its largest entry 1 and with rounding errors set to 0.
     """
     rows = vectors.copy()
     done = 0
     for _ in range(len(rows)):
         rest = np.abs(rows[done:])
-        if rest.max() <= _TRACE:
+        if rest.max() <= _NEGLIGIBLE:
             break
         i, j = divmod(int(np.argmax(rest)), rows.shape[1])
         rows[[done, done + i]] = rows[[done + i, done]]
@@ -68,4 +71,4 @@ def plain_basis(vectors: FloatArray) -> FloatArray:
         done += 1
     rows = rows[:done]
     rows = np.array([row / row[int(np.argmax(np.abs(row)))] for row in rows]).reshape(done, vectors.shape[1])
-    return np.where(np.abs(rows) > _TRACE, rows, 0.0)
+    return np.where(np.abs(rows) > _NEGLIGIBLE, rows, 0.0)

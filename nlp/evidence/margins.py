@@ -1,4 +1,4 @@
-"""How far a point is inside each of the case's limits, and what each limit costs.
+"""Margins of a point in each of the case's limits, and the cost of each limit.
 
 The cost of a limit is the derivative of the optimal F by the number that stands in the case, from the multipliers: with
 the Lagrangian ``phi + sum_j mu_j (g_j - c_j)`` of :mod:`.kkt`, ``d phi* / d c_j = -mu_j``. A number that
@@ -10,17 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, WrenchKind
+from ...models import Dimension, FloatArray
 from ..case.limits.constraint import BoundedConstraint, Constraint
-from ..case.limits.limits import Homogenised
 from ..program.nlp import Nlp
 from .kkt import linearise, multipliers
-from .state import evaluate
+from .state import RobotState, evaluate
 
 
 @dataclass(frozen=True)
@@ -49,18 +48,18 @@ class Margin:
 
     @property
     def margin(self) -> float:
-        """How far inside; negative outside."""
+        """Distance to the limit, positive inside."""
         if self.bound == "equal":
             return -abs(self.value - self.limit)
         return self.limit - self.value if self.bound == "max" else self.value - self.limit
 
 
 def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
-    """Margins of a point (n,) in every limit of the case, in the order of the program's constraints.
+    """Return the margins of a point in every limit of the case, in the order of the program's constraints.
 
     Args:
         nlp: the program.
-        x: the point.
+        x: (n,) the point.
         optimal: whether the point is an optimum, so that costs mean something.
     """
     if not nlp.case.limits:
@@ -69,8 +68,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    g = nlp.evaluate(x)[1]
-    exact = _exact(nlp, x, nlp.program.constraints)
+    measured = _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
     rows = []
     for j, side in enumerate(nlp.sides.sides):
         if side.constraint is None:
@@ -85,128 +83,79 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
                 name=side.name,
                 key=key,
                 bound=side.bound,
-                value=_value(nlp, x, constraint, float(g[side.constraint]), exact),
+                value=measured[side.constraint],
                 limit=constraint.reading.from_value(limit),
                 dimension=constraint.reading.dimension,
                 active=j in active,
                 cost=float(gained[j] * constraint.reading.slope(limit)) if optimal else None,
             )
         )
-    return [*rows, *_met(nlp, x, optimal=optimal)]
+    return [*rows, *_constant(nlp, x, optimal=optimal)]
 
 
-def _met(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
-    """Margins of the limits that hold whatever is chosen: they cost nothing."""
+def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
+    """Return the margins in the limits that hold whatever is chosen: they cost nothing."""
     if not nlp.met:
         return []
-    expressions = ca.vertcat(*[item.constraint.expression for item in nlp.met])
-    function = ca.Function("met", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
-    values = function(x, nlp.arguments).full().ravel()
-    exact = _exact(nlp, x, [item.constraint for item in nlp.met])
+    constraints = [item.constraint for item in nlp.met]
+    expressions = ca.vertcat(*[constraint.expression for constraint in constraints])
+    function = ca.Function("constant", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
+    measured = _measured(nlp, x, constraints, function(x, nlp.arguments).full().ravel())
     return [
         Margin(
             name=item.constraint.name,
             key=key,
             bound=bound,
-            value=_value(nlp, x, item.constraint, float(value), exact),
+            value=value,
             limit=item.constraint.reading.from_value(limit),
             dimension=item.constraint.reading.dimension,
             active=False,
             cost=0.0 if optimal else None,
         )
-        for item, value in zip(nlp.met, values, strict=True)
+        for item, value in zip(nlp.met, measured, strict=True)
         for bound, key, limit in _sides(item)
     ]
 
 
-def _sides(item: BoundedConstraint) -> list[tuple[Literal["min", "max", "equal"], str, float]]:
+class _LimitSide(NamedTuple):
+    """A side of a constraint with the key of its number, and its bound in the program's terms."""
+
+    bound: Literal["min", "max", "equal"]
+    key: str
+    limit: float
+
+
+def _sides(item: BoundedConstraint) -> list[_LimitSide]:
+    """Return the sides of a constraint that are limits of the case."""
     low, high = item.constraint.keys
     if item.lower == item.upper:
-        return [("equal", low, item.lower)]
-    sides: list[tuple[Literal["min", "max", "equal"], str, float]] = []
-    if low:
-        sides.append(("min", low, item.lower))
-    if high:
-        sides.append(("max", high, item.upper))
-    return sides
+        return [_LimitSide("equal", low, item.lower)]
+    sides = [_LimitSide("min", low, item.lower), _LimitSide("max", high, item.upper)]
+    return [side for side in sides if side.key]
 
 
-def _exact(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint]) -> dict[str, float]:
-    """Measured numbers by name, of the constraints that say them near their limits only."""
-    told = {each.name: each.exact for each in constraints if each.exact is not None}
-    if not told:
-        return {}
-    function = ca.Function("exact", [nlp.program.x, nlp.program.p], [ca.densify(ca.vertcat(*told.values()))])
-    return dict(zip(told, map(float, function(x, nlp.arguments).full().ravel()), strict=True))
-
-
-def _value(nlp: Nlp, x: FloatArray, constraint: Constraint, measured: float, exact: dict[str, float]) -> float:
-    """The measured number; singular values, which the program keeps to from the safe side, as they are."""
-    if constraint.name in exact:
-        return exact[constraint.name]
-    limits = nlp.case.limits
-    if constraint.keys[0].startswith("smallest_singular_value") and limits.smallest_singular_value is not None:
-        return float(_singular_values(nlp, x, constraint.pose, limits.smallest_singular_value)[-1])
-    if constraint.keys[1].startswith("condition_number") and limits.condition_number is not None:
-        values = _singular_values(nlp, x, constraint.pose, limits.condition_number)
-        return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
-    return constraint.reading.from_value(measured)
-
-
-def _singular_values(nlp: Nlp, x: FloatArray, pose: int, homogenised: Homogenised) -> FloatArray:
-    """(6,) singular values of J with moments about the platform's origin, divided by a length; 0 for missing rows."""
-    state = evaluate(nlp, x, pose)
-    forces, moments = state.jacobian[:, :3], np.array(state.jacobian[:, 3:])
-    along = [row.kind is WrenchKind.FORCE for row in nlp.program.model.wrenches]
-    moments[along] -= np.cross(state.position, forces[along])
-    values = np.linalg.svd(np.hstack([forces, moments / homogenised.length]), compute_uv=False)
-    return np.concatenate([values, np.zeros(6 - len(values))])
-
-
-def margins_as_data(nlp: Nlp, margins: Sequence[Margin]) -> list[dict[str, Any]]:
-    """Margins in the case's units, ready for JSON."""
-    units = nlp.case.units
-    return [
-        {
-            "name": row.name,
-            "key": row.key,
-            "bound": row.bound,
-            "value": _finite(units.shown(row.value, row.dimension)),
-            "limit": units.shown(row.limit, row.dimension),
-            "margin": _finite(units.shown(row.margin, row.dimension)),
-            "unit": units.label(row.dimension),
-            "active": row.active,
-            "cost": None if row.cost is None else row.cost * units.to_internal(1.0, row.dimension),
-        }
-        for row in margins
-    ]
-
-
-def costs_of(margins: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row for each number in the case: its least margin, where it is active, and what it costs in all.
+def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values: FloatArray) -> list[float]:
+    """Return the number that each limit measures, radians for angles; NaN for a constraint that is no limit.
 
     Args:
-        margins: as :func:`margins_as_data` gives them.
+        nlp: the program.
+        x: (n,) the point.
+        constraints: of the program, or constant ones.
+        values: (c,) their expressions at the point.
     """
-    rows = []
-    for key in dict.fromkeys(row["key"] for row in margins):
-        own = [row for row in margins if row["key"] == key]
-        least = min(own, key=lambda row: float("-inf") if row["margin"] is None else row["margin"])
-        costs = [row["cost"] for row in own if row["cost"] is not None]
-        rows.append(
-            {
-                "key": key,
-                "limit": least["limit"],
-                "unit": least["unit"],
-                "nearest": least["name"],
-                "value": least["value"],
-                "margin": least["margin"],
-                "active": [row["name"] for row in own if row["active"]],
-                "cost": sum(costs) if costs else None,
-            }
-        )
-    return rows
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    exact = {k: each.exact for k, each in enumerate(constraints) if each.exact is not None}
+    measured = [
+        each.reading.from_value(float(value)) if any(each.keys) else float("nan")
+        for each, value in zip(constraints, values, strict=True)
+    ]
+    if exact:
+        function = ca.Function("exact", [nlp.program.x, nlp.program.p], [ca.densify(ca.vertcat(*exact.values()))])
+        for k, value in zip(exact, function(x, nlp.arguments).full().ravel(), strict=True):
+            measured[k] = float(value)
+    states: dict[int, RobotState] = {}
+    for k, each in enumerate(constraints):
+        if each.measure is not None:
+            if each.pose not in states:
+                states[each.pose] = evaluate(nlp, x, each.pose)
+            measured[k] = each.measure(states[each.pose].jacobian, states[each.pose].position)
+    return measured

@@ -3,11 +3,11 @@
 The paper checks each of its solutions by the derivatives and the Hessian's eigenvalues of the objective. With bounds
 that is not enough, so this module checks the whole of the first- and second-order conditions (J. Nocedal and
 S. Wright, *Numerical Optimization*, 2nd edition, sections 12.3 to 12.5), in the scaled terms of
-:mod:`screwsynth.nlp.evidence.kkt`, and says in words what holds.
+:mod:`screwsynth.nlp.evidence.kkt`, and gives a verdict in words.
 
 Sign convention of multipliers: a multiplier is the rate at which the optimal F **improves** (grows for a maximum, falls
-for a minimum) per unit by which the limit is **relaxed**, in F per the case's unit of that limit. It is never negative
-on a bound; on an equation it is the improvement per unit by which the equation's right-hand side grows.
+for a minimum) per unit by which the limit is **relaxed**, in F per the case's unit of that limit. A multiplier is never
+negative on an inequality; on an equation it is the improvement per unit by which the equation's right-hand side grows.
 """
 
 from __future__ import annotations
@@ -17,33 +17,36 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
-from ...models import FloatArray, frozen_array
+from ...models import Dimension, FloatArray, frozen_array
 from ..case.task import Sense
 from ..program.nlp import Nlp
-from .kkt import FEASIBLE, STATIONARY, Linearisation, correct, lagrangian_hessian, linearise, multipliers
-from .linalg import plain_basis
+from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
+from .linalg import echelon_basis
 
-#: A multiplier below this, in scaled terms, does not hold the point at its side: the side is weakly active.
+#: Multiplier, in scaled terms, below which an active side is weakly active.
 STRONG = 1e-9
-#: An eigenvalue of the scaled reduced Hessian below this is zero: over half a variable's range F would change by less
-#: than this part of its size.
+#: Eigenvalue of the scaled reduced Hessian below which it counts as zero: over half a variable's range F then changes
+#: by less than this part of its size.
 CURVED = 1e-8
-#: How far a flat direction is followed to see whether F really stays, in half ranges.
-_PROBE = 0.02
-#: How often a flat direction may be turned by following it, and the cosine from which it was not turned.
-_TURNS = 4
-_STRAIGHT = 0.999
-#: Flat directions found by following are known to a few parts in a hundred: what is closer is one and the same, and a
-#: component below a part in a hundred is left out.
+#: Length of the step along a flat direction that tests whether F keeps its value, in half ranges.
+_FLAT_STEP = 0.02
+#: Largest number of changes of a flat direction by corrections of such steps.
+_DIRECTION_CHANGES = 4
+#: Cosine between two directions above which they are the same.
+_SAME_DIRECTION = 0.999
+#: Flat directions from such steps are accurate to a few parts in a hundred: singular values below this part of the
+#: largest belong to no direction of their own.
 _INDEPENDENT = 0.05
-_TRACE = 1e-2
+#: For the same reason, components of a flat direction below this part of the largest are left out.
+_NEGLIGIBLE = 1e-2
 
 
 class PointKind(enum.Enum):
-    """What a point is."""
+    """Verdict on a point."""
 
     STRICT_MAXIMUM = "strict local maximum"
     STRICT_MINIMUM = "strict local minimum"
@@ -62,37 +65,41 @@ class PointKind(enum.Enum):
 
 @dataclass(frozen=True)
 class ActiveSide:
-    """A limit that the point lies on.
+    """An active side: a bound or a limit on which the point lies.
 
     Attributes:
-        name: the variable or constraint.
+        name: name of the variable or constraint.
         bound: ``min``, ``max`` or ``equal``.
         value: the limit, radians for angles.
         multiplier: improvement of F per unit by which the limit is relaxed, in the same unit.
+        dimension: what the limit measures.
     """
 
     name: str
-    bound: str
+    bound: Literal["min", "max", "equal"]
     value: float
     multiplier: float
+    dimension: Dimension
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What holds at a point.
+    """Evidence about a point.
 
     Attributes:
         kind: the verdict.
-        stationarity: largest scaled derivative of the Lagrangian, with the best multipliers there are.
-        feasibility: largest distance outside a limit, in half ranges; 0 inside.
-        complementarity: largest product of a multiplier and its side's slack, scaled.
-        active: limits that the point lies on, with multipliers.
-        violated: names of the limits that the point lies outside of.
-        licq: whether the active normals are linearly independent, so that the multipliers are unique.
-        eigenvalues: of the scaled Lagrangian's Hessian on the tangent space of the strongly active limits, ascending;
-            positive means that F gets worse on leaving the point, for a maximum as for a minimum.
-        flat: directions along which F keeps its optimal value: rates of the variables, in their units, by name,
-            for a step of half a range in the variable that moves most.
+        stationarity: largest scaled derivative of the Lagrangian, with the multipliers that make it least.
+        feasibility: largest distance outside a side, in half ranges; 0 inside.
+        complementarity: largest product of a multiplier and the slack of its side, scaled.
+        active: active sides, with multipliers.
+        violated: names of the variables and constraints of violated sides.
+        licq: whether the active normals are linearly independent, so that the multipliers are unique (the linear
+            independence constraint qualification).
+        eigenvalues: eigenvalues of the reduced Hessian, ascending: of the scaled Lagrangian's Hessian on the tangent
+            space of the strongly active sides. A positive one means that F gets worse away from the point, for a
+            maximum as for a minimum.
+        flat: directions along which F keeps its optimal value: change of each variable by name, in its unit, for a step
+            of half a range in the variable that changes most.
     """
 
     kind: PointKind
@@ -107,7 +114,12 @@ class Evidence:
 
 
 def examine(nlp: Nlp, x: FloatArray) -> Evidence:
-    """Examine a point (n,) of a program."""
+    """Return the evidence about a point of a program.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+    """
     at = linearise(nlp, x)
     active = at.active()
     mu, stationarity = multipliers(at, active)
@@ -119,7 +131,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
     eigenvalues: FloatArray = np.zeros(0)
     flat: list[FloatArray] = []
     if feasibility <= FEASIBLE and stationarity <= STATIONARY:
-        kind, eigenvalues, flat = _second_order(nlp, at, mu)
+        kind, eigenvalues, flat = _second_order_test(nlp, at, mu)
     return Evidence(
         kind=kind,
         stationarity=stationarity,
@@ -129,49 +141,59 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         violated=tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE)),
         licq=bool(np.linalg.matrix_rank(normals, tol=1e-9) == len(active)) if active else True,
         eigenvalues=frozen_array(eigenvalues, eigenvalues.shape),
-        flat=tuple(_named(nlp, direction) for direction in flat),
+        flat=tuple(_changes_by_name(nlp, direction) for direction in flat),
     )
 
 
 def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
+    """Return side j with its scaled multiplier converted to F per unit of the limit."""
     side = at.sides[j]
     limit = float(nlp.sides.limit[j])
     multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
     if side.constraint is not None:
         reading = nlp.program.constraints[side.constraint].reading
-        return ActiveSide(side.name, side.bound, reading.from_value(limit), multiplier * reading.slope(limit))
-    return ActiveSide(side.name, side.bound, limit, multiplier)
+        value, slope = reading.from_value(limit), reading.slope(limit)
+        return ActiveSide(side.name, side.bound, value, multiplier * slope, reading.dimension)
+    dimension = nlp.program.variables[side.variable or 0].dimension
+    return ActiveSide(side.name, side.bound, limit, multiplier, dimension)
 
 
-def _second_order(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[PointKind, FloatArray, list[FloatArray]]:
+def _second_order_test(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[PointKind, FloatArray, list[FloatArray]]:
+    """Return verdict, eigenvalues of the reduced Hessian and flat directions (n,) of a stationary, feasible point."""
     strict = PointKind.STRICT_MAXIMUM if nlp.sense is Sense.MAX else PointKind.STRICT_MINIMUM
     active = at.active()
     strong = [j for j in active if mu[j] > STRONG or at.sides[j].bound == "equal"]
     weak = [j for j in active if j not in strong]
     H = lagrangian_hessian(nlp, at, mu)
-    eigenvalues, _ = _reduced(H, at.normals[strong])
+    eigenvalues, _ = _reduced_eigenpairs(H, at.normals[strong])
     if np.all(eigenvalues > CURVED):
         return strict, eigenvalues, []
-    if _improves(H, at.normals[strong], at.normals[weak]):
+    if _has_improving_direction(H, at.normals[strong], at.normals[weak]):
         return PointKind.SADDLE, eigenvalues, []
-    inner, directions = _reduced(H, at.normals[list(active)])
+    inner, directions = _reduced_eigenpairs(H, at.normals[list(active)])
     candidates = [directions[:, k] for k in np.flatnonzero(np.abs(inner) <= CURVED)]
-    followed = [_followed(nlp, at, direction) for direction in candidates]
-    flat = np.array([direction for direction in followed if direction is not None]).reshape(-1, nlp.n)
+    tested = [_follow_flat_direction(nlp, at, direction) for direction in candidates]
+    flat = np.array([direction for direction in tested if direction is not None]).reshape(-1, nlp.n)
     if len(flat):
-        return PointKind.NOT_ISOLATED, eigenvalues, _span(flat)
+        return PointKind.NOT_ISOLATED, eigenvalues, _independent_directions(flat)
     return PointKind.UNDECIDED, eigenvalues, []
 
 
-def _improves(H: FloatArray, strong: FloatArray, weak: FloatArray) -> bool:
-    """Whether F improves to second order along a direction that the strong sides hold and the weak ones allow.
+def _has_improving_direction(H: FloatArray, strong: FloatArray, weak: FloatArray) -> bool:
+    """Return whether F improves to second order along a direction in which the active sides allow a step.
 
-    Finding out for certain is a hard problem (copositivity). Tried are the directions of negative curvature with all,
-    all but one, and none of the weak sides held, and each of these brought back inside the weak sides.
+    A certain answer is a hard problem (copositivity of H on a cone). The test covers the directions of negative
+    curvature with all, all but one, and none of the weakly active sides as equations, and each of these directions
+    corrected to the inside of the weakly active sides.
+
+    Args:
+        H: (n, n) Hessian of the Lagrangian in scaled variables.
+        strong: (s, n) normals of the strongly active sides, to which a step must be orthogonal.
+        weak: (w, n) outward normals of the weakly active sides, along which a step must not go outwards.
     """
     rows = list(range(len(weak)))
-    for held in [rows, *([k for k in rows if k != freed] for freed in rows), []]:
-        values, directions = _reduced(H, np.vstack([strong, weak[held]]))
+    for equations in [rows, *([k for k in rows if k != left_out] for left_out in rows), []]:
+        values, directions = _reduced_eigenpairs(H, np.vstack([strong, weak[equations]]))
         for k in np.flatnonzero(values < -CURVED):
             for sign in (1.0, -1.0):
                 d = sign * directions[:, k]
@@ -184,8 +206,13 @@ def _improves(H: FloatArray, strong: FloatArray, weak: FloatArray) -> bool:
     return False
 
 
-def _reduced(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Eigenvalues of H on the null space of the normals, ascending, and their directions as columns (n, .)."""
+def _reduced_eigenpairs(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the eigenvalues of the reduced Hessian, ascending, and its eigenvectors as columns (n, .).
+
+    Args:
+        H: (n, n) Hessian.
+        normals: (k, n) rows, on whose null space H is reduced.
+    """
     if len(normals):
         _, sizes, rows = np.linalg.svd(normals)
         Z = rows[int(np.count_nonzero(sizes > 1e-9)) :].T
@@ -195,47 +222,57 @@ def _reduced(H: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray
     return np.asarray(values, dtype=np.float64), np.asarray(Z @ vectors, dtype=np.float64)
 
 
-def _followed(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
-    """The direction (n,) in which F really stays when one sets out along the given one; None when it does not.
+def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+    """Return a direction in which F keeps its value over a finite step, near the given one; None when there is none.
 
-    A step is corrected back onto the optimal set; where the correction turns it, the turned direction is tried next.
+    Newton's method corrects a step along the direction back onto the optimal set. Where the correction changes the
+    direction, the new direction is tried next.
+
+    Args:
+        nlp: the program.
+        at: the program at an optimum.
+        direction: (n,) unit vector in scaled variables, along which the curvature is zero.
     """
-    for _ in range(_TURNS):
-        moved = next((m for m in (_displacement(nlp, at, s * direction) for s in (1.0, -1.0)) if m is not None), None)
-        if moved is None:
+    for _ in range(_DIRECTION_CHANGES):
+        steps = (_step_on_optimal_set(nlp, at, sign * direction) for sign in (1.0, -1.0))
+        step = next((each for each in steps if each is not None), None)
+        if step is None:
             return None
-        turned = moved / np.linalg.norm(moved)
-        if abs(float(turned @ direction)) > _STRAIGHT:
+        changed = step / np.linalg.norm(step)
+        if abs(float(changed @ direction)) > _SAME_DIRECTION:
             return direction
-        direction = turned
+        direction = changed
     return None
 
 
-def _displacement(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
-    """Where a short step along a direction ends after correction, from the point; None when F changes or it cannot."""
-    away = at.x + _PROBE * nlp.scale * direction
+def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+    """Return the step (n,), in scaled variables, to the corrected end of a short step along a direction.
+
+    None stands for a step that leaves the box, changes F or returns to the point.
+    """
+    away = at.x + _FLAT_STEP * nlp.scale * direction
     if np.any(away < nlp.lower) or np.any(away > nlp.upper):
         return None
-    back = correct(nlp, away, at.active())
-    moved = np.asarray((back.x - at.x) / nlp.scale, dtype=np.float64)
-    stays = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= 1e-11
-    return moved if stays and float(np.linalg.norm(moved)) > _PROBE / 3 else None
+    back = correct_point(nlp, away, at.active())
+    step = np.asarray((back.x - at.x) / nlp.scale, dtype=np.float64)
+    keeps_F = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= 1e-11
+    return step if keeps_F and float(np.linalg.norm(step)) > _FLAT_STEP / 3 else None
 
 
-def _span(directions: FloatArray) -> list[FloatArray]:
-    """The independent ones among directions (k, n), in as few names as possible."""
+def _independent_directions(directions: FloatArray) -> list[FloatArray]:
+    """Return a basis (n,) each of the span of directions (k, n), with few components that are not zero."""
     _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
-    plain = plain_basis(rows[sizes > _INDEPENDENT * sizes[0]])
-    return list(np.where(np.abs(plain) > _TRACE, plain, 0.0))
+    basis = echelon_basis(rows[sizes > _INDEPENDENT * sizes[0]])
+    return list(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0))
 
 
-def _named(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:
-    """A scaled direction as rates of the named variables in their units."""
+def _changes_by_name(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:
+    """Return a scaled direction (n,) as the change of each variable by name, in the unit of the variable."""
     steps = direction * nlp.scale
     return MappingProxyType(
         {
             variable.name: float(step)
             for variable, step, part in zip(nlp.program.variables, steps, direction, strict=True)
-            if abs(part) > _TRACE
+            if abs(part) > _NEGLIGIBLE
         }
     )

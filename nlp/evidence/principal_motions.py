@@ -1,8 +1,8 @@
-"""Which motions a robot resists least and most at a fixed point (the task analysis of Wolf and Shoham).
+"""The motions that a robot resists least and most at a fixed point (the task analysis of Wolf and Shoham).
 
 F is a quadratic form in the twist, ``F = |M omega + N v|^2`` with moments ``M`` and forces ``N`` of J.
-Among all twists of unit rotation it has no maximum, since any translation may be added; what is well defined are
-its stationary values under ``|omega| = 1``, the finite part of the generalised eigenproblem
+Among all twists of unit rotation F has no maximum, since any translation may be added. Its stationary values under
+``|omega| = 1`` are well defined: they are the finite part of the generalised eigenproblem
 
     D J' J D chi = F diag(1, 1, 1, 0, 0, 0) chi
 
@@ -27,8 +27,9 @@ class PrincipalMotion:
     """A motion at which F is stationary.
 
     Attributes:
-        twist: (6,) with ``|omega| = 1``, or ``|v| = 1`` for a translation.
-        F: objective for it.
+        twist: (6,) angular velocity, then velocity at the world origin, with ``|omega| = 1``, or ``|v| = 1`` for a
+            translation.
+        F: objective for this twist.
     """
 
     twist: FloatArray
@@ -40,8 +41,8 @@ class TaskAnalysis:
     """The principal motions of a robot at one point, each three by ascending F.
 
     Attributes:
-        rotations: among twists of unit rotation; the first is the least resisted of all of them.
-        translations: among pure translations of unit speed.
+        rotations: three stationary twists of unit rotation; the robot resists the first least of all such twists.
+        translations: three stationary pure translations of unit speed.
     """
 
     rotations: tuple[PrincipalMotion, ...]
@@ -49,25 +50,35 @@ class TaskAnalysis:
 
 
 def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
-    """Principal motions for a Jacobian (m, 6) with rows force, then moment about the world origin."""
+    """Return the principal motions of a robot at one point.
+
+    Args:
+        jacobian: (m, 6) rows force, then moment about the world origin.
+    """
     N, M = jacobian[:, :3], jacobian[:, 3:]
     least_squares = np.linalg.pinv(N, rcond=1e-10)
     projected = M - N @ (least_squares @ M)
     rotations = []
-    for axis in _ascending(projected):
+    for axis in _right_singular_vectors(projected):
         twist = np.concatenate([axis, -least_squares @ (M @ axis)])
-        rotations.append(_motion(jacobian, twist))
-    translations = [_motion(jacobian, np.concatenate([np.zeros(3), axis])) for axis in _ascending(N)]
+        rotations.append(_principal_motion(jacobian, twist))
+    translations = [
+        _principal_motion(jacobian, np.concatenate([np.zeros(3), axis])) for axis in _right_singular_vectors(N)
+    ]
     return TaskAnalysis(tuple(rotations), tuple(translations))
 
 
-def _ascending(matrix: FloatArray) -> FloatArray:
-    """Right singular vectors as rows, the smallest singular value first, largest component positive."""
+def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
+    """Return the right singular vectors of a matrix (m, 3) as rows (3, 3).
+
+    Singular values ascend; the largest component of each vector is positive.
+    """
     rows = np.linalg.svd(matrix)[2][::-1]
     lead = rows[np.arange(3), np.argmax(np.abs(rows), axis=1)]
     return np.asarray(rows * np.sign(lead)[:, None], dtype=np.float64)
 
 
-def _motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
+def _principal_motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
+    """Return a twist (6,) with F for a Jacobian (m, 6)."""
     rates = jacobian[:, 3:] @ twist[:3] + jacobian[:, :3] @ twist[3:]
     return PrincipalMotion(frozen_array(twist, (6,)), float(rates @ rates))

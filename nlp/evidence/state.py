@@ -1,4 +1,4 @@
-"""The robot at one point, in numbers: pose, Jacobian, rates, F, and what singularity there is."""
+"""The robot at one point, in numbers: pose, Jacobian, rates, F, rank and free twists."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...models import FloatArray, axis_angle_from_matrix, frozen_array, homogenised, vanished
+from ...models import Displacement, FloatArray, axis_angle_from_matrix, frozen_array, homogenised, reason_for_zero_row
 from ..case.case import Case
-from ..case.pose import Step
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
-from .linalg import plain_basis
+from .linalg import echelon_basis
 
-#: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of theirs.
+#: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of their sizes.
 ZERO_F = 1e-12
-#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. It is
-#: the square root of the double precision's rounding unit: a point known to rounding error gives no better.
+#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
+#: the square root of the rounding unit of double precision: a point known to rounding error gives no better accuracy.
 ZERO_SINGULAR_VALUE = 1.5e-8
 
 
@@ -29,17 +28,17 @@ class RobotState:
 
     Attributes:
         parameters: components of each parameter, by parameter name; radians for angles.
-        position: (3,) ``p``, length.
-        rotation: (3, 3) ``R``.
-        axis, angle: the rotation as a unit axis (3,) and radians; the held axis with a signed angle where there is one.
-        jacobian: (m, 6) unit wrenches, force then moment about the world origin.
-        rates: (m,) ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
+        position: (3,) ``p``, origin of the platform frame in the world frame, length.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        axis, angle: the rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+        jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
+        rates: (m,) work rates ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
         F: ``sum(rates^2)``.
-        size: what F would be without cancellation; F is zero when it is small beside this.
-        singular_values: (min(m, 6),) of the Jacobian as it stands, largest first.
-        rank: of the Jacobian with moments about the platform's origin, divided by their longest arm.
-        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in plain terms.
-        quantities: the model's named measures, each (n,); radians for angles.
+        size: F without cancellation; F counts as zero when it is small in comparison.
+        singular_values: (min(m, 6),) singular values of ``jacobian``, largest first.
+        rank: rank of the Jacobian with moments about the platform's origin, divided by their longest arm.
+        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form.
+        quantities: the model's quantities by name, each (n,); radians for angles.
     """
 
     parameters: Mapping[str, FloatArray]
@@ -58,18 +57,24 @@ class RobotState:
 
     @property
     def is_zero(self) -> bool:
-        """Whether F is zero: the platform can make the task's motion with every actuator locked."""
+        """Whether F is zero, so that the platform can make the task's motion with every actuator locked."""
         return ZERO_F * self.size >= self.F
 
     @property
     def is_singular(self) -> bool:
-        """Whether some motion of the platform meets no resistance."""
+        """Whether there is a motion of the platform that no row of the Jacobian resists."""
         return self.rank < 6
 
 
 @dataclass(frozen=True, eq=False)
 class StatedPose:
-    """A pose that a case states: ``p`` (3,), ``R`` (3, 3), and the rotation as a unit axis (3,) and radians."""
+    """A pose that a case states, before its displacements.
+
+    Attributes:
+        position: (3,) ``p``, origin of the platform frame in the world frame, length.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        axis, angle: the rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+    """
 
     position: FloatArray
     rotation: FloatArray
@@ -78,18 +83,18 @@ class StatedPose:
 
 
 def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
-    """The robot at a point of the program.
+    """Return the robot at a point of the program.
 
     Args:
         nlp: the program.
         x: (n,) values of its free variables.
-        pose: index of the pose, of a case with several.
+        pose: index of the pose, in a case with several poses.
 
     Returns:
-        The robot with the rates of the program's task; of its first, where it combines several.
+        The robot with the rates of the program's task, or of its first task where the program combines several.
 
     Raises:
-        EvaluationError: a number is not finite there, as when a limb has zero length.
+        EvaluationError: a number is not finite at this point, as where a limb has zero length.
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
@@ -97,14 +102,14 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     rotation, position, jacobian, rates = numbers.rotation, numbers.position, numbers.jacobian, numbers.rates
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if not square > 0:
-            raise EvaluationError(f"{where}{vanished(row)}, at this point")
+            raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
     if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     axis, angle = axis_angle_from_matrix(rotation)
-    stated, step = _stated(case)[pose]
+    stated, step = _pose_displacements(case)[pose]
     if step.is_identity:
-        axis, angle = _turn(nlp, x, stated, rotation)
-    rank, free_twists = _rank(jacobian, position.ravel())
+        axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
+    rank, free_twists = _rank_and_free_twists(jacobian, position.ravel())
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
     sizes = [len(parameter.typical) for parameter in model.parameters]
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
@@ -133,20 +138,27 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
-    """The poses that a case states, at a point (n,), before their displacements."""
+    """Return the poses that a case states, at a point (n,), before their displacements."""
     found: dict[int, StatedPose] = {}
-    for k, (stated, step) in enumerate(_stated(nlp.case)):
+    for k, (stated, step) in enumerate(_pose_displacements(nlp.case)):
         if stated not in found:
             numbers = nlp.program.kernels.robot_states[k](x, nlp.arguments)
             rotation = step.rotation.T @ numbers.rotation
             position = step.rotation.T @ (numbers.position.ravel() - step.translation)
-            axis, angle = _turn(nlp, x, stated, rotation)
+            axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
             found[stated] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
     return list(found.values())
 
 
-def _turn(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArray) -> tuple[FloatArray, float]:
-    """Return a stated pose's rotation as axis and angle: a held axis with a signed angle."""
+def _stated_axis_angle(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArray) -> tuple[FloatArray, float]:
+    """Return a stated pose's rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+
+    Args:
+        nlp: the program.
+        x: (n,) values of its free variables.
+        stated: index of the stated pose.
+        rotation: (3, 3) ``R`` of the stated pose.
+    """
     places, axis = nlp.program.places.rotations[stated], nlp.case.poses[stated].rotation.axis
     if axis is None or not isinstance(places, HeldRotation):
         return axis_angle_from_matrix(rotation)
@@ -154,13 +166,20 @@ def _turn(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArray) -> tuple[F
     return frozen_array(axis, (3,)), float(vector[places.angle.index])
 
 
-def _stated(case: Case) -> list[tuple[int, Step]]:
-    """Return the index of the stated pose that each pose comes from, and the displacement."""
-    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.steps]
+def _pose_displacements(case: Case) -> list[tuple[int, Displacement]]:
+    """Return the index of the stated pose and the displacement from it, for each pose of the robot."""
+    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.displacements]
 
 
-def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
-    """Rank and free twists of J with its moments about the platform's origin, divided by their longest arm."""
+def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
+    """Return the rank and the free twists (6 - rank, 6) of J.
+
+    Moments are taken about the platform's origin and divided by their longest arm.
+
+    Args:
+        jacobian: (m, 6) rows force, then moment about the world origin.
+        centre: (3,) the platform's origin in the world frame, length.
+    """
     arm = float(np.max(np.linalg.norm(homogenised(jacobian, centre, 1.0)[3:], axis=0))) or 1.0
     # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
     forces, moments = np.split(np.array(homogenised(jacobian, centre, arm)), 2)
@@ -169,4 +188,4 @@ def _rank(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
     rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
     null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
     null[:, 3:] -= np.cross(null[:, :3], centre)
-    return rank, plain_basis(null) if len(null) else np.zeros((0, 6))
+    return rank, echelon_basis(null) if len(null) else np.zeros((0, 6))

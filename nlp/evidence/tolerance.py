@@ -1,9 +1,9 @@
-"""What inexact joint centres may cost.
+"""The loss of F by inexact joint centres.
 
-Every joint centre may be built off by a vector of at most a given length. To first order F changes by
-``sum_j grad_j F . e_j`` over the joints, and the most that it can lose is the tolerance times ``sum_j |grad_j F|``,
-when each error points along its joint's gradient. The platform is taken to stand at the same pose: a machine that is
-calibrated has legs of other lengths then.
+Every joint centre may have an error vector of at most a given length. To first order F changes by
+``sum_j grad_j F . e_j`` over the joints. The largest loss is the tolerance times ``sum_j |grad_j F|``, where each error
+is parallel to the gradient of its joint. The platform has the same pose with the errors as without: a calibrated
+machine reaches that pose with other leg lengths.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from casadi import SX
 
 from ...models import FloatArray, frozen_array, objective
 from ..case.pose import OverPoses
-from ..program.epigraph import total_over_poses, worst
+from ..program.epigraph import total_over_poses, worst_value
 from ..program.nlp import Nlp
 
-#: Poses whose F is within this part of the worst one's are the worst together.
-_LEVEL = 1e-7
+#: Poses whose F differs from the worst one by at most this part of it are all worst poses.
+_SAME_VALUE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class ToleranceLoss:
-    """The worst that a tolerance on every joint centre can do.
+    """The largest loss of F by a tolerance on every joint centre.
 
     Attributes:
         tolerance: largest error of each joint centre, length.
-        loss: how much worse F can become, to first order.
-        loss_there: how much worse F really becomes with the errors that are worst to first order.
-        joints: names of the joints: the leg's, and the plate's.
-        gradients: (k, 3) derivatives of F by each joint's error, base joints in the world frame and platform joints in
-            the platform's.
+        loss: largest loss of F to first order, not negative.
+        loss_there: exact loss of F with the errors that are worst to first order.
+        joints: names of leg and plate of each joint.
+        gradients: (k, 3) derivatives of F with respect to each joint's error, base joints in the world frame and
+            platform joints in the platform frame.
     """
 
     tolerance: float
@@ -45,7 +45,12 @@ class ToleranceLoss:
 
 
 class BuiltRobot:
-    """F of a program's first task at a point, as a function of the errors of the joint centres."""
+    """F of a program's first task at a point, as a function of the errors of the joint centres.
+
+    Args:
+        nlp: a program whose model gives rows with errors (``built``).
+        x: (n,) the point.
+    """
 
     def __init__(self, nlp: Nlp, x: FloatArray) -> None:
         self._nlp = nlp
@@ -60,7 +65,13 @@ class BuiltRobot:
         ]
 
     def _function(self, values: Sequence[FloatArray], e: SX, twist: FloatArray) -> ca.Function:
-        """``e -> (F, dF/de)`` at one pose, whose parameters, R and p are numbers."""
+        """Return the function ``e -> (F, dF/de)`` at one pose.
+
+        Args:
+            values: parameters (k, 1), ``R`` (3, 3) and ``p`` (3, 1) at the pose.
+            e: (3 k, 1) symbols of the joints' errors.
+            twist: (6,) twist of the task.
+        """
         model, length = self._nlp.program.model, self._nlp.case.characteristic_length
         F = objective(model.built, SX(twist.tolist()), SX(length))
         symbols = [ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters])]
@@ -70,38 +81,44 @@ class BuiltRobot:
         return ca.Function("built", [e], [at, ca.gradient(at, e)])
 
     def evaluate(self, errors: FloatArray) -> tuple[float, list[FloatArray]]:
-        """F over the poses, and its gradients (k, 3): one, or one for each of the worst poses.
+        """Return F over the poses, and its gradients (k, 3): one, or one for each of the worst poses.
 
         Args:
-            errors: (k, 3) of the joints.
+            errors: (k, 3) errors of the joint centres, length, each in the frame of its joint.
         """
         results = [function(errors.ravel()) for function in self._functions]
         values = [float(F) for F, _ in results]
         gradients: list[FloatArray] = [gradient.full().reshape(-1, 3) for _, gradient in results]
         case = self._nlp.case
         if case.over_poses is OverPoses.WORST and len(values) > 1:
-            level = worst(values, self._nlp.sense)
+            level = worst_value(values, self._nlp.sense)
             return level, [
                 gradient
                 for value, gradient in zip(values, gradients, strict=True)
-                if abs(value - level) <= _LEVEL * abs(level)
+                if abs(value - level) <= _SAME_VALUE * abs(level)
             ]
         return total_over_poses(values, case.over_poses), [total_over_poses(gradients, case.over_poses)]
 
 
 def tolerance_loss(nlp: Nlp, x: FloatArray, tolerance: float) -> ToleranceLoss:
-    """The worst first-order loss of F at a point (n,) with every joint centre off by up to a length."""
+    """Return the largest first-order loss of F by a tolerance on every joint centre.
+
+    Args:
+        nlp: a program whose model gives rows with errors (``built``).
+        x: (n,) the point.
+        tolerance: largest error of each joint centre, length.
+    """
     robot = BuiltRobot(nlp, x)
     exact, gradients = robot.evaluate(np.zeros((len(robot.joints), 3)))
-    worst = max(gradients, key=lambda gradient: float(np.linalg.norm(gradient, axis=1).sum()))
-    sizes = np.linalg.norm(worst, axis=1, keepdims=True)
-    # A maximum loses by going down, a minimum by going up.
-    errors = nlp.sign * tolerance * np.divide(worst, sizes, out=np.zeros_like(worst), where=sizes > 0)
+    steepest = max(gradients, key=lambda gradient: float(np.linalg.norm(gradient, axis=1).sum()))
+    sizes = np.linalg.norm(steepest, axis=1, keepdims=True)
+    # A decrease of F is a loss where F is maximised, an increase where F is minimised.
+    errors = nlp.sign * tolerance * np.divide(steepest, sizes, out=np.zeros_like(steepest), where=sizes > 0)
     there, _ = robot.evaluate(errors)
     return ToleranceLoss(
         tolerance=tolerance,
         loss=tolerance * float(sizes.sum()),
         loss_there=nlp.sign * (there - exact),
         joints=robot.joints,
-        gradients=frozen_array(worst, worst.shape),
+        gradients=frozen_array(steepest, steepest.shape),
     )

@@ -1,4 +1,4 @@
-"""From a layout and an objective to the nonlinear program with its numbers."""
+"""Assembly of the nonlinear program from a layout, an objective and further constraints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import casadi as ca
 from casadi import SX
 
-from ...models import frozen_vector, vanished
+from ...models import frozen_vector, reason_for_zero_row
 from ..case.limits.constraint import BoundedConstraint
 from ..case.task import Sense
 from ..errors import CaseError
@@ -31,8 +31,8 @@ def assemble(
         layout: the case as symbols.
         objective: (1, 1) expression in them.
         sense: whether the objective is maximised or minimised.
-        constraints: constraints beside the layout's own.
-        epigraph: where the epigraph variable stands, when the objective is one.
+        constraints: constraints in addition to those of the layout.
+        epigraph: places of the epigraph, where the objective is an epigraph variable.
 
     Raises:
         CaseError: a limb has zero length at every point of the box.
@@ -67,11 +67,15 @@ def assemble(
 
 
 def _check_limbs(nlp: Nlp) -> None:
-    """Refuse a limb whose direction is zero at every point of the box."""
+    """Refuse a limb whose direction is zero at every point of the box.
+
+    Raises:
+        CaseError: there is such a limb.
+    """
     program = nlp.program
     for robot, kernel in zip(program.robots, program.kernels.robot_states, strict=True):
         values = kernel(nlp.start, nlp.arguments).squares.ravel()
         free = ca.which_depends(robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
         for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
             if not varies and not value > 0:
-                raise CaseError("robot.parameters", vanished(row), source=nlp.case.source)
+                raise CaseError("robot.parameters", reason_for_zero_row(row), source=nlp.case.source)

@@ -1,13 +1,14 @@
 """F over several poses, and the worst case as an epigraph.
 
-The worst of several values is no smooth function. Its epigraph is: a variable ``level`` with one constraint for each
-value, which is optimised in the place of the values.
+The worst of several values is not a smooth function. The epigraph formulation is smooth: an epigraph variable
+``level`` replaces the values as the objective, with one constraint for each value.
 
-* Poses: the best level that F keeps at every pose.
+* Poses, F to be maximised: the largest ``level`` with ``F_k >= level`` at every pose; F to be minimised: the smallest
+  ``level`` with ``F_k <= level``.
 * Tasks, all to be maximised: the largest ``level`` with ``F_j >= w_j level`` for every task.
 * Tasks, all to be minimised: the smallest ``level`` with ``w_j F_j <= level``.
-* Tasks of both senses: the smallest ``level`` with ``w_j loss_j <= level``, where ``loss_j`` is how far ``F_j`` is from
-  the task's own optimum. (The worst of values of opposite senses would mean nothing.)
+* Tasks of both senses: the smallest ``level`` with ``w_j loss_j <= level``, where ``loss_j`` is the distance of ``F_j``
+  from the task's own optimum. (The worst of values of opposite senses has no meaning.)
 """
 
 from __future__ import annotations
@@ -31,41 +32,53 @@ from .nlp import Nlp
 from .places import Epigraph
 from .sampling import starting_points
 
-#: Points at which the size of F over several poses is evaluated.
-_PROBES = 32
-#: Upper bound of the level of a worst pose, in parts of that size: no F comes near it.
-_FAR = 2.0
+#: Number of points at which the size of F over several poses is evaluated.
+_SIZE_POINTS = 32
+#: Upper bound of the level of a worst pose, as a multiple of that size: far above any F.
+_LEVEL_BOUND = 2.0
 
 Number = TypeVar("Number", SX, float, FloatArray)
 
 
 def total_over_poses(values: Sequence[Number], how: OverPoses) -> Number:
-    """Return the sum or the mean of values at several poses; for the worst pose, the sum."""
+    """Return the sum or the mean of values at several poses; for the worst pose, the sum.
+
+    Args:
+        values: one for each pose, at least one; all of one shape.
+        how: how a case combines F over its poses.
+    """
     total = values[0]
     for value in values[1:]:
         total = total + value
     return total / len(values) if how is OverPoses.MEAN and len(values) > 1 else total
 
 
-def worst(values: Sequence[float] | FloatArray, sense: Sense) -> float:
-    """Return the worst of several values of F: the smallest of those that are maximised."""
+def worst_value(values: Sequence[float] | FloatArray, sense: Sense) -> float:
+    """Return the worst of several values of F: the smallest where F is maximised, the largest where it is minimised."""
     return float(np.min(values) if sense is Sense.MAX else np.max(values))
 
 
-def worst_pose(layout: Layout, sense: Sense) -> Nlp:
+def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     """Return the program of the best level that F keeps at every pose.
 
-    The level is bounded by the size that F would have without cancellation, which no F reaches.
+    The bounds of the level come from the size of F without cancellation, which no F reaches.
+
+    Args:
+        layout: a case with one task and several poses.
+        sense: sense of the task.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box.
     """
     whole = assemble(layout, layout.robots[0].F[0], sense)
-    points = starting_points(whole, _PROBES, 0)
+    points = starting_points(whole, _SIZE_POINTS, 0)
     states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
     sizes = [float(state.magnitude[0, 0]) for state in states if np.isfinite(state.magnitude).all()]
     ceiling = max([*sizes, whole.objective_scale])
-    epigraph = _Epigraph(layout, Free(-ceiling, _FAR * ceiling, ceiling / 2), ceiling)
+    epigraph = _EpigraphBuilder(layout, Free(-ceiling, _LEVEL_BOUND * ceiling, ceiling / 2), ceiling)
     for k, robot in enumerate(layout.robots):
-        room = robot.F[0] - epigraph.level if sense is Sense.MAX else epigraph.level - robot.F[0]
-        epigraph.add(f"F pose {k + 1}", room)
+        slack = robot.F[0] - epigraph.level if sense is Sense.MAX else epigraph.level - robot.F[0]
+        epigraph.add(f"F pose {k + 1}", slack)
     return epigraph.program(sense)
 
 
@@ -76,29 +89,39 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         case: a case with several tasks.
         weights: one for each task.
         best: each task's own optimum, for the losses.
-        ceiling: a level that no answer exceeds, positive.
+        ceiling: a positive level that no answer exceeds.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
     """
     layout = lay_out(case, case.tasks)
     F = total_over_poses([robot.F for robot in layout.robots], case.over_poses)
     senses = {task.sense for task in case.tasks}
-    epigraph = _Epigraph(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
+    epigraph = _EpigraphBuilder(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
     own_places = []
     for j, task in enumerate(case.tasks):
         weight = layout.table.add(f"weight{j}", Dimension.NUMBER, weights[j]).symbols
         own, (place,) = layout.table.add(f"best{j}", Dimension.NUMBER, best[j])
         own_places.append(place.index)
         if senses == {Sense.MAX}:
-            room = F[j] - weight * epigraph.level
+            slack = F[j] - weight * epigraph.level
         elif senses == {Sense.MIN}:
-            room = epigraph.level - weight * F[j]
+            slack = epigraph.level - weight * F[j]
         else:
-            room = epigraph.level - weight * (own - F[j] if task.sense is Sense.MAX else F[j] - own)
-        epigraph.add(f"task {task.name}", room)
+            slack = epigraph.level - weight * (own - F[j] if task.sense is Sense.MAX else F[j] - own)
+        epigraph.add(f"task {task.name}", slack)
     return epigraph.program(Sense.MAX if senses == {Sense.MAX} else Sense.MIN, tuple(own_places))
 
 
 def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float], best: Sequence[float]) -> float:
-    """Return the level of :func:`formulate_worst` that values of F keep, one for each task."""
+    """Return the best level of :func:`formulate_worst` for given values of F.
+
+    Args:
+        case: a case with several tasks.
+        values: F of each task.
+        weights: one for each task.
+        best: each task's own optimum, for the losses.
+    """
     senses = {task.sense for task in case.tasks}
     if senses == {Sense.MAX}:
         return min(F / w for F, w in zip(values, weights, strict=True))
@@ -111,26 +134,42 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the level of a worst pose set to F there; any other program's point unchanged."""
+    """Return a point with the level of a worst pose set to the worst F there; another program's point unchanged.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+    """
     epigraph = nlp.program.places.epigraph
     if epigraph is None or len(nlp.program.robots) == 1:
         return x
     values = [float(kernel(x, nlp.arguments).F[0, 0]) for kernel in nlp.program.kernels.robot_states]
     moved = np.array(x)
-    moved[epigraph.level] = worst(values, nlp.sense)
+    moved[epigraph.level] = worst_value(values, nlp.sense)
     return moved
 
 
 def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return the level of a worst pose, (k,), that F keeps at each of several points (n, k)."""
+    """Return the best level of a worst pose, (k,), at each of several points.
+
+    Args:
+        nlp: a program over poses.
+        points: (n, k) one point a column.
+    """
     values = ca.vertcat(*[robot.F[0] for robot in nlp.program.robots])
     extreme = ca.mmin(values) if nlp.sense is Sense.MAX else ca.mmax(values)
     levels: FloatArray = ca.Function("levels", [nlp.program.x, nlp.program.p], [extreme])(points, nlp.arguments).full()
     return levels.ravel()
 
 
-class _Epigraph:
-    """An epigraph under construction: its variable, the last one of the program, and its constraints."""
+class _EpigraphBuilder:
+    """An epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
+
+    Args:
+        layout: the case as symbols, to which the epigraph variable is added.
+        bounds: bounds and start of the epigraph variable.
+        ceiling: positive size by which the constraints are divided.
+    """
 
     def __init__(self, layout: Layout, bounds: Free, ceiling: float) -> None:
         self._layout = layout
@@ -139,13 +178,21 @@ class _Epigraph:
         self._reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
         self._constraints: list[BoundedConstraint] = []
 
-    def add(self, name: str, room: SX) -> None:
-        """Add the constraint ``room >= 0``, in parts of the ceiling, so that its row is of order 1."""
-        constraint = Constraint(name, room / self._size, self._reading)
+    def add(self, name: str, slack: SX) -> None:
+        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1."""
+        constraint = Constraint(name, slack / self._size, self._reading)
         self._constraints.append(BoundedConstraint(constraint, 0.0, math.inf))
 
     def program(self, sense: Sense, best: tuple[int, ...] = ()) -> Nlp:
-        """Return the program that optimises the level."""
+        """Return the program that optimises the level.
+
+        Args:
+            sense: sense of the level.
+            best: indices in ``p`` of each task's own optimum.
+
+        Raises:
+            CaseError: a limb has zero length at every point of the box.
+        """
         epigraph = Epigraph(
             self._level_place.index,
             self._size_place.index,

@@ -1,4 +1,4 @@
-"""From a case to its nonlinear program.
+"""The nonlinear programs of a case.
 
 The objective is F, the sum over the rows of the Jacobian of the squared reciprocal product with the task's twist
 (equations 5 and 14); :mod:`screwsynth.models.instance` writes it. Several tasks become one program in two ways: the
@@ -22,7 +22,7 @@ from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from .assembly import assemble
-from .epigraph import total_over_poses, worst_pose
+from .epigraph import formulate_worst_pose, total_over_poses
 from .layout import lay_out
 from .nlp import Nlp
 from .places import Scalar
@@ -42,15 +42,17 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     layout = lay_out(case, [case.tasks[task]])
     sense = case.tasks[task].sense
     if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
-        return worst_pose(layout, sense)
+        return formulate_worst_pose(layout, sense)
     return assemble(layout, total_over_poses([robot.F[0] for robot in layout.robots], case.over_poses), sense)
 
 
 def formulate_each(case: Case) -> list[Nlp]:
-    """Return the programs of all tasks of a case: one program, with each task's twist and sense.
+    """Return the programs of all tasks of a case.
+
+    They share their symbols: the programs differ by twist and sense alone.
 
     Raises:
-        CaseError: as for :func:`formulate`.
+        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
     """
     first = formulate(case)
     (twist,) = first.program.places.twists
@@ -65,12 +67,15 @@ def formulate_each(case: Case) -> list[Nlp]:
 def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
     """Return the program of the weighted sum of the tasks' objectives.
 
-    With one sense for all tasks it is that sense's optimum of ``sum w_j F_j``. With both, it is the maximum of the same
-    sum in which the tasks to be minimised count negatively.
+    Where all tasks have one sense, the objective is ``sum w_j F_j`` with that sense. Where both senses occur, the sum
+    is maximised, and the tasks to be minimised have negative signs in it.
 
     Args:
         case: a case with several tasks.
         weights: one for each task.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
     """
     layout = lay_out(case, case.tasks)
     F = total_over_poses([robot.F for robot in layout.robots], case.over_poses)
@@ -85,7 +90,7 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
 
 
 def proximity_program(program: Program) -> Program:
-    """Return a program whose objective also rewards nearness to a point; see :func:`with_proximity_term`."""
+    """Return a program with a cost on the squared distance from a point; see :func:`with_proximity_term`."""
     n = len(program.variables)
     t, scale, cost = SX.sym("target", n), SX.sym("scale", n), SX.sym("cost")
     return replace(
@@ -97,16 +102,16 @@ def proximity_program(program: Program) -> Program:
 
 
 def with_proximity_term(nlp: Nlp, extended: Program, target: FloatArray, strength: float) -> Nlp:
-    """Put numbers into a program whose objective also rewards nearness to a point.
+    """Return a program with a cost on the squared distance from a point added to its objective.
 
-    Where the optima of the original form a set, the optimum of this program tends to the set's nearest point as the
-    strength tends to zero (distances in half ranges).
+    Where the optima of the original program form a set, the optimum of the new program tends to the point of that set
+    nearest to the target as the strength tends to zero. Distances are in half ranges of the variables.
 
     Args:
-        nlp: the original.
+        nlp: the original program.
         extended: :func:`proximity_program` of the original's program, built once for all points and strengths.
         target: (n,) the point.
-        strength: cost of a distance of 1, in parts of the objective's scale.
+        strength: cost of a distance of 1, as a multiple of the objective's scale.
     """
     values = [*nlp.arguments, *target, *nlp.scale, nlp.sign * strength * nlp.objective_scale]
     return replace(nlp, program=extended, arguments=frozen_vector(values))

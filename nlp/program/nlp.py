@@ -1,4 +1,4 @@
-"""The nonlinear program with its numbers: bounds, arguments, scale and the sides of every constraint."""
+"""The nonlinear program with its numbers: bounds, arguments, scale and the sides of bounds and constraints."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Multiples of the golden section, modulo 1, spread evenly.
+#: Golden section: its multiples modulo 1 are spread evenly over the unit interval.
 _GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a bound or constraint.
+    """One side of a variable's bounds or of a constraint.
 
     Attributes:
-        name: the variable or constraint.
-        bound: which side of it.
+        name: name of the variable or constraint.
+        bound: ``min`` or ``max``; ``equal`` for an equation, which has one side.
         variable: index of the variable, or None for a constraint.
         constraint: index of the constraint, or None for a variable's bound.
     """
@@ -41,14 +41,15 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Every side of a program, variables' bounds first, and what arithmetic over all of them needs.
+    """All sides of a program as arrays: those of the variables' bounds, then those of the constraints.
 
     Attributes:
-        sides: the sides.
-        place: (k,) index of each side's expression among the variables and then the constraints.
-        sign: (k,) direction, along that expression, that leaves the feasible side; +1 for an equation.
-        limit: (k,) limit of each side, in the program's terms.
-        equal: (k,) whether it is an equation.
+        sides: the k sides.
+        place: (k,) index of each side's expression among the variables, followed by the constraints.
+        sign: (k,) -1 for a lower and +1 for an upper side: the sign of a change of the expression that leaves the
+            feasible side; +1 for an equation.
+        limit: (k,) bound of each side, in the units of its expression.
+        equal: (k,) whether the side is an equation.
     """
 
     sides: tuple[Side, ...]
@@ -60,18 +61,19 @@ class Sides:
 
 @dataclass(frozen=True, eq=False)
 class Nlp:
-    """A program with its numbers: what every solver, certificate and report reads.
+    """A program with its numbers, on which every solver, certificate and report is based.
 
     Attributes:
         program: the symbols.
-        case: where the numbers come from, for names and units.
+        case: the case of the program, for names and units.
         sense: whether the objective is maximised or minimised.
         arguments: (k,) values of the program's arguments.
         lower, upper: (n,) bounds of the variables, ``lower < upper``.
         start: (n,) first starting point.
-        g_lower, g_upper: (c,) bounds of the constraints, infinite where there is none, equal for an equation.
-        met: limits of the case that do not depend on ``x`` and hold, and so are no constraints of the program.
-        size: size of the objective, where it is not made of the robot's F.
+        g_lower, g_upper: (c,) lower and upper sides of the constraints: infinite where there is none, equal for an
+            equation.
+        met: limits of the case that do not depend on ``x`` and hold, and so are not constraints of the program.
+        size: positive size of the objective, where the objective does not consist of the robot's F.
     """
 
     program: Program
@@ -93,7 +95,7 @@ class Nlp:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """(n,) half of each variable's range: a step of 1 in scaled variables goes from the middle to a bound."""
+        """(n,) half of each variable's range, so that scaled variables run from -1 to 1 between the bounds."""
         return (self.upper - self.lower) / 2
 
     @property
@@ -103,12 +105,12 @@ class Nlp:
 
     @property
     def sign(self) -> float:
-        """What makes the objective one to be minimised: -1 for a maximum."""
+        """Factor that turns the objective into one to be minimised: -1 for a maximum, 1 for a minimum."""
         return -1.0 if self.sense is Sense.MAX else 1.0
 
     @cached_property
     def sides(self) -> Sides:
-        """Every side of every bound and constraint."""
+        """All sides of the variables' bounds and of the constraints."""
         sides: list[Side] = []
         limits: list[float] = []
         for index, variable in enumerate(self.program.variables):
@@ -134,16 +136,16 @@ class Nlp:
         )
 
     def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """Objective and constraints, (c,), at a point (n,)."""
+        """Return the objective and the constraints (c,) at a point (n,)."""
         F, g = self.program.kernels.values(x, self.arguments)
         return float(F[0, 0]), g.ravel()
 
     @cached_property
     def objective_scale(self) -> float:
-        """Size of the objective without cancellation, at the first starting point: positive, unlike F near 0.
+        """Size of the objective without cancellation at the first starting point: positive also where F is 0.
 
-        Where the robot is not defined there, as with limbs of zero length, it is taken at the first of a few points
-        around the middle where it is.
+        Where the robot is not defined at that point, as with limbs of zero length, the size is evaluated at the first
+        of a few points around the middle of the box at which the robot is defined; 1 where there is none.
         """
         if self.size is not None:
             return self.size

@@ -1,7 +1,7 @@
-"""Where a program's numbers stand: among the variables ``x``, or among the arguments ``p``.
+"""Typed places of a program's numbers: indices among the variables ``x`` or among the arguments ``p``.
 
-A symbol is found by a typed place and never by the text of its name. Names are for people alone, so a robot may call
-its parameters what it likes.
+The package finds a symbol by its typed place and never by the text of its name. Names are for people alone, so a robot
+may give its parameters any names.
 """
 
 from __future__ import annotations
@@ -20,7 +20,12 @@ from ..case.pose import Free, Value
 
 @dataclass(frozen=True)
 class Scalar:
-    """A named scalar of a program: a free variable or an argument that a case fixes."""
+    """A named scalar of a program: a free variable or an argument that a case fixes.
+
+    Attributes:
+        name: for people.
+        dimension: length, angle (radians) or plain number.
+    """
 
     name: str
     dimension: Dimension
@@ -36,10 +41,10 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class FreeRotation:
-    """A rotation with a free axis.
+    """Places of a rotation with a free axis.
 
     Attributes:
-        q: indices in ``x`` of the vector part of the unit quaternion.
+        q: indices in ``x`` of the vector part ``q`` of the unit quaternion.
         ball: the constraint on ``|q|^2``.
     """
 
@@ -49,7 +54,7 @@ class FreeRotation:
 
 @dataclass(frozen=True)
 class HeldRotation:
-    """A rotation with a held axis.
+    """Place of a rotation whose axis is held fixed.
 
     Attributes:
         angle: place of the angle, radians.
@@ -58,19 +63,19 @@ class HeldRotation:
     angle: Place
 
 
-#: None stands for no rotation at all: a free axis with an angle of zero.
+#: None stands for no rotation: a free axis with an angle of zero.
 RotationPlaces: TypeAlias = FreeRotation | HeldRotation | None
 
 
 @dataclass(frozen=True, eq=False)
 class Epigraph:
-    """The epigraph of a worst case: a variable that bounds several objectives.
+    """Places of the epigraph of a worst case: a variable that bounds several objectives.
 
     Attributes:
-        level: index in ``x`` of the epigraph variable; the last one.
+        level: index in ``x`` of the epigraph variable, which is the last variable.
         ceiling: index in ``p`` of the size by which the constraints are divided.
         constraints: one for each objective.
-        best: indices in ``p`` of each task's own optimum; empty over poses.
+        best: indices in ``p`` of each task's own optimum; empty for a worst pose.
     """
 
     level: int
@@ -81,15 +86,15 @@ class Epigraph:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where a program's numbers stand.
+    """Places of a program's numbers.
 
     Attributes:
-        numbers: the case's own numbers, in the order of :attr:`~..case.case.Case.scalars`.
-        rotations: of each stated pose.
+        numbers: places of the case's own numbers, in the order of :attr:`screwsynth.nlp.case.case.Case.scalars`.
+        rotations: places of the rotation of each stated pose.
         unknowns: indices in ``x`` of the robot's internal unknowns, at each pose.
-        twists: indices in ``p`` of each task's six numbers.
-        directions: indices in ``x`` of the three components of each unit vector that is wholly free.
-        epigraph: of a worst case; None where the objective is made of F itself.
+        twists: indices in ``p`` of the six numbers of each task's twist.
+        directions: indices in ``x`` of the three components of each unit vector with three free components.
+        epigraph: places of the epigraph of a worst case; None where the objective consists of F itself.
     """
 
     numbers: tuple[Place, ...]
@@ -100,8 +105,8 @@ class Places:
     epigraph: Epigraph | None = None
 
 
-class Placed(NamedTuple):
-    """Symbols of several numbers, (n, 1), and where each stands."""
+class PlacedSymbols(NamedTuple):
+    """Symbols of n numbers, (n, 1), and the place of each number."""
 
     symbols: SX
     places: tuple[Place, ...]
@@ -109,7 +114,16 @@ class Placed(NamedTuple):
 
 @dataclass
 class SymbolTable:
-    """The symbols of a program under construction: free variables and fixed arguments, in the order they are added."""
+    """The symbols of a program under construction: free variables and fixed arguments, in the order of addition.
+
+    Attributes:
+        variables: names of the free variables.
+        x: symbols of the free variables.
+        bounds: bounds and start of each free variable.
+        arguments: names of the fixed arguments.
+        p: symbols of the fixed arguments.
+        values: value of each fixed argument.
+    """
 
     variables: list[Scalar] = field(default_factory=list)
     x: list[SX] = field(default_factory=list)
@@ -119,10 +133,18 @@ class SymbolTable:
     values: list[float] = field(default_factory=list)
     _names: set[str] = field(default_factory=set)
 
-    def add(self, name: str, dimension: Dimension, value: Value) -> Placed:
+    def add(self, name: str, dimension: Dimension, value: Value) -> PlacedSymbols:
         """Add a number, as a variable where it is free and as an argument where it is fixed.
 
-        A name that an earlier number has is shown with ``program.`` before it.
+        A name that an earlier number already has gets the prefix ``program.``.
+
+        Args:
+            name: for people.
+            dimension: length, angle (radians) or plain number.
+            value: the number, or its bounds.
+
+        Returns:
+            The symbol (1, 1) and its place.
         """
         name = f"program.{name}" if name in self._names else name
         self._names.add(name)
@@ -131,19 +153,23 @@ class SymbolTable:
             self.variables.append(scalar)
             self.x.append(symbol)
             self.bounds.append(value)
-            return Placed(symbol, (Place("x", len(self.x) - 1),))
+            return PlacedSymbols(symbol, (Place("x", len(self.x) - 1),))
         self.arguments.append(scalar)
         self.p.append(symbol)
         self.values.append(value)
-        return Placed(symbol, (Place("p", len(self.p) - 1),))
+        return PlacedSymbols(symbol, (Place("p", len(self.p) - 1),))
 
-    def add_each(self, names: Sequence[str], dimension: Dimension, values: Sequence[Value]) -> Placed:
-        """Add several numbers by their names."""
+    def add_each(self, names: Sequence[str], dimension: Dimension, values: Sequence[Value]) -> PlacedSymbols:
+        """Add several numbers with the given names, and return their symbols (n, 1) and places."""
         added = [self.add(name, dimension, value) for name, value in zip(names, values, strict=True)]
-        return Placed(ca.vertcat(SX(0, 1), *[each.symbols for each in added]), tuple(each.places[0] for each in added))
+        symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in added])
+        return PlacedSymbols(symbols, tuple(each.places[0] for each in added))
 
-    def add_vector(self, name: str, dimension: Dimension, values: Sequence[Value]) -> Placed:
-        """Add the components of a vector: ``name_x, name_y, name_z``, or ``name_0`` and so on beyond three."""
+    def add_vector(self, name: str, dimension: Dimension, values: Sequence[Value]) -> PlacedSymbols:
+        """Add the components of a vector, and return their symbols (n, 1) and places.
+
+        Their names are ``name_x, name_y, name_z``; with more than three components ``name_0, name_1`` and so on.
+        """
         names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
         return self.add_each(names, dimension, values)
 

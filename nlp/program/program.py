@@ -1,8 +1,8 @@
-"""The nonlinear program: a :class:`Program` of symbols, and an :class:`Nlp` that gives it numbers.
+"""The symbols and compiled functions of a nonlinear program; its numbers are in :class:`~.nlp.Nlp`.
 
-A program is built for a *structure*, which is a robot and the choice of what is free. Everything a case fixes
-(dimensions, pose, twist) is an argument, so one program can serve every start, every task and every point of a sweep.
-Variables are in the units of the case (radians for angles); :attr:`Nlp.scale` brings them to order 1.
+A program belongs to a *structure*: a robot with a choice of free numbers. Every number that a case fixes (dimensions,
+pose, twist) is an argument, so one program serves every start, every task and every point of a sweep. Variables are in
+the units of the case (radians for angles); division by :attr:`Nlp.scale` makes them of order 1.
 """
 
 from __future__ import annotations
@@ -16,22 +16,19 @@ from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance
 from ..case.limits.constraint import Constraint
-from .kernel import Kernel, the_only
+from .kernel import Kernel, single_output
 from .places import Places, Scalar
-
-#: Places of three results among those of :meth:`Program.robot_state`.
-OBJECTIVE, SQUARES, MAGNITUDE = 5, 6, 7
 
 
 class Values(NamedTuple):
-    """Objective (1, 1) and constraints (c, 1)."""
+    """Objective F (1, 1) and constraints g (c, 1)."""
 
     F: FloatArray
     g: FloatArray
 
 
 class Derivatives(NamedTuple):
-    """Objective (1, 1), its gradient (1, n), constraints (c, 1) and their Jacobian (c, n)."""
+    """Objective F (1, 1), its gradient (1, n), constraints g (c, 1) and their Jacobian (c, n)."""
 
     F: FloatArray
     gradient: FloatArray
@@ -40,14 +37,26 @@ class Derivatives(NamedTuple):
 
 
 class ArgumentDerivatives(NamedTuple):
-    """Gradient (1, k) of the objective and Jacobian (c, k) of the constraints by the arguments."""
+    """Gradient (1, k) of the objective and Jacobian (c, k) of the constraints with respect to the arguments."""
 
     gradient: FloatArray
     jacobian: FloatArray
 
 
 class RobotNumbers(NamedTuple):
-    """The numbers of a :class:`~screwsynth.models.RobotInstance`: parameters (k, 1), rates (m, tasks) and so on."""
+    """The numbers of a :class:`~screwsynth.models.RobotInstance` at one pose.
+
+    Attributes:
+        parameters: (k, 1) components of all parameters, radians for angles.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        position: (3, 1) ``p``, length.
+        jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
+        rates: (m, tasks) work rates.
+        F: (tasks, 1) objective of each task.
+        squares: (m, 1) squared length of each row's direction.
+        magnitude: (tasks, 1) F without cancellation.
+        quantities: (n, 1) values of each of the model's quantities, radians for angles.
+    """
 
     parameters: FloatArray
     rotation: FloatArray
@@ -71,15 +80,15 @@ class Program:
     """A nonlinear program without its numbers.
 
     Attributes:
-        variables: what is free, in the order of ``x``.
-        arguments: what is fixed, in the order of ``p``.
+        variables: the free numbers, in the order of ``x``.
+        arguments: the fixed numbers, in the order of ``p``.
         x: (n, 1) symbols of the free variables.
         p: (k, 1) symbols of the arguments.
         objective: (1, 1) expression that is maximised or minimised.
-        constraints: beside the variables' bounds.
+        constraints: constraints in addition to the variables' bounds.
         robots: the robot's expressions at each pose.
         model: the robot itself.
-        places: where the case's numbers, rotations, unknowns, twists and directions stand.
+        places: places of the case's numbers, rotations, unknowns, twists, directions and epigraph.
     """
 
     variables: tuple[Scalar, ...]
@@ -104,12 +113,12 @@ class Program:
 
     @cached_property
     def values(self) -> ca.Function:
-        """``(x, p) -> (F, g)``."""
+        """``(x, p) -> (F, g)``, as :class:`Values`."""
         return ca.Function("values", [self.x, self.p], [ca.densify(self.objective), ca.densify(self.g)])
 
     @cached_property
     def derivatives(self) -> ca.Function:
-        """``(x, p) -> (F, dF/dx as a row, g, dg/dx)``."""
+        """``(x, p) -> (F, dF/dx as a row, g, dg/dx)``, as :class:`Derivatives`."""
         outputs = [self.objective, ca.jacobian(self.objective, self.x), self.g, ca.jacobian(self.g, self.x)]
         return ca.Function("derivatives", [self.x, self.p], [ca.densify(output) for output in outputs])
 
@@ -123,12 +132,12 @@ class Program:
 
     @cached_property
     def argument_derivatives(self) -> ca.Function:
-        """``(x, p) -> (dF/dp as a row, dg/dp)``."""
+        """``(x, p) -> (dF/dp as a row, dg/dp)``, as :class:`ArgumentDerivatives`."""
         outputs = [ca.jacobian(self.objective, self.p), ca.jacobian(self.g, self.p)]
         return ca.Function("argument_derivatives", [self.x, self.p], [ca.densify(output) for output in outputs])
 
     def robot_state(self, pose: int = 0) -> ca.Function:
-        """``(x, p) ->`` every number of :class:`RobotInstance`, in its order, at one of the poses."""
+        """Return the function ``(x, p) -> RobotNumbers`` at one of the poses; its last outputs are the quantities."""
         robot = self.robots[pose]
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
         outputs += [robot.squares, robot.magnitude, *robot.quantities]
@@ -136,12 +145,12 @@ class Program:
 
     @cached_property
     def kernels(self) -> Kernels:
-        """The functions on NumPy arrays."""
+        """The functions as kernels, with NumPy arrays as arguments and results."""
         return Kernels(self)
 
 
 class Kernels:
-    """A program's functions on NumPy arrays, each made when it is first used.
+    """A program's functions as kernels on NumPy arrays, each made at its first use.
 
     Arguments and results are those of the properties of the same names of :class:`Program`.
     """
@@ -151,31 +160,31 @@ class Kernels:
 
     @cached_property
     def values(self) -> Kernel[Values]:
-        """Objective and constraints."""
+        """``(x, p)`` to objective and constraints."""
         return Kernel(self._program.values, Values)
 
     @cached_property
     def derivatives(self) -> Kernel[Derivatives]:
-        """Objective and constraints with first derivatives."""
+        """``(x, p)`` to objective and constraints with their first derivatives."""
         return Kernel(self._program.derivatives, Derivatives)
 
     @cached_property
     def hessian(self) -> Kernel[FloatArray]:
-        """Hessian of the Lagrangian."""
-        return Kernel(self._program.hessian, the_only)
+        """``(x, p, weight, multipliers)`` to the Hessian of the Lagrangian, (n, n)."""
+        return Kernel(self._program.hessian, single_output)
 
     @cached_property
     def argument_derivatives(self) -> Kernel[ArgumentDerivatives]:
-        """Derivatives by what is fixed."""
+        """``(x, p)`` to the derivatives of objective and constraints with respect to the arguments."""
         return Kernel(self._program.argument_derivatives, ArgumentDerivatives)
 
     @cached_property
     def robot_state(self) -> Kernel[RobotNumbers]:
-        """The robot's expressions, at the first pose."""
+        """``(x, p)`` to the robot's numbers at the first pose."""
         return self.robot_states[0]
 
     @cached_property
     def robot_states(self) -> tuple[Kernel[RobotNumbers], ...]:
-        """The robot's expressions at each pose."""
+        """``(x, p)`` to the robot's numbers, one kernel for each pose."""
         poses = range(len(self._program.robots))
         return tuple(Kernel(self._program.robot_state(pose), RobotNumbers.from_outputs) for pose in poses)

@@ -1,8 +1,9 @@
 """The smallest relaxation that makes an infeasible case feasible, as a program.
 
-Every number that limits the case gets an unknown ``t >= 0``, by which part of itself it is moved outwards (by how many
-units, where it is 0), at every leg, joint and pose at once. The sum of all t is made least. A sum, unlike a sum of
-squares, moves few numbers and leaves the others alone, so that it says which limits are in each other's way.
+The number of every limit gets a variable ``t >= 0``, by which it is relaxed at every leg, joint and pose at once: ``t``
+is a part of the number itself, or of one unit where the number is 0. The program minimises the sum of all t. A sum,
+unlike a sum of squares, relaxes few numbers and leaves the others unchanged, so that its optimum shows which limits
+contradict each other.
 """
 
 from __future__ import annotations
@@ -21,23 +22,25 @@ from .nlp import Nlp
 from .places import Scalar
 from .sampling import starting_points
 
-#: A number is moved when it is moved by more than this part of itself.
-MOVED = 1e-6
-#: Points at which it is looked how far each number would have to go, and how much farther it may.
-_PROBES, _ROOM = 32, 2.0
-#: No number is moved by more than this many times itself.
-_FARTHEST = 1e3
+#: Relaxation above which a limit counts as relaxed, as a part of the limit's number.
+RELAXED = 1e-6
+#: Number of points at which the necessary relaxation of each limit is evaluated for the upper bound of t.
+_BOUND_POINTS = 32
+#: Upper bound of t, as a multiple of the largest of these necessary relaxations.
+_BOUND_FACTOR = 2.0
+#: Largest relaxation of a limit, as a multiple of the limit's number.
+_LARGEST_RELAXATION = 1e3
 
 
 @dataclass(frozen=True)
-class Relaxed:
-    """A limit's number that has to be moved.
+class RelaxedLimit:
+    """A limit whose number must change to make the case feasible.
 
     Attributes:
         key: dotted key, below ``limits``, of the number.
         limit: the number in the case, radians for angles.
-        needed: what it must be at least, or at most, beside the others that are moved.
-        dimension: what both measure.
+        needed: the nearest number with which the case is feasible, together with the other relaxed limits.
+        dimension: length, angle (radians) or plain number, of both.
     """
 
     key: str
@@ -47,8 +50,16 @@ class Relaxed:
 
 
 @dataclass(frozen=True)
-class _MovableSide:
-    """One side of a constraint whose limit may be moved: outwards is ``direction``."""
+class _RelaxableSide:
+    """One side of a constraint that belongs to a limit.
+
+    Attributes:
+        key: dotted key, below ``limits``, of the limit's number.
+        constraint: the constraint.
+        place: index of the constraint in the program.
+        limit: the side, in units of the constraint's expression.
+        direction: sign of a relaxation: -1 for a lower side, +1 for an upper one.
+    """
 
     key: str
     constraint: Constraint
@@ -58,46 +69,55 @@ class _MovableSide:
 
     @property
     def number(self) -> float:
+        """The limit's number, radians for angles."""
         return self.constraint.reading.from_value(self.limit)
 
     @property
     def unit(self) -> float:
+        """Change of the number by a relaxation of 1: its size, or one unit where it is 0."""
         return abs(self.number) or 1.0
 
-    def missing(self, value: float) -> float:
-        """By how many units the number would have to be moved for a value of the expression."""
+    def necessary_relaxation(self, value: float) -> float:
+        """Return the smallest relaxation t >= 0 with which a value of the expression is feasible."""
         return max(0.0, self.direction * (self.constraint.reading.from_value(value) - self.number) / self.unit)
 
 
-def _rows(nlp: Nlp) -> list[_MovableSide]:
-    rows = []
+def _relaxable_sides(nlp: Nlp) -> list[_RelaxableSide]:
+    """Return the sides of a program that belong to limits of its case."""
+    sides = []
     bounds = zip(nlp.program.constraints, nlp.g_lower, nlp.g_upper, strict=True)
     for place, (constraint, lower, upper) in enumerate(bounds):
         low, high = constraint.keys
         if low:
-            rows.append(_MovableSide(low, constraint, place, float(lower), -1.0))
+            sides.append(_RelaxableSide(low, constraint, place, float(lower), -1.0))
         if high:
-            rows.append(_MovableSide(high, constraint, place, float(upper), 1.0))
-    return rows
+            sides.append(_RelaxableSide(high, constraint, place, float(upper), 1.0))
+    return sides
 
 
-def elastic(nlp: Nlp) -> Nlp:
-    """The program whose optimum is the smallest relaxation; its last variables are the t of :func:`_keys`."""
-    program, rows = nlp.program, _rows(nlp)
-    keys = _keys(rows)
+def formulate_relaxation(nlp: Nlp) -> Nlp:
+    """Return the program whose optimum is the smallest relaxation of a program's limits.
+
+    Its last variables are the t of the limits' numbers, in the order of the program's constraints.
+
+    Args:
+        nlp: a program with limits.
+    """
+    program, sides = nlp.program, _relaxable_sides(nlp)
+    keys = _keys(sides)
     t = SX.sym("t", len(keys))
-    most = _farthest(nlp, rows, keys)
-    kept = [k for k, constraint in enumerate(program.constraints) if not any(constraint.keys)]
-    constraints = [program.constraints[k] for k in kept]
-    lower, upper = [nlp.g_lower[k] for k in kept], [nlp.g_upper[k] for k in kept]
-    for row in rows:
-        number = row.number + row.direction * row.unit * t[keys.index(row.key)]
-        room = row.constraint.expression - row.constraint.reading.to_value(number)
-        own = (row.key, "") if row.direction < 0 else ("", row.key)
-        constraints.append(replace(row.constraint, expression=room, reading=Reading(Dimension.NUMBER), keys=own))
-        lower.append(0.0 if row.direction < 0 else -np.inf)
-        upper.append(np.inf if row.direction < 0 else 0.0)
-    stretched = replace(
+    largest = _upper_bounds(nlp, sides, keys)
+    unchanged = [k for k, constraint in enumerate(program.constraints) if not any(constraint.keys)]
+    constraints = [program.constraints[k] for k in unchanged]
+    lower, upper = [nlp.g_lower[k] for k in unchanged], [nlp.g_upper[k] for k in unchanged]
+    for side in sides:
+        number = side.number + side.direction * side.unit * t[keys.index(side.key)]
+        slack = side.constraint.expression - side.constraint.reading.to_value(number)
+        own = (side.key, "") if side.direction < 0 else ("", side.key)
+        constraints.append(replace(side.constraint, expression=slack, reading=Reading(Dimension.NUMBER), keys=own))
+        lower.append(0.0 if side.direction < 0 else -np.inf)
+        upper.append(np.inf if side.direction < 0 else 0.0)
+    relaxation = replace(
         program,
         variables=(*program.variables, *(Scalar(f"relaxation of {key}", Dimension.NUMBER) for key in keys)),
         x=ca.vertcat(program.x, t),
@@ -106,58 +126,76 @@ def elastic(nlp: Nlp) -> Nlp:
     )
     return replace(
         nlp,
-        program=stretched,
+        program=relaxation,
         sense=Sense.MIN,
         lower=frozen_vector([*nlp.lower, *np.zeros(len(keys))]),
-        upper=frozen_vector([*nlp.upper, *most]),
-        start=frozen_vector([*nlp.start, *most]),
+        upper=frozen_vector([*nlp.upper, *largest]),
+        start=frozen_vector([*nlp.start, *largest]),
         g_lower=frozen_vector(lower),
         g_upper=frozen_vector(upper),
         size=1.0,
     )
 
 
-def stretched_point(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """A point (n,) of a program with the t that it needs, as a point of :func:`elastic`'s program."""
-    rows = _rows(nlp)
-    return np.append(x, _missing(nlp, rows, _keys(rows), x))
+def relaxation_point(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """Return a point of :func:`formulate_relaxation`'s program: a point of the original with the t that it requires.
+
+    Args:
+        nlp: the original program.
+        x: (n,) a point of the original program.
+
+    Returns:
+        (n + k,) array with a t for each of the k numbers.
+    """
+    sides = _relaxable_sides(nlp)
+    return np.append(x, _necessary_relaxations(nlp, sides, _keys(sides), x))
 
 
-def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[Relaxed, ...]:
-    """What is moved at a point of :func:`elastic`'s program, in the order of the case's limits."""
-    rows = _rows(nlp)
-    moved = []
-    for key, t in zip(_keys(rows), x[nlp.n :], strict=True):
-        row = next(each for each in rows if each.key == key)
-        if t > MOVED:
-            needed = row.number + row.direction * row.unit * float(t)
-            moved.append(Relaxed(key, row.number, needed, row.constraint.reading.dimension))
-    return tuple(moved)
+def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[RelaxedLimit, ...]:
+    """Return the limits that are relaxed at a point of :func:`formulate_relaxation`'s program.
+
+    Args:
+        nlp: the original program.
+        x: (n + k,) a point of the relaxation's program.
+
+    Returns:
+        The relaxed limits, in the order of the original program's constraints.
+    """
+    sides = _relaxable_sides(nlp)
+    relaxed = []
+    for key, t in zip(_keys(sides), x[nlp.n :], strict=True):
+        side = next(each for each in sides if each.key == key)
+        if t > RELAXED:
+            needed = side.number + side.direction * side.unit * float(t)
+            relaxed.append(RelaxedLimit(key, side.number, needed, side.constraint.reading.dimension))
+    return tuple(relaxed)
 
 
-def _keys(rows: Sequence[_MovableSide]) -> list[str]:
-    return list(dict.fromkeys(row.key for row in rows))
+def _keys(sides: Sequence[_RelaxableSide]) -> list[str]:
+    """Return the key of each limit's number once, in the order of the sides."""
+    return list(dict.fromkeys(side.key for side in sides))
 
 
-def _missing(nlp: Nlp, rows: Sequence[_MovableSide], keys: Sequence[str], x: FloatArray) -> FloatArray:
+def _necessary_relaxations(nlp: Nlp, sides: Sequence[_RelaxableSide], keys: Sequence[str], x: FloatArray) -> FloatArray:
+    """Return the smallest t (k,) with which a point (n,) is feasible, at most :data:`_LARGEST_RELAXATION`."""
     g = nlp.evaluate(x)[1]
     needed = np.zeros(len(keys))
-    for row in rows:
-        value = float(g[row.place])
-        missing = row.missing(value) if np.isfinite(value) else 0.0
-        needed[keys.index(row.key)] = max(needed[keys.index(row.key)], min(missing, _FARTHEST))
+    for side in sides:
+        value = float(g[side.place])
+        t = side.necessary_relaxation(value) if np.isfinite(value) else 0.0
+        needed[keys.index(side.key)] = max(needed[keys.index(side.key)], min(t, _LARGEST_RELAXATION))
     return needed
 
 
-def _farthest(nlp: Nlp, rows: Sequence[_MovableSide], keys: Sequence[str]) -> FloatArray:
-    """(k,) how far each t may go: farther than it must at a few points of the box, and not through zero."""
-    points = starting_points(nlp, _PROBES, 0)
-    most = _ROOM * np.max([_missing(nlp, rows, keys, x) for x in points], axis=0)
+def _upper_bounds(nlp: Nlp, sides: Sequence[_RelaxableSide], keys: Sequence[str]) -> FloatArray:
+    """Return upper bounds of t (k,): above the necessary relaxations at a few points, without a change of sign."""
+    points = starting_points(nlp, _BOUND_POINTS, 0)
+    largest = _BOUND_FACTOR * np.max([_necessary_relaxations(nlp, sides, keys, x) for x in points], axis=0)
     for k, key in enumerate(keys):
-        row = next(each for each in rows if each.key == key)
-        reading = row.constraint.reading
-        # A limit that is squared, say, cannot be moved below zero.
+        side = next(each for each in sides if each.key == key)
+        reading = side.constraint.reading
+        # A number whose square is the limit in the program, for example, cannot be relaxed below zero.
         one_sided = reading.from_value(float(reading.to_value(SX(-1.0)))) >= 0
-        if row.direction < 0 and one_sided:
-            most[k] = min(most[k], 1.0)
-    return np.asarray(np.maximum(most, 1e-3), dtype=np.float64)
+        if side.direction < 0 and one_sided:
+            largest[k] = min(largest[k], 1.0)
+    return np.asarray(np.maximum(largest, 1e-3), dtype=np.float64)

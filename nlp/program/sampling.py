@@ -1,4 +1,4 @@
-"""Starting points: the user's first, then a Latin hypercube; uniform on spheres and in the rotation's ball."""
+"""Starting points: the case's own, then a Latin hypercube; uniform on unit spheres and in the balls of rotations."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .places import FreeRotation
 
 
 def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
-    """Starting points inside the bounds, and inside the rotation's ball.
+    """Return starting points inside the bounds of the variables and inside the balls of the rotations.
 
-    The generator is Python's own: importing NumPy's takes longer than a solve's sampling ever does.
+    The generator is Python's own: the import of NumPy's takes longer than the sampling of a solve.
 
     Args:
         nlp: the program.
-        count: how many, at least 1.
-        seed: of the generator; the same seed gives the same points.
+        count: number of points, at least 1.
+        seed: seed of the generator; the same seed gives the same points.
 
     Returns:
         (count, n) array; the first row is the case's own start.
@@ -31,19 +31,20 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
         column[:] = [(stratum + generator.random()) / (count - 1) for stratum in strata]
     points = nlp.lower + unit * (nlp.upper - nlp.lower)
     for triple in nlp.program.places.directions:
-        points[:, triple] = _sphere(generator, count - 1)
+        points[:, triple] = _sphere_points(generator, count - 1)
     for rotation in nlp.program.places.rotations:
         if not isinstance(rotation, FreeRotation):
             continue
         ball = nlp.program.constraints.index(rotation.ball)
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
-        # Equal volumes get equal chances: the cube of the radius is uniform. The hypercube's first column spreads it.
+        # The points are uniform in volume, so the cube of the radius is uniform; the hypercube's first column of q
+        # spreads it.
         radii = np.cbrt(inner + unit[:, rotation.q[0]] * (outer - inner))
-        points[:, rotation.q] = radii[:, None] * _sphere(generator, count - 1)
+        points[:, rotation.q] = radii[:, None] * _sphere_points(generator, count - 1)
     return np.vstack([nlp.start, np.clip(points, nlp.lower, nlp.upper)])
 
 
-def _sphere(generator: random.Random, count: int) -> FloatArray:
-    """Directions, uniform on the unit sphere, (count, 3)."""
+def _sphere_points(generator: random.Random, count: int) -> FloatArray:
+    """Return unit vectors (count, 3), uniform on the unit sphere."""
     vectors = np.array([[generator.gauss() for _ in range(3)] for _ in range(count)]).reshape(-1, 3)
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)

@@ -1,58 +1,103 @@
-"""What a result says about building the design, as plain data: margins and costs, relaxations, sensitivities."""
+"""Data about building the design: margins and costs, relaxations, sensitivities."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Sequence
 
 from ...models import FloatArray
-from ..evidence.margins import costs_of, margins_as_data, margins_of
+from ..evidence.margins import Margin, margins_of
 from ..evidence.sensitivity import sensitivities
 from ..evidence.tolerance import tolerance_loss
 from ..program.nlp import Nlp
-from ..solve.multistart import ProgramSolution
-
-#: What stands in a result where the robot is not defined.
-NO_MARGINS: dict[str, Any] = {"margins": [], "limits": []}
-
-
-def margins_in(nlp: Nlp, x: FloatArray, *, optimal: bool) -> dict[str, Any]:
-    """Margins in every limit of the case, and one row for each number of it."""
-    margins = margins_as_data(nlp, margins_of(nlp, x, optimal=optimal))
-    return {"margins": margins, "limits": costs_of(margins)}
+from ..program.relaxation import RelaxedLimit
+from ..units import Units
+from .jsondata import vector
+from .parts import JointGradientData, LimitData, MarginData, RelaxationData, SensitivityData, ToleranceData
+from .point import finite
 
 
-def relaxation_in(solution: ProgramSolution) -> list[dict[str, Any]]:
-    """The numbers of the case that must be moved for it to be feasible, all of these at once."""
-    units = solution.nlp.case.units
-    return [
-        {
-            "key": row.key,
-            "limit": units.shown(row.limit, row.dimension),
-            "needed": units.shown(row.needed, row.dimension),
-            "unit": units.label(row.dimension),
-        }
-        for row in solution.relaxation
-    ]
+def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[MarginData, ...]:
+    """Return the margins of a point (n,) in every limit of the case; their costs too where the point is an optimum."""
+    return tuple(_margin(nlp.case.units, row) for row in margins_of(nlp, x, optimal=optimal))
 
 
-def sensitivity_in(solution: ProgramSolution) -> dict[str, Any]:
-    """What F owes to what is fixed, and what inexact joint centres may cost."""
-    nlp, case = solution.nlp, solution.nlp.case
-    rows = [
-        {
-            "name": row.name,
-            "value": case.units.shown(row.value, row.dimension),
-            "unit": case.units.label(row.dimension),
-            "derivative": row.derivative * case.units.to_internal(1.0, row.dimension),
-        }
-        for row in sensitivities(nlp, solution.x)
-    ]
-    if case.joint_centre_tolerance is None:
-        return {"sensitivity": rows}
-    lost = tolerance_loss(nlp, solution.x, case.joint_centre_tolerance)
-    joints = [
-        {"limb": limb, "plate": plate, "gradient": gradient.tolist()}
-        for (limb, plate), gradient in zip(lost.joints, lost.gradients, strict=True)
-    ]
-    tolerance = {"joint_centre": lost.tolerance, "loss": lost.loss, "loss_there": lost.loss_there, "joints": joints}
-    return {"sensitivity": rows, "tolerance": tolerance}
+def _margin(units: Units, row: Margin) -> MarginData:
+    return MarginData(
+        name=row.name,
+        key=row.key,
+        bound=row.bound,
+        value=finite(units.shown(row.value, row.dimension)),
+        limit=units.shown(row.limit, row.dimension),
+        margin=finite(units.shown(row.margin, row.dimension)),
+        unit=units.label(row.dimension),
+        active=row.active,
+        cost=None if row.cost is None else row.cost * units.to_internal(1.0, row.dimension),
+    )
+
+
+def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
+    """Return one row for each limiting number of the case: its least margin, where it is active, and its whole cost."""
+    keys = dict.fromkeys(row.key for row in margins)
+    return tuple(_limit(key, [row for row in margins if row.key == key]) for key in keys)
+
+
+def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
+    least = min(margins, key=lambda row: -math.inf if row.margin is None else row.margin)
+    costs = [row.cost for row in margins if row.cost is not None]
+    return LimitData(
+        key=key,
+        limit=least.limit,
+        unit=least.unit,
+        nearest=least.name,
+        value=least.value,
+        margin=least.margin,
+        active=tuple(row.name for row in margins if row.active),
+        cost=sum(costs) if costs else None,
+    )
+
+
+def relaxation_data(nlp: Nlp, relaxation: Sequence[RelaxedLimit]) -> tuple[RelaxationData, ...] | None:
+    """Return the numbers of the case that must be moved for it to be feasible, all at once; None without any."""
+    units = nlp.case.units
+    rows = tuple(
+        RelaxationData(
+            key=row.key,
+            limit=units.shown(row.limit, row.dimension),
+            needed=units.shown(row.needed, row.dimension),
+            unit=units.label(row.dimension),
+        )
+        for row in relaxation
+    )
+    return rows or None
+
+
+def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
+    """Return the sensitivities of the optimal F at an optimum (n,) to the numbers that the case fixes."""
+    units = nlp.case.units
+    return tuple(
+        SensitivityData(
+            name=row.name,
+            value=units.shown(row.value, row.dimension),
+            unit=units.label(row.dimension),
+            derivative=row.derivative * units.to_internal(1.0, row.dimension),
+        )
+        for row in sensitivities(nlp, x)
+    )
+
+
+def tolerance_data(nlp: Nlp, x: FloatArray) -> ToleranceData | None:
+    """Return the loss at an optimum (n,) by inexact joint centres; None where the case has no tolerance."""
+    tolerance = nlp.case.joint_centre_tolerance
+    if tolerance is None:
+        return None
+    lost = tolerance_loss(nlp, x, tolerance)
+    return ToleranceData(
+        joint_centre=lost.tolerance,
+        loss=lost.loss,
+        loss_there=lost.loss_there,
+        joints=tuple(
+            JointGradientData(limb=limb, plate=plate, gradient=vector(gradient))
+            for (limb, plate), gradient in zip(lost.joints, lost.gradients, strict=True)
+        ),
+    )

@@ -1,8 +1,8 @@
-"""Cases held to what they must compute, and to what the literature prints.
+"""Cases held to expected and to published values.
 
-Three kinds of value are kept apart: what this program **computes**, what it must compute (**expected**, with a
-tolerance of the case's own), and what the literature prints (**published**). A published number is *reproduced* by one
-of two rules, and no other:
+Three kinds of value are kept apart: those that this program **computes**, those that the case **expects**, with a
+tolerance of its own, and those that the literature prints (**published**). A published number is *reproduced* by one of
+two rules, and no other:
 
 * ``digits``: the computed number is within half a unit of the last printed digit, in every component;
 * ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 from ...models import component_names
 from ..case.case import Case
@@ -25,9 +25,17 @@ from ..case.reader import load_case, shipped_cases
 from ..case.settings import Published, Search
 from ..errors import CaseError, EvaluationError, InputError
 from ..program.formulation import formulate_each
-from ..solve.multistart import Status, solve_program
-from ..solve.solve import solve
-from .data import result_of
+from ..solver.multistart import solve_program
+from ..solver.solve import solve
+from .data import CaseResult, CombinedResult
+from .jsondata import JsonValue, json_data
+from .parts import RobotData
+from .result import result_of
+
+#: A result as JSON's own types.
+JsonData: TypeAlias = dict[str, JsonValue]
+#: Numbers of a case by name, in its file's units.
+Settings: TypeAlias = dict[str, float | list[float]]
 
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
 FLAT = 1e-5
@@ -37,11 +45,11 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class ExpectedCheck:
-    """A computed number beside what it must be."""
+    """A computed number beside the one that the case expects."""
 
     quantity: str
     expected: float | bool | str
-    computed: float | bool | str | None
+    computed: JsonValue
     tolerance: float
     passed: bool
 
@@ -51,9 +59,9 @@ class PublishedCheck:
     """A published number beside the computed one.
 
     Attributes:
-        published: what is printed, and how the case marks it.
+        published: the printed number, and how the case marks it.
         computed: components of the computed number, empty when there is none.
-        reproduced: what the rules find.
+        reproduced: whether a rule finds it reproduced.
         rule: the rule that decided, with its figures.
     """
 
@@ -77,7 +85,7 @@ class PublishedCheck:
 
 @dataclass(frozen=True)
 class CaseCheck:
-    """A case's checks."""
+    """Checks of a case."""
 
     name: str
     title: str
@@ -100,11 +108,11 @@ def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
     Raises:
         InputError: a case, or one that it refers to, cannot be read.
     """
-    solved: dict[str, dict[str, Any]] = {}
+    solved: dict[str, CaseResult] = {}
     return [check_case(name, solved) for name in names or shipped_cases()]
 
 
-def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> CaseCheck:
+def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCheck:
     """Solve a case and check it.
 
     Args:
@@ -118,70 +126,78 @@ def check_case(name: str, solved: dict[str, dict[str, Any]] | None = None) -> Ca
     solved = {} if solved is None else solved
     case = load_case(name)
     result = _solved(name, solved, case)
+    data = json_data(result)
     return CaseCheck(
         name=case.name,
         title=case.title,
-        expected=tuple(_expected(case, result)),
-        published=tuple(_published(name, case, row, result, solved) for row in case.published),
+        expected=tuple(_expected(case, result, data)),
+        published=tuple(_published(name, case, row, result, data, solved) for row in case.published),
         seconds=time.perf_counter() - began,
     )
 
 
-def _solved(name: str, solved: dict[str, dict[str, Any]], case: Case | None = None) -> dict[str, Any]:
-    """Result of a case by name, solved once; the case itself, where it is read already."""
+def _solved(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
+    """Return the result of a case by name, solved once; the case itself, where it is read already."""
     if name not in solved:
         case = case or load_case(name)
         solved[name] = result_of(solve(case))
     return solved[name]
 
 
-def _expected(case: Case, result: Mapping[str, Any]) -> list[ExpectedCheck]:
+def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
     expect = case.expect
-    rows = [ExpectedCheck("status", "an answer", str(result["status"]), 0.0, _is_answer(result))]
+    rows = [ExpectedCheck("status", "an answer", result.status.value, 0.0, result.status.is_answer)]
     if expect.F is not None:
-        F = _lookup(result, "F")
-        off = math.inf if F is None else abs(float(F) - expect.F)
+        F = _number(data, "F")
+        off = math.inf if F is None else abs(F - expect.F)
         rows.append(ExpectedCheck("F", expect.F, F, expect.tolerance, off <= expect.tolerance * (abs(expect.F) or 1.0)))
     if expect.singular is not None:
-        singular = _lookup(result, "singular" if "F" in result else "combined.singular")
+        singular = _lookup(data, "singular" if "F" in data else "combined.singular")
         rows.append(ExpectedCheck("singular", expect.singular, singular, 0.0, singular == expect.singular))
     for row in expect.values:
-        value = _lookup(result, row.quantity)
+        value = _lookup(data, row.quantity)
         near = isinstance(value, float | int) and abs(value - row.value) <= row.within
         rows.append(ExpectedCheck(row.quantity, row.value, value, row.within, near))
     return rows
 
 
-def _is_answer(result: Mapping[str, Any]) -> bool:
-    return Status(result["status"]).is_answer
-
-
-def _lookup(result: Any, path: str) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    """What stands at a dotted path of a result, numbers meaning places in lists; None when nothing does."""
-    found = result
+def _lookup(data: JsonValue, path: str) -> JsonValue:
+    """Return the value at a dotted path of JSON data, numbers being places in lists; None where there is none."""
+    found = data
     for part in path.split("."):
-        if isinstance(found, Mapping):
+        if isinstance(found, dict):
             found = found.get(part)
-        elif isinstance(found, Sequence) and not isinstance(found, str) and part.isdigit() and int(part) < len(found):
+        elif isinstance(found, list) and part.isdigit() and int(part) < len(found):
             found = found[int(part)]
         else:
             return None
     return found
 
 
+def _number(data: JsonValue, path: str) -> float | None:
+    """Return the number at a dotted path of JSON data, or None where there is none."""
+    found = _lookup(data, path)
+    return float(found) if isinstance(found, float | int) else None
+
+
+def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
+    """Return the number, or the list of numbers, at a dotted path of JSON data; nothing where there is neither."""
+    found = _lookup(data, path)
+    parts = found if isinstance(found, list) else [found]
+    numbers = tuple(float(part) for part in parts if isinstance(part, float | int))
+    return numbers if len(numbers) == len(parts) else ()
+
+
 def _published(
-    name: str, case: Case, row: Published, result: Mapping[str, Any], solved: dict[str, dict[str, Any]]
+    name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
 ) -> PublishedCheck:
-    if row.over is not None:
-        over, F = _lookup(_solved(row.over, solved), "F"), _lookup(result, "F")
-        found = 100 * (F - over) / over if F is not None and over else None
+    if row.over is None:
+        computed = _numbers(data, row.quantity)
     else:
-        found = _lookup(result, row.quantity)
-    computed = tuple(float(each) for each in found) if isinstance(found, list) else ()
-    if isinstance(found, float | int):
-        computed = (float(found),)
-    if not _is_answer(result):
-        return PublishedCheck(row, (), False, f"the case has no answer: it is {result['status']}")
+        over, F = _number(json_data(_solved(row.over, solved)), "F"), _number(data, "F")
+        computed = (100 * (F - over) / over,) if F is not None and over else ()
+    if not result.status.is_answer:
+        return PublishedCheck(row, (), False, f"the case has no answer: it is {result.status.value}")
     if len(computed) != len(row.value):
         source = case.source or name
         fault = f"is no number of this result with {len(row.value)} components"
@@ -197,25 +213,25 @@ def _published(
 
 
 def decimals_of(value: float) -> int:
-    """Digits behind the point of the shortest text of a number."""
+    """Return the number of digits behind the point of the shortest text of a number."""
     text = f"{value:.15g}"
     if "e" in text:
         return 15
     return len(text.partition(".")[2])
 
 
-def _flat_difference(name: str, case: Case, row: Published, result: Mapping[str, Any]) -> float | None:
-    """Relative difference of F between the printed point and the best with this argument free.
+def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) -> float | None:
+    """Return the relative difference of F between the printed point and the best with this argument free.
 
     None when the number is no argument of F, or the printed point is no robot.
     """
-    printed: dict[str, Any] = {}
+    printed: Settings = {}
     for each in case.published:
         printed |= _setting(case, each.quantity, each.value)
-    own = _setting(case, row.quantity, row.value)
-    if not own:
+    own, robot = _setting(case, row.quantity, row.value), _robot(result)
+    if not own or robot is None:
         return None
-    settings = {**_own_settings(case, result), **printed}
+    settings = {**_own_settings(case, robot), **printed}
     try:
         at_printed = _objectives(load_case(name, settings))
         best = _objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
@@ -228,8 +244,8 @@ def _flat_difference(name: str, case: Case, row: Published, result: Mapping[str,
     return max(differences)
 
 
-def _setting(case: Case, quantity: str, value: Sequence[float]) -> dict[str, Any]:
-    """An argument of F as settings of the case; empty for anything else."""
+def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
+    """Return an argument of F as settings of the case; nothing for anything else."""
     path = quantity.removeprefix("combined.")
     if path == "pose.position":
         return dict(zip(component_names("p", 3), value, strict=True))
@@ -241,18 +257,26 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> dict[str, Any
     return {}
 
 
-def _own_settings(case: Case, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The computed point as settings of the case."""
-    point = result if "parameters" in result else result["combined"]
-    settings: dict[str, Any] = dict(point["parameters"])
-    settings |= dict(zip(component_names("p", 3), point["pose"]["position"], strict=True))
-    settings["angle"] = point["pose"]["angle"]
-    settings["axis"] = point["pose"]["axis"] if case.axis is None else case.axis.tolist()
+def _robot(result: CaseResult) -> RobotData | None:
+    """Return the robot of an answer, or None where its equations have no value."""
+    if isinstance(result, CombinedResult):
+        return None if result.combined.made is None else result.combined.made.robot
+    return result.robot
+
+
+def _own_settings(case: Case, robot: RobotData) -> Settings:
+    """Return the computed point as settings of the case."""
+    settings: Settings = {
+        name: list(value) if isinstance(value, tuple) else value for name, value in robot.parameters.items()
+    }
+    settings |= dict(zip(component_names("p", 3), robot.pose.position, strict=True))
+    settings["angle"] = robot.pose.angle
+    settings["axis"] = list(robot.pose.axis) if case.axis is None else case.axis.tolist()
     return settings
 
 
 def _objectives(case: Case) -> list[tuple[float, float]]:
-    """Best F of each task over what is still free, and its size without cancellation."""
+    """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):
         solution = solve_program(nlp, Search(starts=_STARTS))

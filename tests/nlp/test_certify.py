@@ -22,6 +22,8 @@ from screwsynth.nlp.certificate.engines import engine_for, kernel
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.results.evidence import certificate_data
+from screwsynth.nlp.results.jsondata import json_data
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 ENGINES = ["numpy", pytest.param("c", marks=needs_kernel)]
@@ -218,8 +220,9 @@ def test_a_box_without_a_value_is_kept(engine: str) -> None:
     assert found.status is CertificateStatus.INCOMPLETE
     assert not math.isfinite(found.bound)
     assert "zero length" in found.reason
-    assert found.as_data()["bound"] is None
-    json.dumps(found.as_data(), allow_nan=False)
+    data = json_data(certificate_data(found))
+    assert data["bound"] is None
+    json.dumps(data, allow_nan=False)
 
 
 def test_nan_in_a_bound_does_not_close_a_box() -> None:
@@ -265,7 +268,7 @@ def test_an_empty_feasible_set_is_a_proof_of_its_own(engine: str) -> None:
     impossible = replace(nlp, g_lower=np.array([0.9]), g_upper=np.array([0.95]))
     found = certify_program(impossible, engine=engine)
     assert found.status is CertificateStatus.INFEASIBLE
-    assert found.as_data()["bound"] is None
+    assert json_data(certificate_data(found))["bound"] is None
 
 
 @pytest.mark.parametrize(("value", "status"), [(1.0, CertificateStatus.PROVED), (300.0, CertificateStatus.REFUSED)])

@@ -15,7 +15,7 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.embedding import codegen
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
 from screwsynth.nlp.program.sampling import starting_points
-from screwsynth.nlp.solve.multistart import solve_program
+from screwsynth.nlp.solver.multistart import solve_program
 
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT = range(4)
 FEASIBLE, STATIONARY = 1e-9, 1e-7

@@ -21,16 +21,32 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from screwsynth.models import Model, hexapod, stewart_gough, three_upu
-from screwsynth.nlp import Case, CaseError, Free, Solution, Status, Task, case_from_tables, result_of
-from screwsynth.nlp.case.limits.limits import Cone, Interval, Limits
+from screwsynth.nlp import (
+    BaseJointAngle,
+    Case,
+    CaseError,
+    Free,
+    JointSpacing,
+    LegClearance,
+    LegLength,
+    Limits,
+    QuantityLimit,
+    Relations,
+    Solution,
+    Status,
+    Task,
+    case_from_tables,
+    json_data,
+    result_of,
+)
 from screwsynth.nlp.case.limits.segments import squared_distance
 from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eigenvalue
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.solve.compromise import solution_of_one_task
-from screwsynth.nlp.solve.multistart import solve_program
-from screwsynth.nlp.solve.starts import StartStatus
+from screwsynth.nlp.solver.compromise import solution_of_one_task
+from screwsynth.nlp.solver.multistart import solve_program
+from screwsynth.nlp.solver.starts import StartStatus
 
 Array = NDArray[np.float64]
 Run = Any
@@ -172,7 +188,7 @@ def test_limits_hold_and_margins_are_what_numpy_measures(name: str) -> None:
     limits = SETS[name]
     solution = solved(case_with(limits))
     assert solution.status is Status.OPTIMAL
-    result = result_of(solution)
+    result = json_data(result_of(solution))
     found = measured(result, limits, limits.get("home"))
     assert result["limits"]
     for row in result["limits"]:
@@ -187,7 +203,7 @@ def test_limits_hold_and_margins_are_what_numpy_measures(name: str) -> None:
 def test_what_a_limit_costs_is_what_moving_it_does(name: str) -> None:
     case = case_with(SETS[name])
     solution = solved(case)
-    for row in result_of(solution)["limits"]:
+    for row in json_data(result_of(solution))["limits"]:
         key = row["key"]
         if not row["active"] or key.startswith("custom"):
             continue
@@ -214,7 +230,7 @@ def with_number(limits: dict[str, Any], key: str, number: float) -> dict[str, An
 
 def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
     solution = solved(case_with({"custom": ["x1 - 2*x2 >= 0"]}))
-    (row,) = result_of(solution)["limits"]
+    (row,) = json_data(result_of(solution))["limits"]
     assert row["active"]
     ends = [solved(case_with({"custom": [f"x1 - 2*x2 >= {h}"]}), solution.x).F for h in (-1e-3, 1e-3)]
     assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
@@ -223,7 +239,7 @@ def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
 
 def test_a_custom_equation_costs_what_moving_its_right_hand_side_does() -> None:
     solution = solved(case_with({"custom": ["x1 == 2*x2"], "leg_length": {"max": 45}}))
-    row = next(row for row in result_of(solution)["margins"] if row["key"] == "custom[0]")
+    row = next(row for row in json_data(result_of(solution))["margins"] if row["key"] == "custom[0]")
     assert row["bound"] == "equal"
     assert row["active"]
     ends = [
@@ -254,13 +270,13 @@ def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
 
 
 def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
-    degrees = result_of(solved(case_with({"base_joint_angle": 12})))
+    degrees = json_data(result_of(solved(case_with({"base_joint_angle": 12}))))
     text = HEXAPOD.replace('length = "cm"', 'length = "cm"\nangle = "rad"')
     for degree in (2, 28, 30):
         for sign in ("= ", "= -"):
             text = text.replace(f"{sign}{degree},", f"{sign}{math.radians(degree)},")
             text = text.replace(f"{sign}{degree} }}", f"{sign}{math.radians(degree)} }}")
-    radians = result_of(solved(case_with({"base_joint_angle": math.radians(12)}, text)))
+    radians = json_data(result_of(solved(case_with({"base_joint_angle": math.radians(12)}, text))))
     assert radians["F"] == pytest.approx(degrees["F"], rel=1e-9)
     assert radians["limits"][0]["unit"] == "rad"
     assert radians["limits"][0]["cost"] == pytest.approx(math.degrees(degrees["limits"][0]["cost"]), rel=1e-6)
@@ -293,7 +309,7 @@ def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
         "rate_share": {"max": 0.6},
         "smallest_singular_value": {"min": 0.015, "length": 30},
     }
-    result = result_of(solved(case_with(limits, THREE_UPU), starts=16))
+    result = json_data(result_of(solved(case_with(limits, THREE_UPU), starts=16)))
     assert result["status"] == "optimal"
     radii = {plate: result["parameters"][f"{plate}_radius"] for plate in ("base", "platform")}
     corners = np.array([[math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0] for k in range(3)])
@@ -322,20 +338,46 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
     parameters = {item.name: item.typical for item in bare.parameters}
     common: dict[str, Any] = {"model": bare, "parameters": parameters, "position": [Free(-9, 9), 0, 35]}
     task = Task.screw("max", axis=[1, 2, 3], point=[0, 0, 9], pitch=1)
-    for limits in (Limits(leg_clearance=1.0), Limits(joint_spacing=1.0), Limits(base_joint_angle=Cone(1.0))):
+    for limit in (LegClearance(1.0), JointSpacing(1.0), BaseJointAngle(1.0)):
         with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
-            Case(**common, tasks=[task], limits=limits)
+            Case(**common, tasks=[task], limits=Limits(limit))
     with pytest.raises(CaseError, match=r"tolerance\.joint_centre"):
         Case(**common, tasks=[task], joint_centre_tolerance=0.1)
-    limited = Case(**common, tasks=[task], limits=Limits(quantities={"leg_length": Interval(max=37.0)}))
-    solution = solved(limited)
-    assert solution.state is not None
-    assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+    for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
+        limited = Case(**common, tasks=[task], limits=Limits(limit))
+        solution = solved(limited)
+        assert solution.state is not None
+        assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
+
+
+def test_limits_in_python_are_those_of_a_file() -> None:
+    written = case_with(
+        {
+            "custom": ["x1 - 2*x2 >= 0", "cos(x3) <= 0.95"],
+            "leg_clearance": {"min": 2},
+            "leg_length": {"max": 45},
+            "base_joint_angle": {"max": 20, "about": [0, 0, 1]},
+        }
+    ).limits
+    built = Limits(
+        Relations("x1 - 2*x2 >= 0", "cos(x3) <= 0.95"),
+        BaseJointAngle(math.radians(20), about=((0.0, 0.0, 1.0),)),
+        LegClearance(2.0),
+        LegLength(max=45.0),
+    )
+    assert built == written
+    assert [limit.name for limit in built] == ["leg_length", "base_joint_angle", "leg_clearance", "custom"]
+    assert len(built) == 4
+    assert built.of(LegClearance) == LegClearance(2.0)
+    assert built.of(JointSpacing) is None
+    assert not Limits()
+    with pytest.raises(CaseError, match=r"limits\.leg_length: is given more than once"):
+        Limits(LegLength(max=45.0), LegLength(min=20.0))
 
 
 def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
     text = HEXAPOD.replace("x1 = { min = 8, max = 16 }", "x1 = 12").replace("x3 = { min = 2, max = 28 }", "x3 = 20")
-    result = result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text)))
+    result = json_data(result_of(solved(case_with({"footprint": {"base": 13}, "leg_length": {"max": 45}}, text))))
     row = next(row for row in result["limits"] if row["key"] == "footprint.base")
     assert (row["cost"], row["active"]) == (0.0, [])
     assert row["margin"] == pytest.approx(1, rel=1e-9)
@@ -415,7 +457,7 @@ def test_a_starter_case_with_its_limits_is_solved_from_every_start(model: Model)
         r"^# (\[limits\]|leg_length|base_joint_angle|leg_clearance)", r"\1", starter_case(model), flags=re.MULTILINE
     )
     case = case_with({}, text)
-    assert case.limits.leg_clearance
+    assert case.limits.of(LegClearance)
     solution = solved(case, starts=16)
     assert solution.status is Status.OPTIMAL
     assert all(start.status is StartStatus.CONVERGED for start in solution.starts)

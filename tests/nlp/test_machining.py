@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, result_of, solve
+from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
-from screwsynth.nlp.solve.compromise import solution_of_one_task
-from screwsynth.nlp.solve.multistart import solve_program
+from screwsynth.nlp.solver.compromise import solution_of_one_task
+from screwsynth.nlp.solver.multistart import solve_program
 
 Array = NDArray[np.float64]
 Run = Any
@@ -111,7 +111,7 @@ def test_the_limited_design_keeps_every_limit_and_is_found_from_nearly_every_sta
     assert limited.status is Status.OPTIMAL
     assert len(limited.starts) == 64
     assert limited.optima[0].count >= 0.9 * 64
-    result = result_of(limited)
+    result = json_data(result_of(limited))
     found = slacks(result)
     assert set(found) == {row["key"] for row in result["limits"]}
     assert min(found.values()) >= -1e-8
@@ -124,7 +124,7 @@ def test_the_unlimited_optimum_cannot_be_built(limited: Solution) -> None:
     del tables["limits"]
     free = solve(case_of(tables))
     assert free.F > limited.F
-    violated = [key for key, slack in slacks(result_of(free)).items() if slack < -0.01]
+    violated = [key for key, slack in slacks(json_data(result_of(free))).items() if slack < -0.01]
     assert len(violated) >= 3, violated
 
 
@@ -141,7 +141,7 @@ KEYS = [
 @pytest.mark.parametrize("key", KEYS, ids=".".join)
 def test_each_cost_is_what_moving_the_limit_does(limited: Solution, key: tuple[str, str]) -> None:
     number = TABLES["limits"][key[0]][key[1]]
-    row = next(row for row in result_of(limited)["limits"] if row["key"] == ".".join(key))
+    row = next(row for row in json_data(result_of(limited))["limits"] if row["key"] == ".".join(key))
     assert row["active"]
     step = 1e-4 * number
     high, low = (again(changed("limits", *key, to=number + s * step), limited) for s in (1, -1))
@@ -172,7 +172,7 @@ def test_an_impossible_variant_names_the_limit_and_by_how_much(name: str) -> Non
         del tables["limits"]["leg_length"]["min"]
     solution = solve(case_of(tables))
     assert solution.status is Status.INFEASIBLE
-    assert not result_of(solution)["F"]
+    assert not json_data(result_of(solution))["F"]
     moved = {row.key: row for row in solution.relaxation}
     assert moved
     assert set(moved) <= culprits
@@ -214,7 +214,7 @@ def test_sensitivities_are_what_moving_a_fixed_number_does(name: str) -> None:
     tables["robot"]["parameters"] |= FIXED
     tables["pose"]["position"][2] = 20.0
     solution = solve(case_of(tables))
-    rows = {row["name"]: row for row in result_of(solution)["sensitivity"]}
+    rows = {row["name"]: row for row in json_data(result_of(solution))["sensitivity"]}
     assert set(rows) == {*FIXED, "p_z"}
     value = rows[name]["value"]
     assert value == pytest.approx(20.0 if name == "p_z" else FIXED[name])
@@ -236,7 +236,7 @@ def F_of(b: Array, ends: Array, twist: Array) -> float:  # noqa: N802 - the obje
 
 
 def test_the_loss_by_inexact_joints_is_the_worst_that_sampling_finds(limited: Solution) -> None:
-    result = result_of(limited)
+    result = json_data(result_of(limited))
     b, a, _ = joints(result)
     R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
     twist, tolerance = np.array(result["task"]["twist"]), TABLES["tolerance"]["joint_centre"]

@@ -12,8 +12,9 @@ from screwsynth.models import Dimension
 from screwsynth.nlp import Nlp, PointKind, examine, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
 from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.evidence.linalg import nonnegative_least_squares, plain_basis
-from screwsynth.nlp.program.program import Program, Scalar
+from screwsynth.nlp.evidence.linalg import echelon_basis, nonnegative_least_squares
+from screwsynth.nlp.program.places import Places, Scalar
+from screwsynth.nlp.program.program import Program
 
 
 def program_of(
@@ -32,8 +33,9 @@ def program_of(
         p=SX.sym("unused"),
         objective=objective,
         constraints=tuple(Constraint(name, g, Reading(Dimension.NUMBER)) for name, g, _, _ in rows),
-        robot=donor.program.robot,
+        robots=donor.program.robots,
         model=donor.program.model,
+        places=Places(numbers=(), rotations=(), unknowns=(), twists=()),
     )
     nlp = Nlp(
         program=program,
@@ -192,10 +194,10 @@ def test_nonnegative_least_squares_satisfies_its_optimality_conditions() -> None
         assert abs(slope @ y) <= 1e-9
 
 
-def test_plain_basis_spans_the_same_space() -> None:
+def test_echelon_basis_spans_the_same_space() -> None:
     generator = np.random.default_rng(6)
     for _ in range(50):
         vectors = generator.normal(size=(3, 6))
-        basis = plain_basis(vectors)
+        basis = echelon_basis(vectors)
         assert np.linalg.matrix_rank(np.vstack([vectors, basis]), tol=1e-9) == 3
         assert np.abs(basis).max() == 1

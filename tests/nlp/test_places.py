@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from screwsynth.models import Model, stewart_gough
-from screwsynth.nlp import Case, Free, Method, OverPoses, Rotation, Task, along_screw, certify, formulate
+from screwsynth.nlp import Case, Free, Method, OverPoses, Rotation, Task, along_screw, certify_program, formulate, solve
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.evidence.sensitivity import sensitivities
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.formulation import formulate_each, formulate_weighted
-from screwsynth.nlp.solve.compromise import solve_tasks
-from screwsynth.nlp.solve.multistart import solve
 
 PLAIN = ("x1", "x2", "x3", "x4")
 HELICAL = Task.screw("max", axis=[2, 2, 1], point=[2, 3, 6], pitch=1, name="helical")
@@ -71,7 +69,7 @@ def test_internal_names_as_parameter_names_change_nothing(names: tuple[str, ...]
           for c, d in [(one, other)]),
     ]  # fmt: skip
     steps = along_screw(HELICAL.twist, [0.0, 0.1, 0.2])
-    several = {"steps": steps, "over_poses": OverPoses.WORST, "tasks": [HELICAL], "held": held}
+    several = {"displacements": steps, "over_poses": OverPoses.WORST, "tasks": [HELICAL], "held": held}
     pairs.append((formulate(case_of(PLAIN, **several)), formulate(case_of(names, **several))))  # type: ignore[arg-type]
     for first, second in pairs:
         for x in (first.start, first.lower + 0.3 * (first.upper - first.lower)):
@@ -91,8 +89,9 @@ def test_two_tasks_of_a_robot_with_a_parameter_named_as_a_twist() -> None:
     found = []
     for names in (PLAIN, ("twist_0", "level", "weight0", "q_x")):
         case = case_of(names, tasks=[HELICAL, TURN], method=Method.WORST_CASE)
-        compromise = solve_tasks(case, starts=4)
-        found.append([outcome.F for outcome in compromise.outcomes] + [compromise.value])
+        solution = solve(case, starts=4)
+        assert solution.combination is not None
+        found.append([outcome.F for outcome in solution.outcomes] + [solution.combination.value])
     assert found[0] == pytest.approx(found[1], rel=1e-12)
 
 
@@ -100,7 +99,7 @@ def test_answers_proofs_and_c_do_not_depend_on_names() -> None:
     results = []
     for names in (PLAIN, ("angle", "level", "twist_0", "p_x")):
         solution = solve(case_of(names, tasks=[HELICAL]), starts=4)
-        proof = certify(solution.nlp, solution.x, time_limit=20.0)
+        proof = certify_program(solution.nlp, solution.x, time_limit=20.0)
         results.append((solution.F, proof.bound, proof.boxes))
         header = next(text for name, text in generate_c(solution.nlp.case, "").items() if name.endswith(".h"))
         assert "robot.p_x" in header if names != PLAIN else "robot." not in header

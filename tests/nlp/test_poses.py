@@ -15,7 +15,18 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
-from screwsynth.nlp import Case, CaseError, PointKind, Status, case_from_tables, evaluate, formulate, result_of, solve
+from screwsynth.nlp import (
+    Case,
+    CaseError,
+    PointKind,
+    Status,
+    case_from_tables,
+    evaluate,
+    formulate,
+    json_data,
+    result_of,
+    solve,
+)
 from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program.formulation import formulate_each
@@ -128,7 +139,7 @@ def test_objective_over_poses_is_the_sum_mean_or_worst_of_what_each_has(kind: st
     case = case_of(KINDS[kind], over, LIMITS.replace("7.5", "12"), sense)
     solution = solve(case)
     assert solution.status is Status.OPTIMAL
-    result = json.loads(json.dumps(result_of(solution), allow_nan=False))
+    result = json.loads(json.dumps(json_data(result_of(solution)), allow_nan=False))
     twist = np.array(result["task"]["twist"])
     found = [by_hand(result, pose, twist)[0] for pose in result["poses"]]
     assert len(found) == case.pose_count
@@ -141,7 +152,7 @@ def test_objective_over_poses_is_the_sum_mean_or_worst_of_what_each_has(kind: st
 
 def test_poses_along_the_task_are_moved_with_it() -> None:
     solution = solve(case_of(ALONG))
-    result = result_of(solution)
+    result = json_data(result_of(solution))
     twist = np.array(result["task"]["twist"])
     stated = result["pose"]
     R0, p0 = np.array(stated["rotation_matrix"]), np.array(stated["position"])
@@ -157,7 +168,7 @@ def test_poses_along_the_task_are_moved_with_it() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_limits_hold_at_every_pose(kind: str) -> None:
-    result = result_of(solve(case_of(KINDS[kind], "sum", LIMITS)))
+    result = json_data(result_of(solve(case_of(KINDS[kind], "sum", LIMITS))))
     assert result["status"] == "optimal"
     twist = np.array(result["task"]["twist"])
     lengths = np.array([by_hand(result, pose, twist)[1] for pose in result["poses"]])
@@ -174,7 +185,7 @@ def test_limits_hold_at_every_pose(kind: str) -> None:
 def test_what_a_stroke_costs_is_what_moving_it_does() -> None:
     costs = {}
     for stroke in (7.49, 7.5, 7.51):
-        result = result_of(solve(case_of(ALONG, "mean", LIMITS.replace("7.5", str(stroke)))))
+        result = json_data(result_of(solve(case_of(ALONG, "mean", LIMITS.replace("7.5", str(stroke))))))
         row = next(row for row in result["limits"] if row["key"] == "actuator.stroke_max")
         costs[stroke] = (result["F"], row["cost"], row["active"])
     assert costs[7.5][2]
@@ -187,7 +198,7 @@ def test_one_listed_pose_is_that_pose() -> None:
     alone = tomllib.loads(HEAD + one.replace("[[pose]]", "[pose]") + TASK.replace("SENSE", "max"))
     first, second = (solve(case_from_tables(each, name="one", source="one.toml")) for each in (tables, alone))
     assert first.F == second.F
-    assert "poses" not in result_of(first)
+    assert "poses" not in json_data(result_of(first))
 
 
 def test_starting_points_lie_in_every_poses_ball() -> None:
@@ -241,7 +252,7 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
         second = first.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
         text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + second + first
         tables = tomllib.loads(f"{text}\n[limits]\nleg_length = {{ max = {longest} }}\n")
-        result: dict[str, Any] = result_of(solve(case_from_tables(tables, name="two", source="two.toml")))
+        result: dict[str, Any] = json_data(result_of(solve(case_from_tables(tables, name="two", source="two.toml"))))
         return result["combined"]
 
     (row,) = together(40.0)["limits"]

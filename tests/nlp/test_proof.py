@@ -18,7 +18,7 @@ from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprin
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.certificate.prooftree import TreeReader, unfolded
 from screwsynth.nlp.certificate.standardform import standard_form
-from screwsynth.nlp.solve.certified import certify, program_of, proof_of
+from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 Run = Callable[..., tuple[int, str, str]]
 NAME = "paper-4.1-helical-axis-z"

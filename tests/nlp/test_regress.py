@@ -10,6 +10,7 @@ import pytest
 
 from screwsynth.nlp import load_case, shipped_cases
 from screwsynth.nlp.output.checks import checks_as_junit, checks_as_markdown
+from screwsynth.nlp.results.data import CaseResult
 from screwsynth.nlp.results.regression import CaseCheck, check_case, decimals_of
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +63,7 @@ PRINTED = [
 
 @pytest.fixture(scope="module")
 def checks() -> dict[str, CaseCheck]:
-    solved: dict[str, dict[str, object]] = {}
+    solved: dict[str, CaseResult] = {}
     return {name: check_case(name, solved) for name in shipped_cases()}
 
 

@@ -20,15 +20,27 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from screwsynth.models import Body, Closure, Dimension, Link, Model, Point, PoseSymbols, Scene, Unknown, force_along
-from screwsynth.nlp import Case, Step, Task, formulate, load_case, result_of, solve
+from screwsynth.models import (
+    Body,
+    Closure,
+    Dimension,
+    Displacement,
+    Link,
+    Model,
+    Point,
+    PoseSymbols,
+    Scene,
+    Unknown,
+    force_along,
+)
+from screwsynth.nlp import Case, Task, formulate, load_case, result_of, solve
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
 from screwsynth.nlp.output.report.frames import RATES
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
 from screwsynth.nlp.output.report.webpage import page_of
-from screwsynth.nlp.solve import solve as solve_module
+from screwsynth.nlp.solver import solve as solve_module
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -354,14 +366,14 @@ def sliding(*shifts: float) -> Case:
         ),
     )
     task = Task([0, 0, 0, 0.6, 0, 0.8])
-    steps = tuple(Step(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
-    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], steps=steps)
+    steps = tuple(Displacement.by(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
+    return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], displacements=steps)
 
 
 def test_robots_with_loops_follow() -> None:
     for shifts in ((0.0,), (0.0, 1.0)):
         solution = solve(sliding(*shifts), starts=2)
-        report = report_of("sliding", "", solution, result_of(solution))
+        report = report_of("", solution, result_of(solution))
         assert report.parts[0].view is not None
         for frame in report.parts[0].view["frames"]:
             foot, head = np.array(frame["points"])
@@ -407,7 +419,7 @@ def test_charts_put_points_where_they_belong() -> None:
 
 def test_bound_against_time() -> None:
     history = [[0.5, 12.0, 9.0], [1.0, 11.0, 10.0], [2.0, 10.1, 10.0]]
-    chart, words = (str(part) for part in judgement.bound_chart({"history": history})[0].split("<figcaption>"))
+    chart, words = (str(part) for part in judgement.bound_chart(history)[0].split("<figcaption>"))
     bound, best = (points_of(path)[0] for path in re.findall(r'd="([^"]*)" class="curve(?: best)?"', chart))
     # Level up to each point, then down: a bound holds until a better one is there.
     assert [x for x, _ in bound] == [x for x, _ in best]

@@ -37,11 +37,12 @@ from screwsynth.nlp import (
     Task,
     examine,
     formulate,
+    json_data,
     load_case,
     result_of,
     solve,
 )
-from screwsynth.nlp.evidence.kkt import assembled, linearise
+from screwsynth.nlp.evidence.kkt import close_equations, linearise
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -106,7 +107,7 @@ def test_the_angle_bears_the_whole_multiplier_when_the_axis_is_a_coordinate_axis
     slope = (solve(turned_case(10.01), starts=4).F - solve(turned_case(9.99), starts=4).F) / math.radians(0.02)
     assert solution.evidence.active[0].multiplier == pytest.approx(slope, rel=1e-4)
     # In JSON it is per degree.
-    (side,) = result_of(solution)["optimality"]["active"]
+    (side,) = json_data(result_of(solution))["optimality"]["active"]
     assert side["value"] == pytest.approx(10)
 
 
@@ -154,7 +155,7 @@ def looped(*, a: float) -> Case:
 
 def test_a_robot_is_assembled_before_it_is_evaluated() -> None:
     nlp = formulate(looped(a=2))
-    x = assembled(nlp, nlp.start)
+    x = close_equations(nlp, nlp.start)
     assert x[0] == pytest.approx(2, abs=1e-12)
     assert pytest.approx(4 / 5) == solve(looped(a=2), starts=2).F
 
@@ -162,9 +163,9 @@ def test_a_robot_is_assembled_before_it_is_evaluated() -> None:
 def test_a_robot_that_cannot_be_assembled_is_infeasible() -> None:
     solution = solve(looped(a=12), starts=3)
     assert solution.status is Status.INFEASIBLE
-    assert [side["name"] for side in result_of(solution)["reached"]["violated"]] == ["loop"]
+    assert [side["name"] for side in json_data(result_of(solution))["reached"]["violated"]] == ["loop"]
     nlp = formulate(looped(a=12))
-    assert linearise(nlp, assembled(nlp, nlp.start)).violation > 0.1
+    assert linearise(nlp, close_equations(nlp, nlp.start)).violation > 0.1
 
 
 def test_evaluate_puts_free_directions_on_the_sphere(cli: Run) -> None:

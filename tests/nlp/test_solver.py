@@ -25,6 +25,7 @@ from screwsynth.nlp import (
     certify,
     examine,
     formulate,
+    json_data,
     load_case,
     result_of,
     solve,
@@ -32,7 +33,7 @@ from screwsynth.nlp import (
 from screwsynth.nlp.program import formulation
 from screwsynth.nlp.program.layout import Layout, lay_out
 from screwsynth.nlp.program.sampling import starting_points
-from screwsynth.nlp.solve import multistart
+from screwsynth.nlp.solver import multistart
 
 
 def random_case(seed: int, sense: str) -> Case:
@@ -194,7 +195,7 @@ def test_an_infeasible_case_names_what_cannot_hold() -> None:
     solution = solve(case)
     assert solution.status is Status.INFEASIBLE
     assert solution.optima == ()
-    result = result_of(solution)
+    result = json_data(result_of(solution))
     assert result["F"] is None
     assert [side["name"] for side in result["reached"]["violated"]] == ["|u1_1|"]
     assert result["reached"]["violated"][0]["value"] == pytest.approx(math.sqrt(1.62), abs=1e-6)

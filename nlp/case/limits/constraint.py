@@ -2,31 +2,50 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from casadi import SX
 
-from ....models import Dimension
+from ....models import Dimension, FloatArray
+
+#: A measured number from the Jacobian (m, 6) and the position (3,) of the platform at a pose.
+JacobianMeasure: TypeAlias = Callable[[FloatArray, FloatArray], float]
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a constraint's limit reads in the words of a case.
+    """Conversion between a constraint's bound and the number that a case states for it.
 
-    A limit on an angle may be a limit on a smoother function of it in the program.
+    A limit on an angle may be a bound on a smoother function of it in the program.
 
     Attributes:
         dimension: what the limit measures for people.
-        from_value: the number for people (radians for angles) from the program's limit.
-        slope: derivative of the program's limit with respect to the number for people, at the program's limit.
-        to_value: the program's limit from the number for people, as an expression; it never falls where that grows.
+        from_value: the number for people (radians for angles) from the program's bound.
+        slope: derivative of the program's bound with respect to the number for people, at the program's bound.
+        to_value: the program's bound from the number for people, as an expression; it never falls where that grows.
     """
 
     dimension: Dimension
     from_value: Callable[[float], float] = lambda value: value
     slope: Callable[[float], float] = lambda _: 1.0
     to_value: Callable[[SX], SX] = lambda number: number
+
+
+def squared(dimension: Dimension) -> Reading:
+    """Return the reading of a square as the number itself."""
+    return Reading(
+        dimension,
+        from_value=lambda value: math.sqrt(max(value, 0.0)),
+        slope=lambda value: 2 * math.sqrt(max(value, 0.0)),
+        to_value=lambda number: number * number,
+    )
+
+
+LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)
+SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NUMBER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +55,12 @@ class Constraint:
     Attributes:
         name: in the words of a case.
         expression: (1, 1).
-        reading: how its limits read.
+        reading: how its bounds read.
         keys: dotted keys below ``limits`` of the case's numbers that are its lower and its upper bound; empty for a
             bound that is none of the case's limits.
         pose: index of the pose that it is at.
-        exact: (1, 1) the measured number itself, where the expression tells it near the limit only.
+        exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
+        measure: the measured number itself, where the expression only estimates it.
     """
 
     name: str
@@ -49,6 +69,7 @@ class Constraint:
     keys: tuple[str, str] = ("", "")
     pose: int = 0
     exact: SX | None = None
+    measure: JacobianMeasure | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +79,52 @@ class BoundedConstraint:
     constraint: Constraint
     lower: float
     upper: float
+
+
+def bounded(
+    name: str,
+    expression: SX,
+    reading: Reading,
+    keys: tuple[str, str],
+    *,
+    lower: float | None = None,
+    upper: float | None = None,
+    exact: SX | None = None,
+    measure: JacobianMeasure | None = None,
+) -> BoundedConstraint:
+    """Return a constraint from the numbers of its limit as people write them.
+
+    Args:
+        name: in the words of a case.
+        expression: (1, 1); it grows with the measured number.
+        reading: how its bounds read.
+        keys: dotted keys below ``limits`` of the lower and of the upper number; empty where there is none.
+        lower: the lower number, radians for an angle; None where there is none.
+        upper: likewise.
+        exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
+        measure: the measured number itself, where the expression only estimates it.
+    """
+    return BoundedConstraint(
+        Constraint(name, expression, reading, keys, exact=exact, measure=measure),
+        -math.inf if lower is None else float(reading.to_value(SX(lower))),
+        math.inf if upper is None else float(reading.to_value(SX(upper))),
+    )
+
+
+def between(
+    name: str,
+    expression: SX,
+    reading: Reading,
+    key: str,
+    *,
+    lower: float | None = None,
+    upper: float | None = None,
+    exact: SX | None = None,
+    measure: JacobianMeasure | None = None,
+) -> BoundedConstraint:
+    """Return a constraint whose numbers are written as ``key.min`` and ``key.max``.
+
+    The other arguments are those of :func:`bounded`.
+    """
+    keys = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
+    return bounded(name, expression, reading, keys, lower=lower, upper=upper, exact=exact, measure=measure)

@@ -2,7 +2,7 @@
 
 The language is small: numbers, names, ``+ - * / ^``, brackets, the functions ``sqrt``, ``sin``, ``cos`` and ``abs``,
 and one relation ``>=``, ``<=`` or ``==``. ``^`` binds tighter than a sign and to the right, as in mathematics.
-Nothing is ever handed to Python's own interpreter: a sentence becomes a tree, and a tree a CasADi expression.
+Nothing is ever handed to Python's own interpreter: a text becomes a tree, and a tree a CasADi expression.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import SX
 
 from ...errors import nearest
 
-#: A sentence is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
+#: A text is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
 LONGEST = 400
 _DEEPEST = 40
 
@@ -36,34 +35,30 @@ _TOKEN = re.compile(
 
 
 class SentenceError(ValueError):
-    """A sentence that cannot be understood; the message shows where."""
+    """A text that is no relation; the message shows where."""
 
 
-@dataclass(frozen=True)
-class Number:
+class Number(NamedTuple):
     """A number as it stands."""
 
     value: float
 
 
-@dataclass(frozen=True)
-class Name:
+class Name(NamedTuple):
     """A number of the case, by name."""
 
     name: str
 
 
-@dataclass(frozen=True)
-class Call:
+class Call(NamedTuple):
     """A function of one argument; ``-`` is the change of sign."""
 
     function: str
     argument: Tree
 
 
-@dataclass(frozen=True)
-class Operation:
-    """Two trees and what is done with them."""
+class Operation(NamedTuple):
+    """An arithmetic operation on two trees."""
 
     sign: str
     left: Tree
@@ -73,8 +68,7 @@ class Operation:
 Tree: TypeAlias = Number | Name | Call | Operation
 
 
-@dataclass(frozen=True)
-class Relation:
+class Relation(NamedTuple):
     """``left >= right`` and the like."""
 
     left: Tree
@@ -82,22 +76,21 @@ class Relation:
     right: Tree
 
 
-@dataclass(frozen=True)
-class _Token:
+class _Token(NamedTuple):
     kind: str
     text: str
     place: int
 
 
 def parse(text: str, names: Collection[str]) -> Relation:
-    """The relation that a sentence says.
+    """Return the relation that a text states.
 
     Args:
-        text: the sentence.
-        names: what may be named in it.
+        text: the relation as it is written.
+        names: names that may stand in it.
 
     Raises:
-        SentenceError: it is no such sentence; the message has the offending token and its place.
+        SentenceError: the text is no relation; the message has the offending token and its place.
     """
     if len(text) > LONGEST:
         raise SentenceError(f"is longer than {LONGEST} characters")
@@ -115,7 +108,13 @@ def parse(text: str, names: Collection[str]) -> Relation:
 
 
 def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
-    """A tree as an expression of the values of its names; ``sin`` and ``cos`` take angles in units of ``angle`` rad."""
+    """Return a tree as an expression of the values of its names.
+
+    Args:
+        tree: the tree.
+        values: an expression (1, 1) for each name.
+        angle: unit of the angles that ``sin`` and ``cos`` take, radians.
+    """
     match tree:
         case Number(value):
             return SX(value)
@@ -133,7 +132,7 @@ def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
 
 
 class _Reader:
-    """Recursive descent over the tokens of a sentence."""
+    """Recursive descent over the tokens of a text."""
 
     def __init__(self, text: str, names: Collection[str]) -> None:
         self._text, self._names = text, names
@@ -141,31 +140,32 @@ class _Reader:
         self._at = self._depth = 0
 
     def wrong(self, token: _Token, expected: str) -> SentenceError:
-        """The fault at a token, with what stands before it."""
+        """Return the fault at a token, which shows the text with the token marked."""
         found = "the sentence ends" if token.kind == "end" else f"{token.text!r} stands"
         return SentenceError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
 
     def next(self) -> _Token:
+        """Return the next token, and go on; the end stays the next one."""
         token = self._tokens[self._at]
         self._at = min(self._at + 1, len(self._tokens) - 1)
         return token
 
     def sum(self) -> Tree:
-        """``product (+|- product)*``."""
+        """Read ``product (+|- product)*``."""
         tree = self._product()
         while self._tokens[self._at].text in ("+", "-"):
             tree = Operation(self.next().text, tree, self._product())
         return tree
 
     def _product(self) -> Tree:
-        """``signed (*|/ signed)*``."""
+        """Read ``signed (*|/ signed)*``."""
         tree = self._signed()
         while self._tokens[self._at].text in ("*", "/"):
             tree = Operation(self.next().text, tree, self._signed())
         return tree
 
     def _signed(self) -> Tree:
-        """``(+|-)* power``."""
+        """Read ``(+|-)* power``."""
         self._depth += 1
         if self._depth > _DEEPEST:
             raise SentenceError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
@@ -179,7 +179,7 @@ class _Reader:
         return tree
 
     def _power(self) -> Tree:
-        """``atom (^ signed)?``."""
+        """Read ``atom (^ signed)?``."""
         base = self._atom()
         if self._tokens[self._at].text != "^":
             return base
@@ -187,7 +187,7 @@ class _Reader:
         return Operation("^", base, self._signed())
 
     def _atom(self) -> Tree:
-        """A number, a name, a function's value, or something in brackets."""
+        """Read a number, a name, a function with its argument, or a sum in brackets."""
         token = self.next()
         if token.kind == "number":
             value = float(token.text)
@@ -228,5 +228,5 @@ class _Reader:
         yield _Token("end", "", len(self._text.rstrip()))
 
     def _pointed(self, place: int) -> str:
-        """The sentence with the place marked."""
+        """Return the text with a place marked."""
         return f"{self._text[:place]}»{self._text[place:]}"

@@ -1,130 +1,140 @@
-"""What a design must keep to be built: the limits of a case, as values.
+"""The limits of a case, and the registry of all types of limits.
 
-Lengths are in the case's unit and angles in radians. Everything is optional; what is left out is no limit. A limit is
-checked against the robot once, by :mod:`screwsynth.nlp.case.limits.limitcheck`, in the words of a case file.
+Everything is optional: no limit is no restriction. A limit is checked against the robot once, when its case is made.
+To add a limit, write a subclass of :class:`~.limit.Limit` in a file of its own, and add it to :data:`LIMIT_TYPES`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import TypeAlias
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from ....models import FloatArray, frozen_array
+from pydantic import ConfigDict, create_model
 
-#: Three numbers.
-Triple: TypeAlias = tuple[float, float, float]
+from ....models import Model
+from ...errors import CaseError, listing
+from ...units import Units
+from ..table import Table
+from .clearance import LegClearance
+from .interval import IntervalTable
+from .joints import BaseJointAngle, PlatformJointAngle
+from .legs import Actuator, LegLength
+from .limit import Limit, LimitedCase
+from .plates import Footprint, JointSpacing, RadiusRatio
+from .quantity import QuantityLimit
+from .rate_share import RateShare
+from .relation import Relations
+from .singular_values import ConditionNumber, SmallestSingularValue
 
+#: Every type of limit, in the order of documentation and messages.
+LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
+    LegLength,
+    Actuator,
+    BaseJointAngle,
+    PlatformJointAngle,
+    JointSpacing,
+    Footprint,
+    RadiusRatio,
+    LegClearance,
+    ConditionNumber,
+    SmallestSingularValue,
+    RateShare,
+    Relations,
+    QuantityLimit,
+)
 
-@dataclass(frozen=True)
-class Interval:
-    """A limit with one side or two."""
-
-    min: float | None = None
-    max: float | None = None
-
-
-@dataclass(frozen=True)
-class Actuator:
-    """A telescoping leg over all poses: ``stroke = longest - shortest``.
-
-    Attributes:
-        stroke_max: the largest stroke.
-        dead_length: what the leg has beside its stroke when retracted: ``shortest >= dead_length + stroke``.
-    """
-
-    stroke_max: float | None = None
-    dead_length: float | None = None
-
-
-@dataclass(frozen=True)
-class MountingPose:
-    """The pose at which passive joints are mounted straight: position, and ``exp(angle [axis]x)``."""
-
-    position: Triple
-    axis: Triple = (0.0, 0.0, 1.0)
-    angle: float = 0.0
-
-
-@dataclass(frozen=True)
-class Cone:
-    """The cone of a passive joint: how far a leg may lean from the joint's mounting axis.
-
-    Attributes:
-        max: half angle, radians, above 0 and at most half a turn.
-        about: the mounting axes, pointing the way from base to platform: the plate's normal when None, the leg's own
-            direction at a :class:`MountingPose`, one direction in the plate's frame for all joints, or one for each.
-    """
-
-    max: float
-    about: MountingPose | tuple[Triple, ...] | None = None
+LimitT = TypeVar("LimitT", bound=Limit[Any])
 
 
-@dataclass(frozen=True)
-class Footprint:
-    """Largest distance of joint centres from their plate's axis, its z axis."""
+class _OpenTable(Table):
+    """What a design must keep to be built; other keys are measures that the robot itself has."""
 
-    base: float | None = None
-    platform: float | None = None
-
-
-@dataclass(frozen=True)
-class Homogenised:
-    """A limit on J made homogeneous: moments about the platform's origin, divided by a length.
-
-    Attributes:
-        limit: the smallest or largest value.
-        length: what moments are divided by.
-    """
-
-    limit: float
-    length: float
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, IntervalTable]
 
 
-@dataclass(frozen=True)
+if TYPE_CHECKING:
+    LimitsTable: TypeAlias = _OpenTable
+else:
+    #: The table ``[limits]`` of a case file.
+    LimitsTable = create_model(
+        "LimitsTable",
+        __base__=_OpenTable,
+        __doc__=_OpenTable.__doc__,
+        __module__=__name__,
+        **{key: tuple(field) for kind in LIMIT_TYPES for key, field in kind.fields().items()},
+    )
+
+
+@dataclass(frozen=True, init=False)
 class Limits:
-    """The limits of a case.
+    """The limits of a case, such as ``Limits(LegLength(min=28, max=40), LegClearance(min=2))``.
 
     Attributes:
-        leg_length: of every leg, at every pose.
-        actuator: of every leg, over all poses.
-        base_joint_angle, platform_joint_angle: cones of the passive joints.
-        joint_spacing: smallest distance between two joint centres of one plate.
-        footprint: largest radii of the plates.
-        radius_ratio: platform's radius over base's, each the root mean square distance of joints from the plate's axis.
-        leg_clearance: smallest distance between two legs, as line segments between their joints.
-        condition_number: largest ratio of singular values of the homogenised J.
-        smallest_singular_value: smallest of them.
-        rate_share: largest part of F that one limb carries.
-        custom: relations between the case's own numbers, such as ``"x1 - 1.5*x2 >= 0"``.
-        quantities: of the model's other named measures, by name.
+        items: the limits, in the order of the registry.
+
+    Raises:
+        CaseError: one limit is given twice.
     """
 
-    leg_length: Interval | None = None
-    actuator: Actuator | None = None
-    base_joint_angle: Cone | None = None
-    platform_joint_angle: Cone | None = None
-    joint_spacing: float | None = None
-    footprint: Footprint | None = None
-    radius_ratio: Interval | None = None
-    leg_clearance: float | None = None
-    condition_number: Homogenised | None = None
-    smallest_singular_value: Homogenised | None = None
-    rate_share: float | None = None
-    custom: tuple[str, ...] = ()
-    quantities: Mapping[str, Interval] = field(default_factory=dict)
+    items: tuple[Limit[Any], ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "quantities", MappingProxyType(dict(self.quantities)))
+    def __init__(self, *limits: Limit[Any]) -> None:
+        names = [limit.name for limit in limits]
+        for name in names:
+            if names.count(name) > 1:
+                raise CaseError(f"limits.{name}", "is given more than once")
+        object.__setattr__(self, "items", tuple(sorted(limits, key=_rank)))
 
-    def __bool__(self) -> bool:
-        """Whether there is any limit."""
-        return any(getattr(self, name) for name in self.__dataclass_fields__)
+    @classmethod
+    def from_table(cls, written: LimitsTable | None, model: Model, units: Units) -> Limits:
+        """Return the limits that a case file states.
+
+        Args:
+            written: the table ``[limits]``; None where there is none.
+            model: the robot.
+            units: the file's units.
+
+        Raises:
+            CaseError: the table contradicts itself.
+        """
+        if written is None:
+            return cls()
+        return cls(*(limit for kind in LIMIT_TYPES for limit in kind.read(written, model, units)))
+
+    def __iter__(self) -> Iterator[Limit[Any]]:
+        return iter(self.items)
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def of(self, kind: type[LimitT]) -> LimitT | None:
+        """Return the limit of a type, the first where there are several, or None where there is none."""
+        return next((limit for limit in self.items if isinstance(limit, kind)), None)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse limits that the robot they are for cannot have, or whose numbers mean nothing.
+
+        Raises:
+            CaseError: a number is out of its range, two sides are crossed, or the robot has no such measure.
+        """
+        for limit in self.items:
+            if not limit.exists_for(case.model):
+                fault = f"is nothing that {case.model.name!r} has; it has {listing(_measures(case.model))}"
+                raise CaseError(f"limits.{limit.name}", fault)
+        for limit in self.items:
+            limit.check(case)
 
 
-def unit_axes(axes: tuple[Triple, ...], count: int) -> FloatArray:
-    """(count, 3) unit mounting axes from one for all or one for each."""
-    rows = [[part / math.hypot(*axis) for part in axis] for axis in axes]
-    return frozen_array(rows if len(rows) == count else rows * count, (count, 3))
+def _rank(limit: Limit[Any]) -> int:
+    """Return the place of a limit's type in the registry; types of the user's own come last."""
+    return LIMIT_TYPES.index(type(limit)) if type(limit) in LIMIT_TYPES else len(LIMIT_TYPES)
+
+
+def _measures(model: Model) -> list[str]:
+    """Return the keys of ``[limits]`` that mean something for a robot."""
+    of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs] if model.legs else []
+    own = [quantity.name for quantity in model.quantities]
+    always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.key]
+    return list(dict.fromkeys([*of_legs, *own, *always]))

@@ -15,13 +15,20 @@ import casadi as ca
 from casadi import SX
 
 #: Keeps the division defined for parallel lines, in parts of the squared lengths; the sine of the lines' angle counts
-#: squared beside it. Whatever s it gives there, t and s are improved once more, and what is left makes the squared
-#: distance too large by a quarter of this part of a leg's squared length at most.
+#: squared beside it. Whatever s it gives there, t and s are improved once more; the squared distance is then too large
+#: by a quarter of this part of a leg's squared length at most.
 _PARALLEL = 1e-10
 
 
 def squared_distance(p: SX, d: SX, q: SX, e: SX) -> SX:
-    """(1, 1) squared distance between the segments from p to p + d and from q to q + e, each (3, 1), d and e not 0."""
+    """Return the squared distance (1, 1) between the segments from p to p + d and from q to q + e.
+
+    Args:
+        p: (3, 1) start of the first segment, length.
+        d: (3, 1) its span, not 0.
+        q: (3, 1) start of the second segment.
+        e: (3, 1) its span, not 0.
+    """
     r = p - q
     a, b, c = ca.sumsqr(d), ca.dot(d, e), ca.sumsqr(e)
     f, g = ca.dot(d, r), ca.dot(e, r)

@@ -1,13 +1,13 @@
 """Smallest and largest eigenvalue of a symmetric positive semidefinite matrix, as smooth expressions.
 
-No closed form exists, and an eigenvalue itself has a corner where two of them meet, which is just where an optimum
-likes to lie. What stands here is smooth everywhere, made of ``+ - * /`` and square roots alone, and never on the unsafe
+No closed form exists, and an eigenvalue itself has a corner where two of them meet, where optima often lie. The
+estimates of this module are smooth everywhere, made of ``+ - * /`` and square roots alone, and never on the unsafe
 side. For a positive definite matrix A,
 
     mu(A) = (tr A^-m)^(-1/m) <= lambda_min(A),
 
-short of it by the factor ``r^(-1/m)`` where r eigenvalues are smallest and by little where one is. Shifting A almost by
-what is found and looking again multiplies that error by ``1 - r^(-1/m)`` once more:
+short of it by the factor ``r^(-1/m)`` where r eigenvalues are smallest and by little where one is. Shifting A by almost
+this estimate, and estimating again, multiplies the error by ``1 - r^(-1/m)`` once more:
 
     theta <- theta + mu(A - theta I),        theta < lambda_min(A) throughout.
 
@@ -27,7 +27,7 @@ _SQUARINGS = 3
 #: next to none of one whose neighbour is half as large again. More would be closer, and the rounded corner so sharp
 #: that Newton steps across it fail: with four rounds two thirds of the searches did.
 _ROUNDS = 2
-#: The next shift goes this part of the way, so that what is inverted stays well away from singular.
+#: The next shift goes this part of the way, so that the matrix to be inverted stays well away from singular.
 _CLOSE = 0.999
 #: A first shift below zero, in parts of the mean eigenvalue, so that a singular matrix can be inverted.
 _FLOOR = 1e-10
@@ -38,7 +38,7 @@ Rows: TypeAlias = list[list[SX]]
 
 
 def smallest_eigenvalue(A: SX) -> SX:
-    """(1, 1) estimate from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    """Return an estimate (1, 1) from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
     n = A.shape[0]
     scale = ca.trace(A) / n
     rows = _upper(A / scale)
@@ -50,7 +50,7 @@ def smallest_eigenvalue(A: SX) -> SX:
 
 
 def largest_eigenvalue(A: SX) -> SX:
-    """(1, 1) estimate from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    """Return an estimate (1, 1) from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
     scale = ca.trace(A)
     rows = _upper(A / scale)
     # (tr A^m)^(1/m) is above, by no more than n^(1/m).
@@ -73,14 +73,14 @@ def _shifted(rows: Rows, by: SX) -> Rows:
 
 
 def _root_of_inverse(rows: Rows) -> SX:
-    """``(tr A^-m)^(-1/m)`` of a positive definite matrix."""
+    """Return ``(tr A^-m)^(-1/m)`` of a positive definite matrix."""
     inverse = _inverse(rows)
     size = sum((row[0] for row in inverse), SX(0))
     return 1 / (size * _root_of_trace([[each / size for each in row] for row in inverse]))
 
 
 def _root_of_trace(rows: Rows) -> SX:
-    """``(tr A^m)^(1/m)``; the last square's trace is the sum of all squared entries."""
+    """Return ``(tr A^m)^(1/m)``; the last square's trace is the sum of all squared entries."""
     for _ in range(_SQUARINGS - 1):
         rows = _square(rows)
     value = sum((row[0] ** 2 + 2 * sum((each**2 for each in row[1:]), SX(0)) for row in rows), SX(0))
@@ -102,7 +102,7 @@ def _full(rows: Rows) -> Rows:
 
 
 def _inverse(rows: Rows) -> Rows:
-    """Inverse of a positive definite matrix, one row after the other swept; no pivoting is needed.
+    """Return the inverse of a positive definite matrix, by sweeping one row after the other without pivoting.
 
     Sweeping k turns ``a_kk`` into ``-1/a_kk``, the rest of row k into ``a_kj/a_kk`` and every other entry into ``a_ij -
     a_ik a_kj / a_kk``, and keeps the matrix symmetric; after all rows it is minus the inverse.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...case.task import Sense
-from ...solve.multistart import ProgramSolution, Status
-from ...solve.solution import Solution
+from ...solver.multistart import ProgramSolution, Status
+from ...solver.solution import Solution
 from .scene import Drawing, drawing_of
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ....models import Model
-from ...solve.solution import Solution
+from ...solver.solution import Solution
 from ..files import check_target, write_bytes
 from .extras import check_picture
 from .gallery import drawings_of

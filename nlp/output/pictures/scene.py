@@ -12,10 +12,10 @@ from ....models import Body, FloatArray, Link, Model, WrenchKind, axis_from_scre
 from ....models import reciprocal_product as product
 from ...case.case import Case
 from ...errors import EvaluationError
-from ...evidence.kkt import assembled
+from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...solve.multistart import state_or_none
+from ...solver.multistart import state_or_none
 from .posture import Linkage, Posture
 
 #: A path around the axis: at most so many turns, over at most this part of the axis, at this part of the robot's size.
@@ -232,7 +232,7 @@ def _reference(nlp: Nlp, posture: Posture, size: float) -> Posture | None:
     """The start, where it is another posture than the one drawn."""
     if nlp.n == 0:
         return None
-    x = assembled(nlp, nlp.start)
+    x = close_equations(nlp, nlp.start)
     state = state_or_none(nlp, x)
     if state is None:
         return None

@@ -1,4 +1,4 @@
-"""What was found around the answer, as HTML: other optima, slices and maps of F."""
+"""The surroundings of the answer as HTML: other optima, slices and maps of F."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...solve.multistart import ProgramSolution
-from ...solve.starts import StartStatus
+from ...results.tables import MOST_OPTIMA, optimum_table
+from ...solver.multistart import ProgramSolution
+from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
-from .markup import Markup, grid, joined, paragraphs, tag
+from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 
-#: So many optima are shown in full.
-_OPTIMA = 12
-
 
 def optima(report: Report) -> Markup:
-    """Distinct optima that the starts ended at: F against count, and where they lie."""
+    """Return the distinct optima that the starts ended at: F against count, and where they lie."""
     parts: list[Markup] = []
     solutions = [(part.name, part.solution) for part in report.parts]
     if report.combined is not None:
@@ -48,29 +46,13 @@ def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
     else:
         chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=("F", "starts"))
         yield tag("figure", chart, tag("figcaption", words))
-    nlp = solution.nlp
-    units = nlp.case.units
-    names = [variable.name for variable in nlp.program.variables]
-    labels = [units.label(variable.dimension) for variable in nlp.program.variables]
-    headers = ["", *(f"{name}, {unit}" if unit else name for name, unit in zip(names, labels, strict=True))]
-    rows = [
-        [
-            f"F = {found.F:.7g}, {found.count} starts"
-            + (f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > 1e-3 else ""),
-            *(
-                f"{units.shown(float(value), variable.dimension):.6g}"
-                for value, variable in zip(found.x, nlp.program.variables, strict=True)
-            ),
-        ]
-        for found in solution.optima[:_OPTIMA]
-    ]
-    left = len(solution.optima) - len(rows)
-    more = f" ({left} worse ones are left out)" if left else ""
-    yield grid(headers, rows, f"Where they lie{more}")
+    left = len(solution.optima) - MOST_OPTIMA
+    more = f" ({left} worse ones are left out)" if left > 0 else ""
+    yield html_table(optimum_table(solution), f"Where they lie{more}")
 
 
 def around(report: Report) -> Markup:
-    """F along each variable through the answer, and over pairs of variables."""
+    """Return F along each variable through the answer, and over pairs of variables."""
     parts: list[Markup] = []
     with_maps = [k for k, part in enumerate(report.parts) if part.planes]
     if not any(part.slices for part in report.parts):

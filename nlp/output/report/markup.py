@@ -1,4 +1,4 @@
-"""HTML from Python values: whatever is not markup already is escaped, so nothing of a case can become any."""
+"""HTML from Python values: everything but markup is escaped, so that no text of a case becomes markup."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-from rich.table import Table
-from rich.text import Text
+from ...results.text import Line, TextTable
 
 
 class Markup(str):
@@ -24,7 +23,7 @@ _VOID = frozenset(["meta", "link", "input", "br", "img"])
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
-    """An element.
+    """Return an element.
 
     Args:
         name: of the element.
@@ -43,66 +42,55 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
 
 
 def joined(content: Iterable[object]) -> Markup:
-    """Several pieces of content as one."""
+    """Return several pieces of content as one."""
     return Markup(
         "".join(part if isinstance(part, Markup) else escape(str(part)) for part in content if part is not None)
     )
 
 
-def paragraphs(lines: Iterable[object]) -> Markup:
-    """A paragraph for each line of text; a dim label before it stays one."""
-    return joined(tag("p", _labelled(line)) for line in lines)
+def paragraphs(lines: Iterable[Line | str]) -> Markup:
+    """Return a paragraph for each line of text; its label stands before it."""
+    return joined(tag("p", _line(line)) for line in lines)
 
 
-def _labelled(line: object) -> object:
-    if not (isinstance(line, Text) and line.spans and line.spans[0].start == 0 and line.spans[0].style == "dim"):
-        return _plain(line)
-    end = line.spans[0].end
-    return joined([tag("span", f"{line.plain[:end].strip()}:", class_="label"), " ", line.plain[end:]])
+def _line(line: Line | str) -> object:
+    if isinstance(line, str):
+        return line
+    if not line.label:
+        return line.words
+    return joined([tag("span", f"{line.label}:", class_="label"), " ", line.words])
 
 
-def html_table(table: Table, caption: str, **attributes: object) -> Markup:
-    """A table for the terminal as one of HTML, its first column naming the rows."""
-    headers = [_plain(column.header).replace("\n", ", ") for column in table.columns]
-    rows = zip(*(map(_plain, column.cells) for column in table.columns), strict=True)
-    return grid(headers, rows, caption, **attributes)
+def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
+    """Return a table of HTML, its first column naming the rows; a wide one scrolls by itself, also by keyboard.
 
-
-def grid(headers: Iterable[object], rows: Iterable[Iterable[object]], caption: str, **attributes: object) -> Markup:
-    """A table of HTML, its first column naming the rows; a wide one scrolls by itself, also by keyboard."""
+    Args:
+        table: of text.
+        caption: of the table.
+        attributes: of the element, as for :func:`tag`.
+    """
+    headers = [header.replace("\n", ", ") for header in table.headers]
     # A heading without words names nothing: it is a mere cell.
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     body = []
-    for row in rows:
-        first, *others = row
+    for row in table.rows:
+        first, *others = (cell.words if isinstance(cell, Line) else cell for cell in row)
         body.append(tag("tr", tag("th", first, scope="row"), *(_cell(cell) for cell in others)))
     whole = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body), **attributes)
     return tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
-    """JSON that can stand in a script element: no ``<`` is left, so nothing in it can end the element."""
+    """Return JSON that can stand in a script element: no ``<`` is left that could end the element."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)
 
 
-def _cell(value: object) -> Markup:
-    if isinstance(value, Markup):
-        return tag("td", value)
-    text = str(value)
+def _cell(text: str) -> Markup:
     return tag("td", text, class_="number" if _is_short_number(text) else None)
 
 
 def _is_short_number(text: str) -> bool:
     return len(text) < _SHORT and (text[:1].isdigit() or text[:1] in {"+", "-"})
-
-
-def _plain(value: object) -> str:
-    return value.plain if isinstance(value, Text) else str(value)
-
-
-def paragraphs_of(lines: Any) -> list[Markup]:  # noqa: ANN401 - any lines of text
-    """A paragraph for each line of text."""
-    return [paragraphs([line]) for line in lines]

@@ -1,6 +1,6 @@
-"""What a report shows of a solved case: its result, its robot along the motion, and F beside the point found.
+"""Content of a report about a solved case: its result, its robot along the motion, and F beside the point found.
 
-A report of a solve that failed shows what was reached, and calls it that.
+A report of a solve that failed shows the point reached, and calls it that.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from ....models import FloatArray
 from ...case.case import Case
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...results.regression import CaseCheck, check_case
-from ...solve.multistart import ProgramSolution
-from ...solve.solution import Solution
+from ...results.data import CaseResult
+from ...results.jsondata import json_data
+from ...results.regression import CaseCheck
+from ...solver.multistart import ProgramSolution
+from ...solver.solution import Solution
 from ..pictures.scene import drawing_of
 from .frames import view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
@@ -34,7 +36,7 @@ class Part:
         name: of the task.
         nlp: its program.
         x: (n,) the point.
-        solution: what the task has by itself.
+        solution: of the task by itself.
         view: the robot there, for the 3-D view; None where it does not exist.
         slices: F along each variable.
         planes: F over pairs of variables.
@@ -53,55 +55,51 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Everything that a page shows.
+    """Content of a page.
 
     Attributes:
         case: the case.
         text: the case as it is written in its file.
-        result: as ``--json`` writes it.
+        result: of the solve.
         parts: one for each task.
         combined: the solution of the program that brings several tasks together, where there is one.
         check: published and expected numbers beside the computed; None where the case has none.
-        is_answer: whether the point is what was asked for.
+        is_answer: whether the point is an answer.
     """
 
     case: Case
     text: str
-    result: dict[str, Any]
+    result: CaseResult
     parts: tuple[Part, ...]
     combined: ProgramSolution | None
     check: CaseCheck | None
     is_answer: bool
 
     def as_data(self) -> dict[str, Any]:
-        """What the page's script needs, ready for JSON."""
+        """Return the data of the page's script, as JSON's own types."""
         return {
-            "result": self.result,
+            "result": json_data(self.result),
             "views": [part.view for part in self.parts if part.view is not None],
             "planes": [[_plane(part.nlp, part.x, plane) for plane in part.planes] for part in self.parts],
         }
 
 
-def report_of(name: str, text: str, solution: Solution, result: dict[str, Any]) -> Report:
-    """Everything that a page shows of a solved case.
+def report_of(text: str, solution: Solution, result: CaseResult, check: CaseCheck | None = None) -> Report:
+    """Return the content of a page about a solved case; nothing is solved here.
 
     Args:
-        name: by which the case was read; without one, published values are left out.
         text: the case as it is written in its file.
         solution: the solve.
-        result: the same as plain data, with its certificates.
-
-    Raises:
-        InputError: a case that this one's published numbers refer to cannot be read.
+        result: of that solve, with its certificates.
+        check: published and expected numbers beside the computed; None where the case has none.
     """
-    case, is_answer = solution.case, solution.status.is_answer
+    is_answer = solution.status.is_answer
     combined = None if solution.combination is None else solution.combination.combined
     parts = tuple(
         _part(outcome.own.nlp, solution.x, outcome.state, outcome.own, j, len(solution.outcomes), is_answer)
         for j, outcome in enumerate(solution.outcomes)
     )
-    check = check_case(name, {name: result}) if case.published and name else None
-    return Report(case, text, result, parts, combined, check, is_answer)
+    return Report(solution.case, text, result, parts, combined, check, is_answer)
 
 
 def _part(
@@ -127,7 +125,7 @@ def _part(
 
 
 def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
-    """A map in the case's units, rounded to what a picture shows."""
+    """Return a map in the case's units, rounded to a picture's precision."""
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 
@@ -147,7 +145,7 @@ def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
 
 
 def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
-    """What a map shows, in a sentence."""
+    """Return a map in words."""
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 

@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Group
-
-from ...program.places import FreeRotation
-from ...results.data import motion_of
-from ..terminal import (
-    design_table,
-    headline,
-    limb_table,
+from ...case.case import Case
+from ...case.pose import sizes_of_turn
+from ...results.data import CombinedResult, SolveResult
+from ...results.parts import LimitData, MarginData
+from ...results.point import motion_data
+from ...results.tables import (
+    combined_design_table,
     limit_table,
-    motion_words,
+    margin_table,
+    origin_table,
     outcome_table,
-    pose_table,
+    robot_table,
+    solved_design_table,
+)
+from ...results.wording import (
+    costliest_words,
+    headline,
+    motion_words,
+    relaxation_words,
     singularity_lines,
     tolerance_line,
 )
 from .exploration import around, optima
 from .frames import RATES
 from .judgement import certificates, evidence_section, published
-from .markup import Markup, grid, html_table, joined, paragraphs, paragraphs_of, tag
+from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Report
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Every section that has something to show: its anchor, its heading and its content."""
+    """Return every section that has something to show: its anchor, its heading and its content."""
     found = [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", _robot(report)),
@@ -44,15 +52,15 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
 
 
 def answer(report: Report) -> Markup:
-    """What was found, at the top of the page; what is no answer is said to be none."""
+    """Return the answer, for the top of the page, or the sentence that there is none."""
     result = report.result
-    if "combined" not in result:
-        group = headline(report.case, result)
-        lines = [str(line) for line in group.renderables[-1:]] if isinstance(group, Group) else []
+    if isinstance(result, SolveResult):
+        lines = [headline(result).words]
     else:
-        combined = result["combined"]
-        value = "" if combined["value"] is None else f", value {combined['value']:.7g}"
-        lines = [f"{len(report.parts)} tasks, combined by {combined['method']}: {result['status']}{value}"]
+        combined = result.combined
+        value = "" if combined.value is None else f", value {combined.value:.7g}"
+        tasks = f"{len(report.parts)} tasks, combined by {combined.method.value}"
+        lines = [f"{tasks}: {result.status.value}{value}"]
         if not report.is_answer:
             lines.append("This is no answer: what was reached is shown below.")
     kind = "answer" if report.is_answer else "answer none"
@@ -64,7 +72,7 @@ def _case(report: Report) -> Markup:
     lines = [f"{case.model.description}."]
     for task in case.tasks:
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        lines.append(f"Task “{task.name}”: make F {word} for a {motion_words(motion_of(task.twist), case.units)}.")
+        lines.append(f"Task “{task.name}”: make F {word} for a {motion_words(motion_data(task.twist), case.units)}.")
     lines.append(
         "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
     )
@@ -76,7 +84,8 @@ def _case(report: Report) -> Markup:
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
-        if any(isinstance(rotation, FreeRotation) for rotation in program.places.rotations):
+        turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
+        if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
             lines.append("q is the vector part of the unit quaternion that turns the platform.")
     else:
         lines.append("Nothing is free: the robot is evaluated where it stands.")
@@ -85,9 +94,9 @@ def _case(report: Report) -> Markup:
             f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
             "Pictures and their rates show the first."
         )
-    limits = _point(report).get("limits") or []
+    limits = _limits_of(report)
     if limits:
-        listed = ", ".join(f"{row['key']} {row['limit']:g} {row['unit']}".strip() for row in limits)
+        listed = ", ".join(f"{row.key} {row.limit:g} {row.unit}".strip() for row in limits)
         lines.append(f"Limits: {listed}.")
     search = case.search
     if names:
@@ -162,7 +171,7 @@ def _legend(view: dict[str, Any]) -> Markup:
 
 
 def _rates(view: dict[str, Any]) -> Markup:
-    """Rates of every row at the drawn posture; the script keeps it in step with the platform."""
+    """Return the rates of every row at the drawn posture; the script keeps the table in step with the platform."""
     frame = view["frames"][view["zero"]]
     # Where the task's motion is resisted by nothing, what is left is rounding.
     rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
@@ -206,92 +215,66 @@ def _rates(view: dict[str, Any]) -> Markup:
 
 
 def _result(report: Report) -> Markup:
-    case, result = report.case, report.result
+    result = report.result
+    if isinstance(result, CombinedResult):
+        return _combined(report, result)
+    sentences = [f"It would be {relaxation_words(row)}." for row in result.relaxation or ()]
+    return joined([*_one(report.case, result, "design"), paragraphs(sentences)])
+
+
+def _combined(report: Report, result: CombinedResult) -> Markup:
+    case, combined = report.case, result.combined
     parts: list[Markup] = []
-    if "combined" not in result:
-        parts += _one(report, result, "design")
-        for row in result.get("relaxation", []):
-            unit = f" {row['unit']}" if row["unit"] else ""
-            line = (
-                f"It would be feasible with {row['key']} = {row['needed']:.6g}{unit} instead of {row['limit']:g}{unit}."
-            )
-            parts.append(tag("p", line))
-        return joined(parts)
-    combined = result["combined"]
-    point = _point(report)
-    if "parameters" in point:
+    robot = None if combined.point is None else combined.point.robot
+    if robot is not None:
         words = "The combined robot" if report.is_answer else "What was reached; this is no answer"
-        parts.append(html_table(design_table(case, point), words, id="design"))
-        parts += paragraphs_of(singularity_lines(case, {**point, "task_is_free": False}))
-    if combined["tasks"]:
+        parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
+        parts.append(paragraphs(singularity_lines(robot, case.units)))
+    if combined.tasks:
         parts.append(html_table(outcome_table(combined), "What it means for each task", id="outcomes"))
-    parts += [tag("p", f"Note: {notice}.") for notice in combined["notices"]]
-    parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined["violated"]]
-    for k, own in enumerate(result["tasks"]):
+    parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
+    parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
+    for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"“{report.parts[k].name}” by itself"))
-        parts += paragraphs_of(_last_line(headline(case, own)))
-        parts += _one(report, own, f"design-{k + 1}")
+        parts.append(paragraphs([headline(own)]))
+        parts += _one(case, own, f"design-{k + 1}")
     return joined(parts)
 
 
-def _one(report: Report, result: dict[str, Any], anchor: str) -> list[Markup]:
-    """Tables of one task's result."""
-    case = report.case
-    if "parameters" not in result:
+def _one(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
+    """Return the tables of one task's result."""
+    robot, reached = result.robot, result.reached is not None
+    if robot is None:
         return [tag("p", "The robot does not exist at the point reached.", class_="warning")]
-    reached = "reached" in result
-    parts = [
-        html_table(design_table(case, result), "What was reached" if reached else "Dimensions and pose", id=anchor)
-    ]
-    if "poses" in result:
-        parts.append(html_table(pose_table(case, result), "The robot at every pose", id=f"{anchor}-poses"))
-    else:
-        parts.append(html_table(limb_table(case, result), "Limbs", id=f"{anchor}-limbs"))
-    if "rank" in result and not reached:
-        parts += paragraphs_of(singularity_lines(case, result))
+    caption = "What was reached" if reached else "Dimensions and pose"
+    parts = [html_table(solved_design_table(case, result, robot), caption, id=anchor)]
+    caption, kind = ("Limbs", "limbs") if robot.several is None else ("The robot at every pose", "poses")
+    parts.append(html_table(robot_table(case, robot), caption, id=f"{anchor}-{kind}"))
+    if not reached:
+        parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts
 
 
 def _limits(report: Report) -> Markup:
-    point = _point(report)
-    if not point.get("limits"):
+    limits, margins = _limits_of(report), _margins_of(report)
+    if not limits:
         return Markup("")
-    parts = [
-        html_table(limit_table(point), "How near the robot comes to each limit, and what the limit costs", id="limit")
-    ]
-    costly = [row for row in point["limits"] if row["active"] and row["cost"]]
-    if costly:
-        row = max(costly, key=lambda each: abs(each["cost"] * (each["limit"] or 1.0)))
-        unit = row["unit"] or "unit"
-        parts.append(
-            tag("p", f"Per part of its own size, {row['key']} costs most: F changes by {row['cost']:+.4g} per {unit}.")
-        )
-    if point.get("tolerance"):
-        parts += paragraphs_of([tolerance_line(report.case, point)])
-    rows = [
-        [
-            row["name"],
-            row["bound"],
-            "none" if row["value"] is None else f"{row['value']:.6g}",
-            f"{row['limit']:.6g}",
-            "none" if row["margin"] is None else f"{row['margin']:.4g}",
-            row["unit"],
-            "active" if row["active"] else "",
-        ]
-        for row in point["margins"]
-    ]
-    headers = ["where", "bound", "value", "limit", "margin", "unit", ""]
-    every = grid(headers, rows, "Every margin, positive inside")
-    parts.append(tag("details", tag("summary", f"Every margin ({len(rows)})"), every))
+    caption = "How near the robot comes to each limit, and what the limit costs"
+    parts = [html_table(limit_table(limits), caption, id="limit")]
+    costliest = costliest_words(limits)
+    if costliest is not None:
+        parts.append(tag("p", costliest))
+    result = report.result
+    if isinstance(result, SolveResult) and result.tolerance is not None:
+        parts.append(paragraphs([tolerance_line(result.tolerance, result.F, report.case.units)]))
+    every = html_table(margin_table(margins), "Every margin, positive inside")
+    parts.append(tag("details", tag("summary", f"Every margin ({len(margins)})"), every))
     return joined(parts)
 
 
 def _origin(report: Report) -> Markup:
     result = report.result
-    rows = [[name, text] for name, text in result["versions"].items()]
-    rows.append(["seed", str(report.case.search.seed)])
-    rows.append(["starts", str(report.case.search.starts)])
-    rows.append(["seconds", f"{result['seconds']:.3g}"])
+    origin = origin_table(result.versions, report.case.search, result.seconds)
     text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
     copy = tag(
         "p",
@@ -300,20 +283,20 @@ def _origin(report: Report) -> Markup:
         tag("span", id="copied", role="status"),
         class_="controls script",
     )
-    return joined(
-        [grid(["", ""], rows, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
-    )
+    return joined([html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text])
 
 
-def _last_line(group: object) -> list[object]:
-    return [*group.renderables[-1:]] if isinstance(group, Group) else [group]
-
-
-def _point(report: Report) -> dict[str, Any]:
-    """Where the robot of the report stands in its result."""
+def _limits_of(report: Report) -> Sequence[LimitData]:
+    """Return the limits of the case at the point that the report is about."""
     result = report.result
-    if "combined" not in result:
-        return result
-    combined = result["combined"]
-    reached: dict[str, Any] = combined.get("reached") or {}
-    return {**combined, **reached}
+    if isinstance(result, SolveResult):
+        return result.limits
+    return () if result.combined.point is None else result.combined.point.limits or ()
+
+
+def _margins_of(report: Report) -> Sequence[MarginData]:
+    """Return the margins at the point that the report is about."""
+    result = report.result
+    if isinstance(result, SolveResult):
+        return result.margins
+    return () if result.combined.point is None else result.combined.point.margins or ()

@@ -11,7 +11,7 @@ from .sections import answer, sections
 
 
 def page_of(report: Report) -> str:
-    """The whole page.
+    """Return the whole page.
 
     Words and tables come first and need no script. The library for the 3-D view stands at the end as text, and is
     started after the page is first painted.

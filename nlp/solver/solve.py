@@ -14,10 +14,10 @@ from ..errors import CaseError
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
 from .compromise import combine, solution_of_one_task
+from .interface import Solver
 from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
 from .solution import Solution
-from .solver import Solver
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
 #: and the best objective so far.

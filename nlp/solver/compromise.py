@@ -27,7 +27,7 @@ import numpy as np
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
 from ..case.task import Method, Sense, Task
-from ..evidence.kkt import FEASIBLE, correct, linearise
+from ..evidence.kkt import FEASIBLE, correct_point, linearise
 from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
@@ -244,7 +244,7 @@ def _nearest_member(
         found = polish(with_proximity_term(nlp, extended, target, weight), first=points)
         points = [found.x]
         for start in found.starts:
-            back = correct(nlp, start.x, linearise(nlp, start.x).active())
+            back = correct_point(nlp, start.x, linearise(nlp, start.x).active())
             kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
             if kept and distance(back.x) < distance(closest):
                 closest = back.x

@@ -11,7 +11,7 @@ from ..errors import EvaluationError
 from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
-from ..program.relaxation import Relaxed
+from ..program.relaxation import RelaxedLimit
 from .multistart import Optimum, ProgramSolution, Status
 from .starts import Start
 
@@ -134,7 +134,7 @@ class Solution:
         return self._decisive().optima
 
     @property
-    def relaxation(self) -> tuple[Relaxed, ...]:
+    def relaxation(self) -> tuple[RelaxedLimit, ...]:
         """Smallest movement found that makes the limits of an infeasible program feasible."""
         return self._decisive().relaxation
 

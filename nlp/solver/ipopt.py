@@ -15,7 +15,7 @@ from ...models import FloatArray
 from ..case.settings import Search
 from ..program.nlp import Nlp
 from .compiled import shared_library
-from .solver import LocalSearch, SolverResult, StopReason
+from .interface import LocalSearch, SolverResult, StopReason
 
 #: Ipopt's tolerance. The Newton correction that follows converges quadratically: tighter would only cost iterations.
 TOLERANCE = 1e-8
@@ -30,7 +30,7 @@ _REASONS = {
 
 
 def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[LocalSearch]:
-    """Return searches by Ipopt; see :class:`screwsynth.nlp.solve.solver.Solver`.
+    """Return searches by Ipopt; see :class:`screwsynth.nlp.solver.interface.Solver`.
 
     CasADi's symbols are not safe to share between threads: every function is built here, and only called later.
 

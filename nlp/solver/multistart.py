@@ -17,10 +17,10 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
-from ..program.relaxation import Relaxed, elastic, relaxed_limits, stretched_point
+from ..program.relaxation import RelaxedLimit, formulate_relaxation, relaxation_point, relaxed_limits
 from ..program.sampling import starting_points
+from .interface import Solver
 from .ipopt import ipopt
-from .solver import Solver
 from .starts import SAME_POINT, Start, StartStatus, search_from
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
@@ -94,7 +94,7 @@ class ProgramSolution:
     optima: tuple[Optimum, ...]
     seed: int
     seconds: float
-    relaxation: tuple[Relaxed, ...] = ()
+    relaxation: tuple[RelaxedLimit, ...] = ()
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name
@@ -139,8 +139,8 @@ def solve_program(
     limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
     if solution.status is not Status.INFEASIBLE or not limited:
         return solution
-    stretched = elastic(nlp)
-    points = [stretched_point(nlp, x) for x in (solution.x, nlp.start)]
+    stretched = formulate_relaxation(nlp)
+    points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
     few = replace(search, starts=min(search.starts, _ELASTIC_STARTS))
     relaxed = _search(stretched, few, points, jobs, None, solver)
     # An optimum of relaxations is often degenerate, with more limits active than it takes; what counts is that it is

@@ -18,10 +18,10 @@ import numpy as np
 
 from ...models import FloatArray
 from ..case.settings import Search
-from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct, linearise, multipliers
+from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers
 from ..program.nlp import Nlp
+from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
-from .solver import LocalSearch, Solver, SolverResult, StopReason
 
 #: A side farther than this, in half ranges, from where the solver stopped is not one that the optimum lies on.
 _NEAR = 1e-2
@@ -140,7 +140,7 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     raw = at = linearise(nlp, stopped)
     stationarity = multipliers(at, at.active())[1]
     for share in _SHARES if np.isfinite(raw.violation) else ():
-        corrected = correct(nlp, stopped, _likely_active(nlp, raw, found, share))
+        corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
         # A correction that makes F worse has gone to another stationary point.
         kept = corrected.phi <= raw.phi + _WORSE or raw.violation > FEASIBLE

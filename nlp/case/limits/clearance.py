@@ -1,0 +1,66 @@
+"""A limit on the distance between legs, as line segments between their joints.
+
+The squared distance ``d^2`` of two segments is exact (:mod:`screwsynth.nlp.case.limits.segments`). The constraint is on
+``1 - (1 - d^2/D^2)^3`` for d below D, which is twice the limit, and on 1 beyond. This function grows with d, is smooth
+to second order, and does not depend on legs that are far apart: where such legs happen to be parallel, second
+derivatives of their distance are not finite.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+from casadi import SX
+
+from ....models import Dimension
+from .constraint import BoundedConstraint, Reading, between
+from .interval import LowerLimit
+from .limit import PosedRobot
+from .segments import squared_distance
+
+
+@dataclass(frozen=True)
+class LegClearance(LowerLimit):
+    """Smallest distance between two legs, as line segments between their joints."""
+
+    key: ClassVar[str] = "leg_clearance"
+    description: ClassVar[str] = "between legs as line segments"
+    needs_legs: ClassVar[bool] = True
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return a smooth function of the distance of each pair of legs, with the distance itself."""
+        far = 4 * self.min**2
+        for one, other in itertools.combinations(pose.robot.legs, 2):
+            squared = squared_distance(one.base, one.span, other.base, other.span)
+            yield between(
+                f"leg_clearance limbs {one.name} and {other.name}{pose.where}",
+                _near(squared, far),
+                _reading(far),
+                "leg_clearance",
+                lower=self.min,
+                exact=ca.sqrt(squared),
+            )
+
+
+def _near(squared: SX, far: float) -> SX:
+    """Return ``1 - (1 - d^2/D^2)^3`` from the squared distances (1, 1) ``d^2`` and ``D^2``, and 1 beyond."""
+    return 1 - ca.fmax(0, 1 - squared / far) ** 3
+
+
+def _reading(far: float) -> Reading:
+    """Return the reading of :func:`_near` as the distance."""
+
+    def distance(value: float) -> float:
+        return math.sqrt(far * (1 - max(1 - value, 0.0) ** (1 / 3)))
+
+    return Reading(
+        Dimension.LENGTH,
+        from_value=lambda value: distance(max(value, 0.0)),
+        slope=lambda value: 6 * max(1 - value, 0.0) ** (2 / 3) * distance(max(value, 0.0)) / far,
+        to_value=lambda number: _near(number * number, far),
+    )

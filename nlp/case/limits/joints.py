@@ -1,0 +1,269 @@
+"""Limits on the angles of passive joints: a cone about each joint's mounting axis.
+
+With the unit mounting axis ``n`` and the leg ``d`` from its base joint to its platform joint, both in the world frame,
+the angle between them is limited by its cosine, ``-n . d / |d| <= -cos(max)``.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+
+import casadi as ca
+from casadi import SX
+from pydantic import (
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
+from pydantic_core import PydanticCustomError
+
+from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array, matrix_from_axis_angle
+from ...errors import CaseError
+from ...units import Units
+from ..table import Table, Vector
+from .constraint import BoundedConstraint, Reading, between
+from .limit import Limit, LimitedCase, PosedRobot, TableField, Written
+
+#: Three numbers.
+Triple: TypeAlias = tuple[float, float, float]
+
+#: ``-cos(angle)`` read as the angle.
+_ANGLE = Reading(
+    Dimension.ANGLE,
+    from_value=lambda value: math.acos(min(max(-value, -1.0), 1.0)),
+    slope=lambda value: math.sqrt(max(1 - value * value, 0.0)),
+    to_value=lambda number: -ca.cos(number),
+)
+
+
+def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
+    """Return one of the words for mounting axes, or say what else could stand there."""
+    try:
+        return handler(value)
+    except ValidationError:
+        fault = "must be 'normal' or 'home', a list of 3 numbers, or a list of such lists"
+        raise PydanticCustomError("reason", "{fault}", {"fault": fault}) from None
+
+
+def _kind_of_axes(value: object) -> str:
+    if not isinstance(value, list):
+        return "<word>"
+    return "<lists>" if value and isinstance(value[0], list) else "<list>"
+
+
+Axes = Annotated[
+    Annotated[Literal["normal", "home"], WrapValidator(_word), Tag("<word>")]
+    | Annotated[Vector, Tag("<list>")]
+    | Annotated[list[Vector], Tag("<lists>")],
+    Discriminator(_kind_of_axes),
+]
+
+
+class ConeTable(Table):
+    """The cone of a passive joint."""
+
+    max: FiniteFloat = Field(description="half angle")
+    about: Axes = Field(
+        default="normal",
+        description="mounting axes: the plate's normal, the leg's direction at limits.home, a direction in the "
+        "plate's frame, or a list with one for each leg",
+    )
+
+
+class HomeTable(Table):
+    """The pose at which joints are mounted straight."""
+
+    position: Vector = Field(description="origin of the platform frame")
+    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="axis of rotation")
+    angle: FiniteFloat = Field(default=0.0, description="angle of rotation")
+
+
+NumberOrCone = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[ConeTable, Tag("<range>")],
+    Discriminator(lambda value: "<range>" if isinstance(value, dict | ConeTable) else "<number>"),
+]
+
+
+@dataclass(frozen=True)
+class MountingPose:
+    """The pose at which passive joints are mounted straight: position, and ``exp(angle [axis]x)``."""
+
+    position: Triple
+    axis: Triple = (0.0, 0.0, 1.0)
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class JointAngle(Limit[float | ConeTable], abc.ABC):
+    """The cone of the passive joints of one plate: the largest angle of a leg to its joint's mounting axis.
+
+    Attributes:
+        max: half angle, radians, above 0 and at most half a turn.
+        about: the mounting axes, pointing the way from base to platform: the plate's normal when None, the leg's own
+            direction at a :class:`MountingPose`, one direction in the plate's frame for all joints, or one for each.
+    """
+
+    max: float
+    about: MountingPose | tuple[Triple, ...] | None = None
+
+    table: ClassVar[Any] = NumberOrCone
+    needs_legs: ClassVar[bool] = True
+
+    @classmethod
+    def from_table(cls, written: Written[float | ConeTable]) -> Self:
+        """Return the limit that a case file writes.
+
+        Raises:
+            CaseError: its cones are about a home pose that is not stated.
+        """
+        if not isinstance(written.value, ConeTable):
+            return cls(written.internal(written.value, Dimension.ANGLE))
+        largest = written.internal(written.value.max, Dimension.ANGLE)
+        match written.value.about:
+            case "normal":
+                return cls(largest)
+            case "home":
+                home = _home(written.limits)
+                if home is None:
+                    raise CaseError("limits.home", f'is missing: limits.{cls.key} has about = "home"')
+                angle = written.internal(home.angle, Dimension.ANGLE)
+                return cls(largest, MountingPose(_triple(home.position), _triple(home.axis), angle))
+            case axes:
+                rows = [row for row in axes if isinstance(row, list)]
+                flat = [part for part in axes if not isinstance(part, list)]
+                return cls(largest, tuple(_triple(row) for row in rows or [flat]))
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse an angle out of its range, and axes that give no direction or are not as many as the legs.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        case.check_number(f"{self.key}.max", self.max, Dimension.ANGLE, most=math.pi)
+        if self.about is None:
+            return
+        key, legs = f"limits.{self.key}.about", len(case.model.legs)
+        axes: Sequence[Triple] = [self.about.axis] if isinstance(self.about, MountingPose) else self.about
+        if len(axes) not in (1, legs):
+            raise CaseError(key, f"must be one direction, or one for each of the {legs} legs, got {len(axes)}")
+        for axis in axes:
+            if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
+                raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+        home = self.about
+        if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
+            raise CaseError(key, "must be a pose of finite numbers")
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return the cosine of each joint's angle."""
+        robot = pose.robot
+        for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
+            cosine = ca.dot(self._to_world(axis, robot.rotation), leg.span) / ca.norm_2(leg.span)
+            yield between(f"{self.key} limb {leg.name}{pose.where}", -cosine, _ANGLE, self.key, upper=self.max)
+
+    def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
+        """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""
+        if self.about is None:
+            return [SX([0, 0, 1])] * len(robot.legs)
+        if isinstance(self.about, MountingPose):
+            (axis,) = unit_axes((self.about.axis,), 1)
+            R = matrix_from_axis_angle(SX(axis.tolist()), SX(self.about.angle))
+            p = SX(list(self.about.position))
+            spans = [p + R @ leg.platform - leg.base for leg in robot.legs]
+            return [self._from_home(span / ca.norm_2(span), R) for span in spans]
+        return [SX(axis.tolist()) for axis in unit_axes(self.about, len(robot.legs))]
+
+    @staticmethod
+    @abc.abstractmethod
+    def _to_world(axis: SX, rotation: SX) -> SX:
+        """Return a direction (3, 1) of the plate's frame in the world frame.
+
+        Args:
+            axis: the direction.
+            rotation: (3, 3) of the platform.
+        """
+
+    @staticmethod
+    @abc.abstractmethod
+    def _from_home(direction: SX, rotation: SX) -> SX:
+        """Return a direction (3, 1) of the world frame in the plate's frame.
+
+        Args:
+            direction: the direction.
+            rotation: (3, 3) of the platform.
+        """
+
+
+@dataclass(frozen=True)
+class BaseJointAngle(JointAngle):
+    """The cones of the base joints."""
+
+    key: ClassVar[str] = "base_joint_angle"
+    description: ClassVar[str] = "half angle of the base joints' cones"
+
+    @staticmethod
+    def _to_world(axis: SX, rotation: SX) -> SX:  # noqa: ARG004 - the base's frame is the world's
+        return axis
+
+    @staticmethod
+    def _from_home(direction: SX, rotation: SX) -> SX:  # noqa: ARG004 - the base's frame is the world's
+        return direction
+
+
+@dataclass(frozen=True)
+class PlatformJointAngle(JointAngle):
+    """The cones of the platform joints."""
+
+    key: ClassVar[str] = "platform_joint_angle"
+    description: ClassVar[str] = "of the platform joints' cones"
+
+    @classmethod
+    def fields(cls) -> dict[str, TableField]:
+        """Return the keys of the joint angle, and of the home pose that both plates' cones may be about."""
+        about = 'the pose that about = "home" speaks of'
+        return {**super().fields(), "home": TableField(HomeTable | None, Field(default=None, description=about))}
+
+    @classmethod
+    def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
+        """Yield the limit that a case file states.
+
+        Raises:
+            CaseError: a home pose is stated that no cone is about, or the other way round.
+        """
+        cones = [getattr(limits, kind.key) for kind in (BaseJointAngle, PlatformJointAngle)]
+        about = [cone.about for cone in cones if isinstance(cone, ConeTable)]
+        if _home(limits) is not None and "home" not in about:
+            raise CaseError("limits.home", 'means nothing unless a joint angle has about = "home"')
+        yield from super().read(limits, model, units)
+
+    @staticmethod
+    def _to_world(axis: SX, rotation: SX) -> SX:
+        return rotation @ axis
+
+    @staticmethod
+    def _from_home(direction: SX, rotation: SX) -> SX:
+        return rotation.T @ direction
+
+
+def _home(limits: Table) -> HomeTable | None:
+    """Return the home pose of a table ``[limits]``."""
+    home = getattr(limits, "home", None)
+    return home if isinstance(home, HomeTable) else None
+
+
+def unit_axes(axes: tuple[Triple, ...], count: int) -> FloatArray:
+    """Return unit mounting axes (count, 3) from one for all joints or one for each."""
+    rows = [[part / math.hypot(*axis) for part in axis] for axis in axes]
+    return frozen_array(rows if len(rows) == count else rows * count, (count, 3))
+
+
+def _triple(values: Sequence[float]) -> Triple:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

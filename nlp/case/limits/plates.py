@@ -1,0 +1,103 @@
+"""Limits on the joint centres of the plates, which no pose changes: spacing, footprint, ratio of radii.
+
+Distances are limited by their squares. A joint's radius is its distance from its plate's z axis; a plate's radius is
+the root mean square of its joints' radii.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import casadi as ca
+from casadi import SX
+from pydantic import Field, FiniteFloat
+
+from ....models import Dimension
+from ...errors import CaseError
+from ..table import Table
+from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, between, bounded
+from .interval import IntervalLimit, LowerLimit
+from .limit import Design, Limit, LimitedCase, Plate, Written
+
+
+@dataclass(frozen=True)
+class JointSpacing(LowerLimit):
+    """Smallest distance between two joint centres of one plate."""
+
+    key: ClassVar[str] = "joint_spacing"
+    description: ClassVar[str] = "between joint centres of one plate"
+    needs_legs: ClassVar[bool] = True
+
+    def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
+        """Return the squared distance of each pair of joints."""
+        for one, other in itertools.combinations(plate.joints, 2):
+            name = f"joint_spacing {plate.name} joints {one.name} and {other.name}"
+            apart = ca.sumsqr(one.centre - other.centre)
+            yield between(name, apart, SQUARED_LENGTH, "joint_spacing", lower=self.min)
+
+
+class FootprintTable(Table):
+    """Largest distance of joint centres from their plate's axis."""
+
+    base: FiniteFloat | None = Field(default=None, description="of the base's joints")
+    platform: FiniteFloat | None = Field(default=None, description="of the platform's joints")
+
+
+@dataclass(frozen=True)
+class Footprint(Limit[FootprintTable]):
+    """Largest distance of joint centres from their plate's axis, its z axis."""
+
+    base: float | None = None
+    platform: float | None = None
+
+    key: ClassVar[str] = "footprint"
+    table: ClassVar[type[Table]] = FootprintTable
+    description: ClassVar[str] = "largest radii"
+    needs_legs: ClassVar[bool] = True
+
+    @classmethod
+    def from_table(cls, written: Written[FootprintTable]) -> Self:
+        """Return the limit that a case file writes."""
+        return cls(written.value.base, written.value.platform)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a footprint without radii, or with one that is not positive.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        case.check_number("footprint.base", self.base)
+        case.check_number("footprint.platform", self.platform)
+        if self.base is None and self.platform is None:
+            raise CaseError("limits.footprint", "must have base or platform")
+
+    def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
+        """Return the squared radius of each joint."""
+        largest = self.base if plate.name == "base" else self.platform
+        if largest is None:
+            return
+        for joint in plate.joints:
+            radius, keys = ca.sumsqr(joint.centre[:2]), ("", f"footprint.{plate.name}")
+            yield bounded(f"footprint {plate.name} joint {joint.name}", radius, SQUARED_LENGTH, keys, upper=largest)
+
+
+@dataclass(frozen=True)
+class RadiusRatio(IntervalLimit):
+    """Smallest and largest ratio of the platform's radius to the base's."""
+
+    key: ClassVar[str] = "radius_ratio"
+    description: ClassVar[str] = "platform's radius over base's"
+    needs_legs: ClassVar[bool] = True
+    measured: ClassVar[Dimension] = Dimension.NUMBER
+
+    def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
+        """Return the squared ratio."""
+        legs = design.robots[0].legs
+        platform, base = (
+            sum((ca.sumsqr(joint[:2]) for joint in joints), SX(0))
+            for joints in ([leg.platform for leg in legs], [leg.base for leg in legs])
+        )
+        yield between("radius_ratio", platform / base, SQUARED_NUMBER, "radius_ratio", lower=self.min, upper=self.max)

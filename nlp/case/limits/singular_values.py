@@ -1,0 +1,154 @@
+"""Limits on the singular values of J, made homogeneous: moments about the platform's origin, divided by a length.
+
+The constraints are on eigenvalues of ``J'J`` (:mod:`screwsynth.nlp.case.limits.spectrum`). The smallest one is
+estimated from below and the largest from above, so that a design that keeps the constraints keeps the limits. The
+measured numbers are computed from the singular value decomposition of J at a point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, Self
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from pydantic import Field, FiniteFloat
+
+from ....models import Dimension, FloatArray, homogenised
+from ..table import Table
+from .constraint import SQUARED_NUMBER, BoundedConstraint, Reading, between
+from .limit import Limit, LimitedCase, PosedRobot, Written
+from .spectrum import largest_eigenvalue, smallest_eigenvalue
+
+#: ``-1 / c^2`` read as the condition number c.
+_CONDITION = Reading(
+    Dimension.NUMBER,
+    from_value=lambda value: 1 / math.sqrt(-value) if value < 0 else math.inf,
+    slope=lambda value: 2 * max(-value, 0.0) ** 1.5,
+    to_value=lambda number: -1 / (number * number),
+)
+
+
+class SmallestTable(Table):
+    """The smallest singular value of J, homogenised."""
+
+    min: FiniteFloat = Field(description="smallest value")
+    length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
+
+
+@dataclass(frozen=True)
+class SmallestSingularValue(Limit[SmallestTable]):
+    """Smallest singular value of the homogenised J.
+
+    Attributes:
+        min: smallest value.
+        length: length by which moments are divided.
+    """
+
+    min: float
+    length: float
+
+    key: ClassVar[str] = "smallest_singular_value"
+    table: ClassVar[type[Table]] = SmallestTable
+    description: ClassVar[str] = "of the same J"
+
+    @classmethod
+    def from_table(cls, written: Written[SmallestTable]) -> Self:
+        """Return the limit that a case file writes."""
+        return cls(written.value.min, written.value.length)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a value or a length that is not positive.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        case.check_number("smallest_singular_value.min", self.min, Dimension.NUMBER)
+        case.check_number("smallest_singular_value.length", self.length)
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return the smallest eigenvalue of ``J'J``."""
+        yield between(
+            f"smallest_singular_value{pose.where}",
+            smallest_eigenvalue(_gram(pose, self.length)),
+            SQUARED_NUMBER,
+            "smallest_singular_value",
+            lower=self.min,
+            measure=partial(_smallest, self.length),
+        )
+
+
+class ConditionTable(Table):
+    """The ratio of the singular values of J, homogenised."""
+
+    max: FiniteFloat = Field(description="largest value")
+    length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
+
+
+@dataclass(frozen=True)
+class ConditionNumber(Limit[ConditionTable]):
+    """Largest ratio of the singular values of the homogenised J.
+
+    Attributes:
+        max: largest value.
+        length: length by which moments are divided.
+    """
+
+    max: float
+    length: float
+
+    key: ClassVar[str] = "condition_number"
+    table: ClassVar[type[Table]] = ConditionTable
+    description: ClassVar[str] = "of J, made homogeneous by a length"
+    order: ClassVar[int] = 1
+
+    @classmethod
+    def from_table(cls, written: Written[ConditionTable]) -> Self:
+        """Return the limit that a case file writes."""
+        return cls(written.value.max, written.value.length)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a ratio that is not above 1, or a length that is not positive.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        case.check_number("condition_number.max", self.max, Dimension.NUMBER, above=1.0)
+        case.check_number("condition_number.length", self.length)
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return minus the ratio of the smallest to the largest eigenvalue of ``J'J``."""
+        gram = _gram(pose, self.length)
+        yield between(
+            f"condition_number{pose.where}",
+            -smallest_eigenvalue(gram) / largest_eigenvalue(gram),
+            _CONDITION,
+            "condition_number",
+            upper=self.max,
+            measure=partial(_condition, self.length),
+        )
+
+
+def _gram(pose: PosedRobot, length: float) -> SX:
+    """Return ``J'J`` (6, 6) of the homogenised J."""
+    J = ca.horzcat(*homogenised(pose.robot.jacobian, pose.robot.position, length))
+    return J.T @ J
+
+
+def _smallest(length: float, jacobian: FloatArray, position: FloatArray) -> float:
+    return float(_singular_values(length, jacobian, position)[-1])
+
+
+def _condition(length: float, jacobian: FloatArray, position: FloatArray) -> float:
+    values = _singular_values(length, jacobian, position)
+    return float(values[0] / values[-1]) if values[-1] > 0 else math.inf
+
+
+def _singular_values(length: float, jacobian: FloatArray, position: FloatArray) -> FloatArray:
+    """Return the singular values (6,) of the homogenised J, largest first; 0 for missing rows."""
+    values = np.linalg.svd(np.array(homogenised(jacobian, position, length)), compute_uv=False)
+    return np.concatenate([values, np.zeros(6 - len(values))])

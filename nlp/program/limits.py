@@ -1,0 +1,121 @@
+"""The limits of a case as constraints of its program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from operator import attrgetter
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray, RobotInstance
+from ..case.case import Case
+from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..case.pose import Free
+
+#: Relative difference of two limits that are the same: rounding.
+_SAME = 1e-12
+#: How well a limit that depends on fixed numbers alone must hold: they are written with a dozen digits.
+_ROUNDING = 1e-9
+
+
+class LimitConstraints(NamedTuple):
+    """The limits of a case as constraints.
+
+    Attributes:
+        varying: those that depend on the variables, and those that do not hold.
+        constant: those that hold whatever is chosen, because they depend on fixed numbers alone.
+    """
+
+    varying: tuple[BoundedConstraint, ...]
+    constant: tuple[BoundedConstraint, ...]
+
+
+class ProgramNumbers(NamedTuple):
+    """The numbers of a program: symbols ``x`` (n, 1) with their bounds, and ``p`` (k, 1) with their values."""
+
+    x: SX
+    p: SX
+    bounds: Sequence[Free]
+    values: Sequence[float]
+
+
+def limit_constraints(
+    case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX], numbers: ProgramNumbers
+) -> LimitConstraints:
+    """Return the limits of a case as constraints, each once.
+
+    Args:
+        case: the case.
+        robots: the robot at each pose.
+        named: symbols of the case's own numbers by name, radians for angles.
+        numbers: the program's numbers.
+    """
+    if not case.limits:
+        return LimitConstraints((), ())
+    points = _points(numbers.bounds)
+    limits = _without_repeated(list(_constraints(case, robots, named)), numbers, points)
+    expressions = ca.vertcat(*[item.constraint.expression for item in limits])
+    x, p = numbers.x, numbers.p
+    free = ca.which_depends(expressions, x, 1, True) if numbers.bounds else [False] * len(limits)
+    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(points[0], numbers.values).full().ravel()
+    varying: list[BoundedConstraint] = []
+    constant: list[BoundedConstraint] = []
+    for item, varies, value in zip(limits, free, values, strict=True):
+        holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
+        (constant if holds and not varies else varying).append(item)
+    return LimitConstraints(tuple(varying), tuple(constant))
+
+
+def _constraints(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[BoundedConstraint]:
+    """Yield the constraints of every limit: of both plates, of the whole design, then of one pose after the other."""
+    limits = sorted(case.limits, key=attrgetter("order"))
+    legs, model = robots[0].legs, case.model
+    base = Plate("base", tuple(PlateJoint(leg.name, leg.base) for leg in legs))
+    platform = Plate("platform", tuple(PlateJoint(leg.name, leg.platform) for leg in legs))
+    design = Design(case.as_limited, tuple(robots), named)
+    for plate in (base, platform):
+        for limit in limits:
+            yield from limit.on_plate(plate)
+    for limit in limits:
+        yield from limit.of_design(design)
+    for k, robot in enumerate(robots):
+        tasks = tuple(task.name for task in case.tasks[: robot.rates.shape[1]])
+        pose = PosedRobot(model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "")
+        for limit in limits:
+            for item in limit.at_pose(pose):
+                yield replace(item, constraint=replace(item.constraint, pose=k))
+
+
+def _without_repeated(
+    limits: Sequence[BoundedConstraint], numbers: ProgramNumbers, points: FloatArray
+) -> list[BoundedConstraint]:
+    """Return the limits without those that only repeat another.
+
+    Symmetric robots have limits that are the same function of the variables and the arguments, and would share one
+    multiplier. Two limits of one key are the same where they agree, with the arguments' values, at every one of a few
+    points (k, n).
+    """
+    if not limits:
+        return []
+    constraints = [item.constraint for item in limits]
+    measured = [each.expression if each.exact is None else each.exact for each in constraints]
+    function = ca.Function("limits", [numbers.x, numbers.p], [ca.densify(ca.vertcat(*measured))])
+    columns = np.column_stack([function(point, numbers.values).full().ravel() for point in points])
+    kept: list[int] = []
+    for i, row in enumerate(columns):
+        like = (j for j in kept if limits[j].constraint.keys == limits[i].constraint.keys)
+        if not any(np.allclose(columns[j], row, rtol=_SAME, atol=0.0) for j in like):
+            kept.append(i)
+    return [limits[i] for i in kept]
+
+
+def _points(bounds: Sequence[Free]) -> FloatArray:
+    """Return points (3, n) of the box that no symmetry singles out."""
+    parts = np.modf(np.outer(np.arange(1, 4), np.sqrt(2.0 + np.arange(len(bounds)))))[0]
+    lower, upper = np.array([[bound.lower, bound.upper] for bound in bounds]).reshape(-1, 2).T
+    return np.asarray(lower + (0.1 + 0.8 * parts) * (upper - lower), dtype=np.float64)

@@ -1,0 +1,85 @@
+"""A solution of several tasks as a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..certificate.certificate import Certificate
+from ..solver.solution import Combination, Solution, TaskOutcome
+from .data import CombinedData, CombinedPointData, CombinedResult, OutcomeData
+from .design import limits_data, margins_data
+from .evidence import certificate_data, optimality_data
+from .jsondata import vector
+from .point import finite, head_data, robot_data, versions
+from .solution import starts_data, task_result
+
+
+def combined_result(
+    solution: Solution,
+    combination: Combination,
+    certificates: Sequence[Certificate] = (),
+    combined_certificate: Certificate | None = None,
+) -> CombinedResult:
+    """Return the whole result of several tasks.
+
+    Args:
+        solution: of the case.
+        combination: how its tasks were combined.
+        certificates: of each task by itself, where they were asked for.
+        combined_certificate: of the combined program.
+    """
+    combined, point = combination.combined, _point(solution, combination)
+    return CombinedResult(
+        head=head_data(solution.case),
+        status=solution.status,
+        tasks=tuple(
+            task_result(outcome.own, j, certificates[j] if certificates else None)
+            for j, outcome in enumerate(solution.outcomes)
+        ),
+        combined=CombinedData(
+            method=combination.method,
+            value=combination.value,
+            made=point if solution.is_made else None,
+            reached=None if solution.is_made else point,
+            tasks=tuple(_outcome(outcome, answered=solution.is_made) for outcome in solution.outcomes),
+            violated=combination.violated,
+            notices=combination.notices,
+            optimality=None if combined is None else optimality_data(combined.nlp, combined.evidence),
+            starts=None if combined is None else starts_data(combined),
+            certificate=certificate_data(combined_certificate),
+        ),
+        versions=versions(),
+        seconds=solution.seconds,
+    )
+
+
+def _point(solution: Solution, combination: Combination) -> CombinedPointData:
+    """Return the combined point; without the robot, where its equations have no value there."""
+    own, combined = solution.outcomes[0], combination.combined
+    if own.state is None:
+        return CombinedPointData(robot=None, margins=None, limits=None)
+    # Where one program brought the tasks together, a limit has a cost: of that program's value.
+    nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
+    margins = margins_data(nlp, x, optimal=combined is not None and solution.is_made)
+    robot = robot_data(own.own.nlp, solution.x, own.state, None)
+    return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
+
+
+def _outcome(outcome: TaskOutcome, *, answered: bool) -> OutcomeData:
+    """Return a task at the combined point; without an answer there is no F, without an own optimum no best."""
+    best = outcome.own.F if outcome.own.status.is_answer else None
+    state = outcome.state if answered else None
+    loss = outcome.loss if state is not None and best is not None else math.nan
+    return OutcomeData(
+        name=outcome.task.name,
+        sense=outcome.task.sense,
+        weight=outcome.task.weight,
+        F=None if state is None else outcome.F,
+        best=best,
+        loss=finite(loss),
+        relative_loss=finite(loss / best) if best else None,
+        unique=outcome.unique,
+        verdict=None if outcome.evidence is None else outcome.evidence.kind,
+        rates=None if state is None else vector(state.rates),
+    )

@@ -1,0 +1,117 @@
+"""The robot at one given point as a result: the types, and how they are made. Nothing is optimised."""
+
+from collections.abc import Sequence
+
+from ...models import FloatArray
+from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
+from ..evidence.state import RobotState
+from ..program.nlp import Nlp
+from .design import limits_data, margins_data
+from .jsondata import Inline, JsonObject, Vector, vector
+from .parts import HeadData, LimitData, MarginData, MotionData, RobotData, TaskData, VersionsData, ViolationData
+from .point import head_data, motion_data, objective, robot_data, task_data, versions, violations
+
+
+class EvaluatedTaskData(JsonObject):
+    """A task at the point.
+
+    Attributes:
+        task: the task.
+        F: its objective.
+        rates: work rate of each row in the task's motion.
+        task_is_free: whether F is zero, so that nothing resists the task's motion.
+    """
+
+    task: Inline[TaskData]
+    F: float
+    rates: Vector
+    task_is_free: bool
+
+
+class PrincipalMotionData(JsonObject):
+    """A motion at which F is stationary.
+
+    Attributes:
+        F: objective for it.
+        motion: of unit rotation, or a translation of unit speed.
+    """
+
+    F: float
+    motion: Inline[MotionData]
+
+
+class PrincipalMotionsData(JsonObject):
+    """Motions at which F is stationary, each three by ascending F.
+
+    Attributes:
+        rotations: among twists of unit rotation.
+        translations: among translations of unit speed.
+    """
+
+    rotations: tuple[PrincipalMotionData, ...]
+    translations: tuple[PrincipalMotionData, ...]
+
+
+class EvaluationResult(JsonObject):
+    """Result of evaluating a case at one point.
+
+    Attributes:
+        head: the case.
+        F: objective of the first task.
+        robot: at the point, with the first task.
+        tasks: every task at the point.
+        violated: bounds and constraints that the point lies outside of.
+        margins: every limit at every leg, joint and pose.
+        limits: one row for each limiting number of the case.
+        principal_motions: motions that the robot resists least and most.
+        versions: of the programs.
+    """
+
+    head: Inline[HeadData]
+    F: float
+    robot: Inline[RobotData]
+    tasks: tuple[EvaluatedTaskData, ...]
+    violated: tuple[ViolationData, ...]
+    margins: tuple[MarginData, ...]
+    limits: tuple[LimitData, ...]
+    principal_motions: PrincipalMotionsData
+    versions: VersionsData
+
+
+def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotState]) -> EvaluationResult:
+    """Return the robot at one point: with its first task, then every task, and the motions that it resists least.
+
+    Args:
+        nlps: the program of each task.
+        x: (n,) the point.
+        states: the robot there with each task's rates, in order.
+    """
+    nlp, case = nlps[0], nlps[0].case
+    analysis = analyse_tasks(states[0].jacobian)
+    margins = margins_data(nlp, x, optimal=False)
+    return EvaluationResult(
+        head=head_data(case),
+        F=objective(nlp, x, states[0]),
+        robot=robot_data(nlp, x, states[0], 0),
+        tasks=tuple(
+            EvaluatedTaskData(
+                task=task_data(case, j),
+                F=objective(nlps[j], x, state),
+                rates=vector(state.rates),
+                task_is_free=state.is_zero,
+            )
+            for j, state in enumerate(states)
+        ),
+        violated=violations(nlp, x),
+        margins=margins,
+        limits=limits_data(margins),
+        principal_motions=PrincipalMotionsData(
+            rotations=tuple(_principal(each) for each in analysis.rotations),
+            translations=tuple(_principal(each) for each in analysis.translations),
+        ),
+        versions=versions(),
+    )
+
+
+def _principal(motion: PrincipalMotion) -> PrincipalMotionData:
+    return PrincipalMotionData(F=motion.F, motion=motion_data(motion.twist))

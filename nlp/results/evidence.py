@@ -1,0 +1,80 @@
+"""Evidence of optimality and proven bounds as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ..certificate.certificate import Certificate
+from ..evidence.optimality import Evidence
+from ..program.nlp import Nlp
+from .data import ActiveData, CertificateData, OptimalityData
+from .jsondata import vector
+from .point import finite
+
+
+def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
+    """Return the evidence about a point of a program in the case's units, where there is any."""
+    if evidence is None:
+        return None
+    units = nlp.case.units
+    return OptimalityData(
+        kind=evidence.kind,
+        stationarity=finite(evidence.stationarity),
+        feasibility=finite(evidence.feasibility),
+        complementarity=finite(evidence.complementarity),
+        licq=evidence.licq,
+        active=tuple(
+            ActiveData(
+                name=side.name,
+                bound=side.bound,
+                value=units.shown(side.value, side.dimension),
+                # F per unit of the limit: the unit's own factor divides.
+                multiplier=side.multiplier * units.to_internal(1.0, side.dimension),
+            )
+            for side in evidence.active
+        ),
+        reduced_hessian_eigenvalues=vector(evidence.eigenvalues),
+        flat_directions=tuple(_flat(nlp, direction) for direction in evidence.flat),
+    )
+
+
+def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
+    """Return a flat direction in the case's units, its largest rate 1."""
+    rates = {
+        variable.name: nlp.case.units.shown(direction[variable.name], variable.dimension)
+        for variable in nlp.program.variables
+        if variable.name in direction
+    }
+    largest = max(rates.values(), key=abs)
+    return MappingProxyType({name: rate / largest for name, rate in rates.items()})
+
+
+def certificate_data(certificate: Certificate | None) -> CertificateData | None:
+    """Return a proven bound, where there is one."""
+    if certificate is None:
+        return None
+    return CertificateData(
+        status=certificate.status,
+        bound=finite(certificate.bound),
+        incumbent=finite(certificate.incumbent),
+        gap=finite(certificate.gap),
+        relative_gap=certificate.relative_gap,
+        engine=certificate.engine,
+        boxes=certificate.boxes,
+        open=certificate.open,
+        seconds=certificate.seconds,
+        statement=certificate.statement,
+        history=certificate.history,
+    )
+
+
+def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:
+    """Return the best point known by the names of the program's variables, in the case's units."""
+    if certificate is None or certificate.x is None:
+        return None
+    nlp = certificate.nlp
+    variables = zip(nlp.program.variables, certificate.x, strict=True)
+    return MappingProxyType(
+        {each.name: nlp.case.units.shown(float(value), each.dimension) for each, value in variables}
+    )

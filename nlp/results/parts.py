@@ -1,0 +1,308 @@
+"""Parts that several kinds of result share: the case, poses, motions, the robot at a point, limits and their margins.
+
+Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinite pitch, which is the string ``"inf"``.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal, TypeAlias
+
+from ..case.pose import OverPoses
+from ..case.task import Sense
+from .jsondata import Absent, Inline, JsonObject, Size, Vector, Vector3, Vector6
+
+#: Version of the format.
+SCHEMA = 1
+
+#: A side of a limit: from below, from above, or both at once.
+Bound: TypeAlias = Literal["min", "max", "equal"]
+#: Values of a quantity by the limb or joint that has it.
+ByOwner: TypeAlias = Mapping[str, float]
+RotationMatrix: TypeAlias = Annotated[tuple[Vector3, ...], Size(3)]
+Jacobian: TypeAlias = tuple[Vector6, ...]
+
+
+class UnitsData(JsonObject):
+    """Units of the case.
+
+    Attributes:
+        length: label of the length unit.
+        angle: unit of angles.
+    """
+
+    length: str
+    angle: Literal["deg", "rad"]
+
+
+class HeadData(JsonObject):
+    """The case that a result is about.
+
+    Attributes:
+        schema: version of the format.
+        case: name of the case, its file's.
+        title: title of the case.
+        model: name of the robot.
+        units: of every number.
+    """
+
+    schema: int
+    case: str
+    title: str
+    model: str
+    units: UnitsData
+
+
+class VersionsData(JsonObject):
+    """Versions of the programs that the numbers depend on."""
+
+    screwsynth: str
+    casadi: str
+    numpy: str
+    python: str
+
+
+class PoseData(JsonObject):
+    """A pose of the platform.
+
+    Attributes:
+        position: of the platform's origin, in the world frame.
+        axis: unit axis of the rotation.
+        angle: of the rotation about the axis.
+        rotation_matrix: rows of the rotation matrix.
+    """
+
+    position: Vector3
+    axis: Vector3
+    angle: float
+    rotation_matrix: RotationMatrix
+
+
+class MotionData(JsonObject):
+    """An instantaneous motion of the platform.
+
+    Attributes:
+        twist: angular velocity, then velocity at the world origin.
+        axis: unit direction of the screw axis.
+        point: the axis's point nearest to the world origin; null for a translation.
+        pitch: length per radian; "inf" for a translation.
+    """
+
+    twist: Vector6
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+class TaskData(JsonObject):
+    """A task of the case.
+
+    Attributes:
+        name: of the task.
+        sense: whether F is maximised or minimised.
+        motion: of the platform.
+    """
+
+    name: str
+    sense: Sense
+    motion: Inline[MotionData]
+
+
+class PoseStateData(JsonObject):
+    """The robot at one of several poses.
+
+    Attributes:
+        F: objective at this pose alone.
+        pose: of the platform.
+        jacobian: unit wrenches as rows, force then moment about the world origin.
+        rates: one for each row.
+        rank: of the Jacobian.
+        singular: whether the rank is below six.
+        singular_values: of the Jacobian, largest first.
+        quantities: leg lengths, joint angles and the like, by limb.
+    """
+
+    F: float
+    pose: PoseData
+    jacobian: Jacobian
+    rates: Vector
+    rank: int
+    singular: bool
+    singular_values: Vector
+    quantities: Mapping[str, ByOwner]
+
+
+class PosesData(JsonObject):
+    """The robot at every pose of a case with several.
+
+    Attributes:
+        stated_poses: poses that the case states, before their displacements.
+        over_poses: how F is combined over the poses.
+        poses: the robot at every pose.
+    """
+
+    stated_poses: tuple[PoseData, ...]
+    over_poses: OverPoses
+    poses: tuple[PoseStateData, ...]
+
+
+class RobotData(JsonObject):
+    """The robot at a point; with several poses, at the first.
+
+    Attributes:
+        parameters: dimensions by name; three numbers for a point or direction.
+        pose: of the platform; with several poses, the first that the case states.
+        task: the task that the rates belong to; absent where there are several.
+        limbs: limb of each row of the Jacobian.
+        jacobian: unit wrenches as rows, force then moment about the world origin.
+        rates: work rate of each row in the task's motion.
+        rank: of the Jacobian.
+        singular: whether the rank is below six.
+        singular_values: of the Jacobian, largest first.
+        free_motions: basis of the motions that no row resists.
+        task_is_free: whether F is zero, so that nothing resists the task's motion.
+        quantities: leg lengths, joint angles and the like, by limb.
+        characteristic_length: that relates couples to forces; absent for robots without constraint couples.
+        several: the robot at every pose; absent where there is one.
+    """
+
+    parameters: Mapping[str, float | Vector]
+    pose: PoseData
+    task: Absent[TaskData]
+    limbs: tuple[str, ...]
+    jacobian: Jacobian
+    rates: Absent[Vector]
+    rank: int
+    singular: bool
+    singular_values: Vector
+    free_motions: tuple[MotionData, ...]
+    task_is_free: Absent[bool]
+    quantities: Mapping[str, ByOwner]
+    characteristic_length: Absent[float]
+    several: Inline[PosesData | None]
+
+
+class ViolationData(JsonObject):
+    """A bound or constraint that a point lies outside of.
+
+    Attributes:
+        name: variable or constraint.
+        bound: side of it.
+        value: at the point.
+        limit: that it must keep.
+    """
+
+    name: str
+    bound: Bound
+    value: float
+    limit: float
+
+
+class MarginData(JsonObject):
+    """Margin of a point in a limit at one leg, joint or pose.
+
+    Attributes:
+        name: the limit, and where.
+        key: dotted key, below limits, of the number in the case.
+        bound: side of it.
+        value: measured there; null where it is not finite.
+        limit: number of the case.
+        margin: distance from the limit, positive inside.
+        unit: of value, limit and margin.
+        active: whether the point lies on the limit.
+        cost: derivative of the optimal F by the limit; null where the point is no optimum.
+    """
+
+    name: str
+    key: str
+    bound: Bound
+    value: float | None
+    limit: float
+    margin: float | None
+    unit: str
+    active: bool
+    cost: float | None
+
+
+class LimitData(JsonObject):
+    """A limiting number of the case, over all legs, joints and poses.
+
+    Attributes:
+        key: dotted key, below limits, of the number.
+        limit: the number.
+        unit: of limit, value and margin.
+        nearest: where the margin is least.
+        value: measured there.
+        margin: least margin, positive inside.
+        active: everywhere that the point lies on the limit.
+        cost: derivative of the optimal F by the number; null where the point is no optimum.
+    """
+
+    key: str
+    limit: float
+    unit: str
+    nearest: str
+    value: float | None
+    margin: float | None
+    active: tuple[str, ...]
+    cost: float | None
+
+
+class RelaxationData(JsonObject):
+    """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
+
+    Attributes:
+        key: dotted key, below limits, of the number.
+        limit: as it is.
+        needed: as it would have to be.
+        unit: of both.
+    """
+
+    key: str
+    limit: float
+    needed: float
+    unit: str
+
+
+class SensitivityData(JsonObject):
+    """Sensitivity of the optimal F to a fixed number.
+
+    Attributes:
+        name: of the number.
+        value: of the number.
+        unit: of the value.
+        derivative: of the optimal F by the number.
+    """
+
+    name: str
+    value: float
+    unit: str
+    derivative: float
+
+
+class JointGradientData(JsonObject):
+    """Derivatives of F by the error of a joint centre.
+
+    Attributes:
+        limb: of the joint.
+        plate: base or platform.
+        gradient: in the plate's frame.
+    """
+
+    limb: str
+    plate: str
+    gradient: Vector3
+
+
+class ToleranceData(JsonObject):
+    """Loss of F by inexact joint centres.
+
+    Attributes:
+        joint_centre: largest error of every joint centre.
+        loss: worst loss of F, to first order.
+        loss_there: loss of F with the errors that are worst to first order.
+        joints: derivatives of F by each joint's error.
+    """
+
+    joint_centre: float
+    loss: float
+    loss_there: float
+    joints: tuple[JointGradientData, ...]

@@ -1,0 +1,202 @@
+"""The robot at a point as data: its case, poses, motions and numbers, and the constraints that the point violates."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from ...models import Dimension, FloatArray, Quantity, axis_from_screw
+from ..case.case import Case
+from ..evidence.kkt import FEASIBLE, linearise
+from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
+from ..program.nlp import Nlp
+from .jsondata import Vector, matrix, vector
+from .parts import (
+    SCHEMA,
+    ByOwner,
+    HeadData,
+    MotionData,
+    PoseData,
+    PosesData,
+    PoseStateData,
+    RobotData,
+    TaskData,
+    UnitsData,
+    VersionsData,
+    ViolationData,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+#: Violations of less than this part of the worst are left out: they only give way to it.
+_SMALL = 1e-3
+
+
+def head_data(case: Case) -> HeadData:
+    """Return the case that a result is about."""
+    units = UnitsData(length=case.units.length, angle=case.units.angle)
+    return HeadData(schema=SCHEMA, case=case.name, title=case.title, model=case.model.name, units=units)
+
+
+def versions() -> VersionsData:
+    """Return the versions of the programs that the numbers depend on."""
+    return VersionsData(
+        screwsynth=version("screwsynth"),
+        casadi=ca.CasadiMeta.version(),
+        numpy=np.__version__,
+        python=platform.python_version(),
+    )
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for one that JSON cannot hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> RobotData:
+    """Return the robot at a point.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        state: the robot there, at the first pose where there are several.
+        task: index in the case of the task that the state's rates belong to; None leaves task and rates out.
+
+    Raises:
+        EvaluationError: a number is not finite at another pose.
+    """
+    case = nlp.case
+    several = _poses_data(nlp, x)
+    return RobotData(
+        parameters=parameters_data(case, state),
+        pose=pose_data(case, state) if several is None else several.stated_poses[0],
+        task=None if task is None else task_data(case, task),
+        limbs=tuple(row.limb for row in case.model.wrenches),
+        jacobian=matrix(state.jacobian),
+        rates=None if task is None else vector(state.rates),
+        rank=state.rank,
+        singular=state.is_singular,
+        singular_values=vector(state.singular_values),
+        free_motions=tuple(motion_data(twist) for twist in state.free_twists),
+        task_is_free=None if task is None else state.is_zero,
+        quantities=_quantities(case, state),
+        characteristic_length=case.characteristic_length if case.model.has_couples else None,
+        several=several,
+    )
+
+
+def _poses_data(nlp: Nlp, x: FloatArray) -> PosesData | None:
+    """Return the robot at every pose, or None where there is one pose only.
+
+    F and rates are those of the program's task, of its first where it combines several.
+    """
+    case = nlp.case
+    if len(nlp.program.robots) == 1:
+        return None
+    return PosesData(
+        stated_poses=tuple(pose_data(case, pose) for pose in stated_poses(nlp, x)),
+        over_poses=case.over_poses,
+        poses=tuple(_pose_state(case, evaluate(nlp, x, k)) for k in range(len(nlp.program.robots))),
+    )
+
+
+def _pose_state(case: Case, state: RobotState) -> PoseStateData:
+    return PoseStateData(
+        F=state.F,
+        pose=pose_data(case, state),
+        jacobian=matrix(state.jacobian),
+        rates=vector(state.rates),
+        rank=state.rank,
+        singular=state.is_singular,
+        singular_values=vector(state.singular_values),
+        quantities=_quantities(case, state),
+    )
+
+
+def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
+    """Return a pose in the case's units."""
+    return PoseData(
+        position=vector(pose.position),
+        axis=vector(pose.axis),
+        angle=case.units.shown(pose.angle, Dimension.ANGLE),
+        rotation_matrix=matrix(pose.rotation),
+    )
+
+
+def task_data(case: Case, task: int) -> TaskData:
+    """Return a task of the case, by its index."""
+    chosen = case.tasks[task]
+    return TaskData(name=chosen.name, sense=chosen.sense, motion=motion_data(chosen.twist))
+
+
+def motion_data(twist: ArrayLike) -> MotionData:
+    """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
+    screw = axis_from_screw(twist)
+    translation = math.isinf(screw.pitch)
+    return MotionData(
+        twist=vector(np.asarray(twist, dtype=np.float64)),
+        axis=vector(screw.axis),
+        point=None if translation else vector(screw.point),
+        pitch="inf" if translation else screw.pitch,
+    )
+
+
+def parameters_data(case: Case, state: RobotState) -> Mapping[str, float | Vector]:
+    """Return the robot's parameters by name, in the case's units: several numbers for a point or direction."""
+    shown: dict[str, float | Vector] = {}
+    for parameter in case.model.parameters:
+        values = [case.units.shown(float(value), parameter.dimension) for value in state.parameters[parameter.name]]
+        shown[parameter.name] = values[0] if len(values) == 1 else tuple(values)
+    return MappingProxyType(shown)
+
+
+def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:
+    """Return the model's measures that are finite, by name and owner, in the case's units."""
+    return MappingProxyType(
+        {
+            item.name: _by_owner(case, item, state.quantities[item.name])
+            for item in case.model.quantities
+            if np.isfinite(state.quantities[item.name]).all()
+        }
+    )
+
+
+def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
+    pairs = zip(quantity.owners, values, strict=True)
+    return MappingProxyType({owner: case.units.shown(float(value), quantity.dimension) for owner, value in pairs})
+
+
+def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:
+    """Return F at a point (n,): that of the state, or the sum, mean or worst over several poses."""
+    return nlp.evaluate(x)[0] if state is None or len(nlp.program.robots) > 1 else state.F
+
+
+def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
+    """Return the bounds and constraints that a point (n,) lies outside of, in the case's words and units.
+
+    Those that are violated a thousand times less than the worst are left out: they only give way to it.
+    """
+    at, g = linearise(nlp, x), nlp.evaluate(x)[1]
+    units = nlp.case.units
+    rows: list[ViolationData] = []
+    for j, side in enumerate(nlp.sides.sides):
+        if at.slack[j] >= -max(FEASIBLE, _SMALL * at.violation):
+            continue
+        value = float(x[side.variable]) if side.variable is not None else float(g[side.constraint or 0])
+        limit = float(nlp.sides.limit[j])
+        if side.constraint is None:
+            dimension = nlp.program.variables[side.variable or 0].dimension
+        else:
+            reading = nlp.program.constraints[side.constraint].reading
+            dimension, value, limit = reading.dimension, reading.from_value(value), reading.from_value(limit)
+        shown, allowed = units.shown(value, dimension), units.shown(limit, dimension)
+        rows.append(ViolationData(name=side.name, bound=side.bound, value=shown, limit=allowed))
+    return tuple(rows)

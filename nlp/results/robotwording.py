@@ -1,0 +1,58 @@
+"""Robots as tables of text: options, parameters, rows of the Jacobian, and measures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from ...models import Model, Parameter
+from ..units import Units
+from .text import Line, TextTable, Tone
+
+
+def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
+    """Return names and descriptions of robots."""
+    return TextTable(("robot", "what it is"), tuple(models))
+
+
+def model_words(
+    name: str, model: Model | None, options: Sequence[tuple[str, str, str | None]]
+) -> Iterator[Line | TextTable]:
+    """Yield one robot: its options, parameters, rows and measures.
+
+    Args:
+        name: of the robot.
+        model: the robot; None where an option without a default keeps it from being built: then only options are shown.
+        options: name, allowed values and default of each.
+    """
+    yield Line(name, tone=Tone.TITLE)
+    if model is not None:
+        yield Line(model.description)
+    if options:
+        rows = [
+            (option, allowed, "none: must be given" if default is None else default)
+            for option, allowed, default in options
+        ]
+        yield TextTable(("option", "allowed", "default"), tuple(rows))
+    if model is None:
+        return
+    yield TextTable(
+        ("parameter", "measures", "allowed (angles in deg)", "what it is"),
+        tuple(
+            (", ".join(item.components), item.dimension.value, _domain(item), item.description)
+            for item in model.parameters
+        ),
+    )
+    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.wrenches)]
+    yield TextTable(("row", "limb", "wrench"), tuple(rows))
+    if model.quantities:
+        rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
+        yield TextTable(("quantity", "measures", "what it is"), tuple(rows))
+
+
+def _domain(parameter: Parameter) -> str:
+    """Return the allowed values of a parameter, angles in degrees."""
+    units = Units()
+    lower, upper = (units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper))
+    parts = ["" if math.isinf(lower) else f">= {lower:g}", "" if math.isinf(upper) else f"<= {upper:g}"]
+    return ", ".join(part for part in parts if part) or "any"

@@ -1,0 +1,59 @@
+"""A solution of one program as a result."""
+
+from __future__ import annotations
+
+from collections import Counter
+from types import MappingProxyType
+
+from ..certificate.certificate import Certificate
+from ..solver.multistart import ProgramSolution
+from ..solver.starts import StartStatus
+from .data import OptimumData, ReachedData, SolveResult, StartsData
+from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
+from .evidence import certificate_data, optimality_data
+from .point import finite, head_data, objective, robot_data, versions, violations
+
+
+def task_result(solution: ProgramSolution, task: int = 0, certificate: Certificate | None = None) -> SolveResult:
+    """Return the whole result of the program of one task.
+
+    Args:
+        solution: of the program.
+        task: index of that task in the case.
+        certificate: of the same program.
+    """
+    nlp, x, state = solution.nlp, solution.x, solution.state
+    answer = solution.status.is_answer
+    margins = () if state is None else margins_data(nlp, x, optimal=answer)
+    solved = answer and state is not None
+    return SolveResult(
+        head=head_data(nlp.case),
+        sense=nlp.sense,
+        status=solution.status,
+        F=objective(nlp, x, state) if solved else None,
+        reached=None if answer else ReachedData(F=finite(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
+        relaxation=relaxation_data(nlp, solution.relaxation),
+        robot=None if state is None else robot_data(nlp, x, state, task),
+        optimality=optimality_data(nlp, solution.evidence),
+        margins=margins,
+        limits=limits_data(margins),
+        sensitivity=sensitivity_data(nlp, x) if solved else None,
+        tolerance=tolerance_data(nlp, x) if solved else None,
+        starts=starts_data(solution),
+        certificate=certificate_data(certificate),
+        seed=solution.seed,
+        versions=versions(),
+        seconds=solution.seconds,
+    )
+
+
+def starts_data(solution: ProgramSolution) -> StartsData:
+    """Return how the starts of a solve ended, and the distinct optima."""
+    ended = Counter(start.status for start in solution.starts)
+    reasons = [status for status in StartStatus if status is not StartStatus.CONVERGED and ended[status]]
+    return StartsData(
+        run=len(solution.starts),
+        converged=ended[StartStatus.CONVERGED],
+        failed=MappingProxyType({status.value: ended[status] for status in reasons}),
+        optima=tuple(OptimumData(F=found.F, count=found.count, spread=found.spread) for found in solution.optima),
+    )

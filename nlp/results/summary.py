@@ -1,0 +1,114 @@
+"""Results as a sequence of lines and tables, as a terminal shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+from ..case.case import Case
+from .certified import CertifiedResult
+from .data import CaseResult, CombinedResult, SolveResult
+from .evaluation import EvaluationResult
+from .tables import (
+    combined_design_table,
+    design_table,
+    jacobian_table,
+    limit_table,
+    outcome_table,
+    principal_table,
+    robot_table,
+    solved_design_table,
+)
+from .text import Line, TextTable
+from .wording import (
+    certificate_lines,
+    combined_lines,
+    combined_value_lines,
+    evidence_lines,
+    heading_lines,
+    listed,
+    number,
+    singularity_lines,
+    starts_lines,
+    task_line,
+    title_line,
+    tolerance_line,
+    violation_lines,
+)
+
+Summary: TypeAlias = Iterator[Line | TextTable]
+
+
+def case_summary(case: Case, result: CaseResult) -> Summary:
+    """Yield the result of a solve, of one task or of several."""
+    return _combined(case, result) if isinstance(result, CombinedResult) else _solved(case, result)
+
+
+def _solved(case: Case, result: SolveResult) -> Summary:
+    yield from heading_lines(case, result)
+    if result.robot is not None:
+        yield solved_design_table(case, result, result.robot)
+        yield robot_table(case, result.robot)
+    if result.limits:
+        yield limit_table(result.limits)
+    if result.tolerance is not None:
+        yield tolerance_line(result.tolerance, result.F, case.units)
+    yield from evidence_lines(result)
+    yield from starts_lines(result.starts)
+    if result.robot is not None and result.reached is None:
+        yield from singularity_lines(result.robot, case.units)
+    yield from certificate_lines(result.certificate)
+
+
+def _combined(case: Case, result: CombinedResult) -> Summary:
+    combined, made = result.combined, result.combined.made
+    yield title_line(case)
+    yield from combined_lines(result)
+    robot = None if made is None else made.robot
+    if robot is not None:
+        yield combined_design_table(case, combined, robot)
+    if made is not None and made.limits:
+        yield limit_table(made.limits)
+    yield outcome_table(combined)
+    yield from combined_value_lines(combined)
+    for task in result.tasks:
+        name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
+        for line in certificate_lines(task.certificate):
+            yield Line("") if name is None else Line(name, label="task")
+            yield line
+    yield from certificate_lines(combined.certificate)
+    for notice in combined.notices:
+        yield Line(notice, label="note")
+    if robot is not None:
+        yield from singularity_lines(robot, case.units)
+
+
+def certified_summary(case: Case, result: CertifiedResult) -> Summary:
+    """Yield the proven bounds of a case."""
+    several = len(result.tasks) > 1
+    yield title_line(case)
+    for task in result.tasks:
+        if several:
+            yield Line(f"{task.name}, {task.sense.value} F", label="task")
+        yield from certificate_lines(task.certificate)
+    if several and result.certificate is not None:
+        yield Line(case.method.value, label="combined by")
+        yield from certificate_lines(result.certificate)
+
+
+def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
+    """Yield the robot at one point, with its Jacobian."""
+    robot = result.robot
+    yield title_line(case)
+    for each in result.tasks:
+        yield task_line(each.task, case.units)
+        yield Line(number(0.0 if each.task_is_free else each.F), label="F")
+    yield from violation_lines(result.violated)
+    yield design_table(case, robot)
+    yield robot_table(case, robot)
+    if result.limits:
+        yield limit_table(result.limits)
+    yield jacobian_table(case, robot)
+    yield Line(listed(robot.singular_values), label="singular values")
+    yield principal_table(result.principal_motions, case.units)
+    yield from singularity_lines(robot, case.units)

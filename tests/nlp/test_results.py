@@ -1,0 +1,285 @@
+"""Results as typed values: what JSON has is what the schema says, and their words need neither terminal nor page."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+import screwsynth.cases
+from screwsynth.nlp import Solution, Status, json_data, load_case, result_of, shipped_cases, solve
+from screwsynth.nlp.output.checks import markdown
+from screwsynth.nlp.output.report.markup import html_table, paragraphs
+from screwsynth.nlp.output.report.report import report_of
+from screwsynth.nlp.output.report.webpage import page_of
+from screwsynth.nlp.results import data, parts
+from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
+from screwsynth.nlp.results.regression import check_case
+from screwsynth.nlp.results.schema import RESULTS, result_schema
+from screwsynth.nlp.results.summary import case_summary
+from screwsynth.nlp.results.text import Line, TextTable, Tone
+from screwsynth.nlp.solver import ipopt, multistart
+
+Run = Callable[..., tuple[int, str, str]]
+Json = dict[str, Any]
+
+CASES = Path(screwsynth.cases.__file__).parent
+HELICAL = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8").partition("[expect]")[0]
+MACHINE = (CASES / "hexapod-machining.toml").read_text(encoding="utf-8")
+POSITION = "position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 50 }]"
+ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
+FEW = "\n[solve]\nstarts = 2\n"
+PUSH = '\n[[task]]\nname = "push"\nsense = "max"\naxis = [0, 0, 1]\npitch = inf\n'
+OVER_POSES = '[pose.along_task]\nfirst = -15\nlast = 15\ncount = 3\n\n[combine]\nover_poses = "mean"\n'
+
+
+def edited(text: str, *edits: tuple[str, str]) -> str:
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+#: Cases of every kind of outcome, by name.
+WRITTEN = {
+    "nothing-free": edited(HELICAL, (POSITION, "position = [1, 2, 35]"), (ROTATION, "")) + FEW,
+    "infeasible": HELICAL + "[limits]\nleg_length = { min = 500 }\n" + FEW,
+    "not-converged": HELICAL + FEW + "max_iterations = 1\n",
+    "violated": edited(HELICAL, (POSITION, "position = [1, 2, 35]"), (ROTATION, ""))
+    + "[limits]\nleg_length = { min = 500 }\n"
+    + FEW,
+    "poses": edited(HELICAL, ("[[task]]", f"{OVER_POSES}\n[[task]]")) + "[limits]\nleg_length = { max = 70 }\n" + FEW,
+    "tolerance": HELICAL + "[limits]\nleg_length = { max = 55 }\n[tolerance]\njoint_centre = 0.01\n" + FEW,
+    "average": HELICAL + PUSH + FEW,
+    "weighted-sum": HELICAL + PUSH + '[combine]\nmethod = "weighted-sum"\n' + FEW,
+    "worst-case": HELICAL + PUSH + '[combine]\nmethod = "worst-case"\n[limits]\nleg_length = { max = 70 }\n' + FEW,
+    "average-infeasible": HELICAL + PUSH + "[limits]\nleg_length = { min = 500 }\n" + FEW,
+}
+
+
+@pytest.fixture(scope="module")
+def schema() -> Json:
+    return json.loads(json.dumps(result_schema()))
+
+
+def validator(schema: Json, kind: str) -> Draft202012Validator:
+    return Draft202012Validator({"$ref": f"#/$defs/{kind}", "$defs": schema["$defs"]})
+
+
+def hold(result: Json, schema: Json, kind: str) -> None:
+    """Hold a result to the schema: it is of one kind, and no other."""
+    validator(schema, kind).validate(result)
+    Draft202012Validator(schema).validate(result)
+    names = [each.__name__ for each in RESULTS]
+    assert [name for name in names if validator(schema, name).is_valid(result)] == [kind]
+
+
+def objects(value: object) -> Iterator[Json]:
+    """Every object in a result."""
+    if isinstance(value, dict):
+        yield value
+    for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from objects(each)
+
+
+@pytest.fixture(scope="module")
+def case_path(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
+    """Path of a written case, or the name of a shipped one."""
+    folder = tmp_path_factory.mktemp("cases")
+    for name, text in WRITTEN.items():
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    return lambda name: str(folder / f"{name}.toml") if name in WRITTEN else name
+
+
+def test_the_schema_is_one(cli: Run, schema: Json) -> None:
+    code, out, err = cli("schema", "--result")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == schema
+    Draft202012Validator.check_schema(schema)
+    assert [each["$ref"] for each in schema["anyOf"]] == [f"#/$defs/{kind.__name__}" for kind in RESULTS]
+    for name, each in schema["$defs"].items():
+        assert each["additionalProperties"] is False, name
+        if name != "VersionsData":
+            assert all(part.get("description") for part in each["properties"].values()), name
+
+
+@pytest.mark.parametrize("name", [*shipped_cases(), *WRITTEN])
+def test_solves_and_evaluations_keep_to_the_schema(
+    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
+) -> None:
+    code, out, err = cli("solve", case_path(name), "--starts", "2", "--json", "-")
+    assert (code in (0, 1), err) == (True, "")
+    result = json.loads(out)
+    hold(result, schema, "CombinedResult" if "combined" in result else "SolveResult")
+    code, out, err = cli("evaluate", case_path(name), "--json", "-")
+    assert (code in (0, 1), err) == (True, "")
+    hold(json.loads(out), schema, "EvaluationResult")
+
+
+@pytest.mark.parametrize("name", ["paper-4.1-rotation", "paper-4.2", "worst-case", "infeasible", "nothing-free"])
+def test_certificates_keep_to_the_schema(name: str, cli: Run, schema: Json, case_path: Callable[[str], str]) -> None:
+    for command in (("certify", "--gap", "0.1", "--time", "5"), ("solve", "--certify")):
+        if command[0] == "solve" and name != "paper-4.1-rotation":
+            continue
+        code, out, err = cli(command[0], case_path(name), *command[1:], "--starts", "2", "--json", "-")
+        assert (code in (0, 1), err) == (True, "")
+        result = json.loads(out)
+        hold(result, schema, "SolveResult" if command[0] == "solve" else "CertifiedResult")
+        assert result["certificate"] is not None or name == "paper-4.2"
+
+
+def test_checks_keep_to_the_schema(cli: Run, schema: Json) -> None:
+    code, out, err = cli("check", "paper-4.3-axis-x", "paper-4.2-rotation", "--json", "-")
+    assert (code, err) == (0, "")
+    hold(json.loads(out), schema, "ChecksResult")
+
+
+@pytest.mark.parametrize("name", ["tolerance", "poses", "worst-case", "infeasible"])
+def test_the_schema_refuses_what_is_more_or_less_than_a_result(
+    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
+) -> None:
+    _, out, _ = cli("solve", case_path(name), "--json", "-")
+    result = json.loads(out)
+    kind = "CombinedResult" if "combined" in result else "SolveResult"
+    check = validator(schema, kind)
+    count = len(list(objects(result)))
+    assert count > 10
+    for k in range(count):
+        more = deepcopy(result)
+        list(objects(more))[k]["extra"] = "text"
+        assert not check.is_valid(more)
+    for key in result.keys() - {"reached", "relaxation", "sensitivity", "tolerance", "task", "rates", "task_is_free"}:
+        less = {each: value for each, value in result.items() if each != key}
+        assert not check.is_valid(less), key
+
+
+def test_a_robot_is_there_as_a_whole_or_not_at_all(schema: Json) -> None:
+    solution = solve(load_case("paper-4.1-helical"), starts=2)
+    whole = json_data(result_of(solution))
+    without = json_data(result_of(replace(solution, status=Status.INFEASIBLE, state=None)))
+    hold(json.loads(json.dumps(without)), schema, "SolveResult")
+    assert "reached" in without
+    robot = whole.keys() - without.keys()
+    assert {"parameters", "pose", "task", "jacobian", "rates", "rank", "quantities"} < robot
+    assert without["margins"] == without["limits"] == []
+    for key in ("parameters", "pose", "jacobian", "rank"):
+        assert not validator(schema, "SolveResult").is_valid({**json.loads(json.dumps(without)), key: whole[key]})
+
+
+class Inner(JsonObject):
+    """An inner part.
+
+    Attributes:
+        b: a number.
+    """
+
+    b: float
+
+
+class Outer(JsonObject):
+    """A value with every kind of field."""
+
+    a: int
+    inner: Inline[Inner]
+    absent: Absent[str]
+    null: str | None
+    none: Inline[Inner | None]
+    status: Status
+    numbers: tuple[tuple[float, ...], ...]
+    named: Mapping[str, float]
+
+
+def outer(**changes: object) -> Outer:
+    values: dict[str, Any] = {
+        "numbers": ((1.0, 2.0),),
+        "named": {"x": 3.0},
+        "status": Status.OPTIMAL,
+        "none": None,
+        "null": None,
+        "absent": None,
+        "inner": Inner(b=2.0),
+        "a": 1,
+    }
+    return Outer(**values | changes)
+
+
+def test_json_has_the_fields_in_the_order_of_the_type() -> None:
+    found = json_data(outer())
+    assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
+    assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
+    assert json_data(outer(absent="here", none=None))["absent"] == "here"
+
+
+def test_values_are_frozen_and_whole() -> None:
+    value = outer()
+    with pytest.raises(AttributeError, match="frozen"):
+        value.a = 2  # type: ignore[misc]
+    with pytest.raises(AttributeError, match="frozen"):
+        del value.a
+    with pytest.raises(TypeError, match="more"):
+        outer(more=1)
+    with pytest.raises(TypeError, match="b"):
+        Inner()  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="object"):
+        json_data(outer(absent=object()))
+    with pytest.raises(TypeError, match="run time"):
+        type("Text", (JsonObject,), {"__annotations__": {"a": "int"}})
+    assert "status=<Status.OPTIMAL" in repr(value)
+    for module in (parts, data):
+        kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, JsonObject)]
+        assert len(kinds) > 5
+        assert not any(getattr(kind, "__hash__", None) is None for kind in kinds)
+
+
+def test_words_need_neither_terminal_nor_page() -> None:
+    loaded = "print(*(name for name in ('rich', 'html', 'pydantic') if name in sys.modules))"
+    words = "import sys; import screwsynth.nlp.results.summary, screwsynth.nlp.results.checkwording; " + loaded
+    page = "import sys; import screwsynth.nlp.output.report.webpage; " + loaded
+    for code, expected in ((words, {"pydantic"}), (page, {"html", "pydantic"})):
+        done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+        assert set(done.stdout.split()) <= expected
+
+
+def test_a_page_solves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "paper-4.3-axis-x"
+    solution = solve(load_case(name), starts=2)
+    result = result_of(solution)
+    check = check_case(name, {name: result})
+
+    def refuse(*_: object, **__: object) -> Solution:
+        raise AssertionError("a page must not solve")
+
+    monkeypatch.setattr(ipopt, "search_from", refuse)
+    monkeypatch.setattr(multistart, "search_from", refuse)
+    assert "compared" in page_of(report_of("", solution, result, check))
+    assert 'id="compared"' not in page_of(report_of("", solution, result))
+
+
+def test_one_table_for_terminal_markdown_and_page() -> None:
+    table = TextTable(("name", "length\ncm"), ((Line("a|b<", tone=Tone.NO_ANSWER), "1.5"), ("c", "no")))
+    assert markdown(table) == "| name | length\ncm |\n|---|---|\n| a\\|b< | 1.5 |\n| c | no |\n"
+    html = html_table(table, "Lengths", id="lengths")
+    assert '<th scope="col">length, cm</th>' in html
+    assert '<th scope="row">a|b&lt;</th><td class="number">1.5</td>' in html
+    assert "<td>no</td>" in html
+    line = Line("407", label="F", tone=Tone.ANSWER, before="about ", after=" <N>")
+    assert paragraphs([line]) == '<p><span class="label">F:</span> about 407 &lt;N&gt;</p>'
+
+
+def test_a_summary_begins_with_its_title_and_ends_with_the_rank() -> None:
+    case = load_case("paper-4.1-helical")
+    items = list(case_summary(case, result_of(solve(case, starts=2))))
+    first, last = items[0], items[-1]
+    assert isinstance(first, Line)
+    assert (first.text, first.tone) == (case.title, Tone.TITLE)
+    assert isinstance(last, Line)
+    assert (last.label, last.text) == ("rank of J", "6")
+    design, limbs = (item for item in items if isinstance(item, TextTable))
+    assert [row[0] for row in design.rows[:4]] == ["x1", "x2", "x3", "x4"]
+    assert len(limbs.rows) == 6
