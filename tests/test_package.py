@@ -81,7 +81,7 @@ def test_pictures_and_pages_are_public_functions(tmp_path: Path) -> None:
     with pytest.raises(screwsynth.nlp.InputError, match="ends in"):
         screwsynth.nlp.plot(solution, tmp_path / "solution.txt")
     text = (Path(screwsynth.cases.__file__).parent / "paper-4.2-rotation.toml").read_text(encoding="utf-8")
-    page = screwsynth.nlp.report(solution, "paper-4.2-rotation")
+    page = screwsynth.nlp.report(solution, text=text)
     assert page.startswith("<!DOCTYPE html>")
     assert html.escape(text.splitlines()[0]) in page
     assert "has no case file" in screwsynth.nlp.report(solution)
