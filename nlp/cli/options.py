@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,6 +53,8 @@ def write_json(target: str, result: JsonObject) -> None:
     Raises:
         InputError: it cannot be written.
     """
+    import json
+
     from ..output.files import write_text
     from ..results.jsondata import json_data
 
