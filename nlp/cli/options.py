@@ -41,7 +41,7 @@ def check_picture(target: str | None) -> None:
         InputError: its ending is no picture's, Matplotlib is not installed, or the file cannot be written.
     """
     if target is not None:
-        from ..output.pictures.extras import check_picture as check
+        from ..output.pictures.requirements import check_picture as check
 
         check(target)
         check_target(target)

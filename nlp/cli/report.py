@@ -23,7 +23,7 @@ def report(
     """Solve a case and write a page about it: one file that opens without a network."""
     from ..case.reader import find_case, load_case
     from ..output.files import read_text, write_text
-    from ..output.pictures.extras import check_library
+    from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
     loaded = load_case(case)
