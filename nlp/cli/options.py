@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..results.jsondata import Data
+    from ..results.jsondata import JsonObject
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -48,12 +47,14 @@ def check_picture(target: str | None) -> None:
         check_target(target)
 
 
-def write_json(target: str, result: Data) -> None:
+def write_json(target: str, result: JsonObject) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
         InputError: it cannot be written.
     """
+    import json
+
     from ..output.files import write_text
     from ..results.jsondata import json_data
 
