@@ -1,7 +1,10 @@
 """The solver on random robots, at degenerate minima, and where there is no answer."""
 
+import importlib.util
 import math
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -11,19 +14,26 @@ from screwsynth.nlp import (
     Case,
     CaseError,
     EvaluationError,
+    Evidence,
     Free,
+    Nlp,
     Rotation,
     Search,
     StartStatus,
     Status,
     Task,
+    certify,
+    examine,
     formulate,
     json_data,
     load_case,
     result_of,
     solve,
 )
+from screwsynth.nlp.program import formulation
+from screwsynth.nlp.program.layout import Layout, lay_out
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.solver import multistart
 
 
 def random_case(seed: int, sense: str) -> Case:
@@ -189,3 +199,120 @@ def test_an_infeasible_case_names_what_cannot_hold() -> None:
     assert result["F"] is None
     assert [side["name"] for side in result["reached"]["violated"]] == ["|u1_1|"]
     assert result["reached"]["violated"][0]["value"] == pytest.approx(math.sqrt(1.62), abs=1e-6)
+
+
+#: Another solver, as a file of its own: Newton's method in scaled variables, projected onto the box.
+PROJECTED_NEWTON = """
+import numpy as np
+from screwsynth.nlp import SolverResult, StopReason
+from screwsynth.nlp.evidence.kkt import lagrangian_hessian, linearise
+
+def projected_newton(nlp, search, points, count):
+    def search_one(point):
+        at = linearise(nlp, point)
+        for iterations in range(1, search.max_iterations + 1):
+            s, gradient = scaled(at), at.gradient
+            free = (np.abs(s) < 1) | (s * gradient > 0)
+            if np.max(np.abs(gradient[free]), initial=0.0) < 1e-8:
+                return result(at, StopReason.SUCCEEDED, iterations)
+            H = lagrangian_hessian(nlp, at, np.zeros(len(at.sides)))[np.ix_(free, free)]
+            curvatures, directions = np.linalg.eigh(H)
+            step = np.zeros(nlp.n)
+            step[free] = -directions @ (directions.T @ gradient[free] / np.maximum(np.abs(curvatures), 1e-3))
+            for part in 0.5 ** np.arange(40):
+                after = linearise(nlp, nlp.centre + nlp.scale * np.clip(s + part * step, -1, 1))
+                if after.phi < at.phi:
+                    break
+            else:
+                return result(at, StopReason.OTHER, iterations)
+            at = after
+        return result(at, StopReason.ITERATION_LIMIT, search.max_iterations)
+
+    def scaled(at):
+        return (at.x - nlp.centre) / nlp.scale
+
+    def result(at, reason, iterations):
+        of_bounds = np.where(np.abs(scaled(at)) >= 1 - 1e-12, -at.gradient, 0.0)
+        return SolverResult(at.x, of_bounds, np.zeros(0), reason, iterations)
+
+    return [search_one] * count
+"""
+
+#: A solver that does nothing and says that it succeeded.
+IDLE = """
+import numpy as np
+from screwsynth.nlp import SolverResult, StopReason
+
+def idle(nlp, search, points, count):
+    limits = len(nlp.program.constraints)
+    return [lambda x: SolverResult(x, np.zeros(nlp.n), np.zeros(limits), StopReason.SUCCEEDED, 0)] * count
+"""
+
+
+def module_from(text: str, folder: Path) -> ModuleType:
+    path = folder / "another_solver.py"
+    path.write_text(text, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("another_solver", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def without_rotation(sense: str) -> Case:
+    return replace(random_case(1, sense), rotation=Rotation())
+
+
+@pytest.mark.parametrize("sense", ["max", "min"])
+def test_another_solver_is_one_file(sense: str, tmp_path: Path) -> None:
+    newton = module_from(PROJECTED_NEWTON, tmp_path).projected_newton
+    case = without_rotation(sense)
+    ours, other = solve(case, starts=8), solve(case, starts=8, solver=newton)
+    assert other.status is Status.OPTIMAL
+    assert pytest.approx(ours.F, rel=1e-9) == other.F
+    assert other.evidence is not None
+    assert other.evidence.stationarity <= 1e-7
+    assert [start.iterations for start in other.starts] != [start.iterations for start in ours.starts]
+
+
+def test_a_solver_is_not_believed(tmp_path: Path) -> None:
+    idle = module_from(IDLE, tmp_path).idle
+    case = without_rotation("max")
+    solution = solve(case, starts=8, solver=idle)
+    nlp = solution.nlp
+    for start in solution.starts:
+        at = examine(nlp, start.x)
+        assert (start.status is StartStatus.CONVERGED) == at.kind.is_optimum
+    assert any(start.status is StartStatus.STALLED for start in solution.starts)
+    assert solution.status is not Status.OPTIMAL
+
+
+def test_the_winner_is_examined_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[bytes] = []
+
+    def counted(nlp: Nlp, x: np.ndarray) -> Evidence:
+        seen.append(np.asarray(x).tobytes())
+        return examine(nlp, x)
+
+    monkeypatch.setattr(multistart, "examine", counted)
+    solution = solve(load_case("paper-4.1-helical"), starts=6)
+    assert solution.evidence is solution.optima[0].evidence
+    assert len(seen) == len(set(seen)) == len(solution.optima)
+
+
+def test_a_case_is_formulated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = load_case("paper-4.1-helical")
+    counts: list[str] = []
+
+    def counted(*arguments: object) -> Layout:
+        counts.append("formulated")
+        return lay_out(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(formulation, "lay_out", counted)
+    solution = solve(case, starts=4)
+    assert len(counts) == 1
+    certify(solution, gap=1e-2)
+    assert len(counts) == 1
+    certify(case, gap=1e-2, starts=4)
+    assert len(counts) == 2
