@@ -71,7 +71,6 @@ from .solver.interface import SolverResult as SolverResult
 from .solver.interface import StopReason as StopReason
 from .solver.multistart import Optimum as Optimum
 from .solver.multistart import ProgramSolution as ProgramSolution
-from .solver.multistart import Status as Status
 from .solver.multistart import solve_program as solve_program
 from .solver.solution import Combination as Combination
 from .solver.solution import Solution as Solution
@@ -79,4 +78,5 @@ from .solver.solution import TaskOutcome as TaskOutcome
 from .solver.solve import solve as solve
 from .solver.starts import Start as Start
 from .solver.starts import StartStatus as StartStatus
+from .solver.status import Status as Status
 from .units import Units as Units

@@ -25,7 +25,8 @@ from ..errors import CaseError, InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from ..solver.multistart import Status, solve_program
+from ..solver.multistart import solve_program
+from ..solver.status import Status
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .stages import StagedFunctions, stage_functions
 

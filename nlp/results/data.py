@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 from ..case.task import Method, Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
-from ..solver.multistart import Status
+from ..solver.status import Status
 from .jsondata import Absent, Inline, JsonObject, Size, Vector
 from .parts import (
     Bound,

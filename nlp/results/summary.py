@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
-from .certified import CertifiedResult
-from .data import CaseResult, CombinedResult, SolveResult
-from .evaluation import EvaluationResult
+from .data import CombinedResult
 from .tables import (
     combined_design_table,
     design_table,
@@ -35,6 +33,11 @@ from .wording import (
     tolerance_line,
     violation_lines,
 )
+
+if TYPE_CHECKING:
+    from .certified import CertifiedResult
+    from .data import CaseResult, SolveResult
+    from .evaluation import EvaluationResult
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 

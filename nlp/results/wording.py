@@ -9,7 +9,7 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
-from ..solver.multistart import Status
+from ..solver.status import Status
 from ..units import Units
 from .text import Line, Tone
 

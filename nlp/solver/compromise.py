@@ -34,9 +34,10 @@ from ..program.formulation import formulate_weighted, proximity_program, with_pr
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation
 from ..program.program import Program
-from .multistart import SAME_VALUE, ProgramSolution, Status, state_or_none
+from .multistart import SAME_VALUE, ProgramSolution, state_or_none
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
+from .status import Status
 
 #: Weights of the distance to the other tasks' points, in parts of F's scale, smaller and smaller, with which the
 #: nearest member of an optimal set is searched for: the point tends to that member, and the correction that follows

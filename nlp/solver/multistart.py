@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from ..program.sampling import starting_points
 from .interface import Solver
 from .ipopt import ipopt
 from .starts import SAME_POINT, Start, StartStatus, search_from
+from .status import Status
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9
@@ -29,22 +29,6 @@ SAME_VALUE = 1e-9
 _BETTER = 1e-6
 #: Starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
-
-
-class Status(enum.Enum):
-    """How a solve ended; each value is the word in results."""
-
-    OPTIMAL = "optimal"
-    AVERAGED = "averaged"
-    EVALUATED = "evaluated"
-    SADDLE = "saddle"
-    NOT_CONVERGED = "not converged"
-    INFEASIBLE = "infeasible"
-
-    @property
-    def is_answer(self) -> bool:
-        """Whether the solve gave what was asked for."""
-        return self in (Status.OPTIMAL, Status.AVERAGED, Status.EVALUATED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,9 @@ from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
-from .multistart import Optimum, ProgramSolution, Status
+from .multistart import Optimum, ProgramSolution
 from .starts import Start
+from .status import Status
 
 
 @dataclass(frozen=True, eq=False)

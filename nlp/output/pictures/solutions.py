@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...case.task import Sense
-from ...solver.multistart import ProgramSolution, Status
+from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution
+from ...solver.status import Status
 from .drawing import Drawing, drawing_of
 
 
