@@ -19,6 +19,7 @@ from ..errors import CaseError, nearest
 from ..units import Units
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
+from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
 from .task import Method, Sense, Task
@@ -95,20 +96,17 @@ class Case:
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
-    def component_names(self, parameter: Parameter) -> tuple[str, ...]:
-        """Names of a parameter's components in this case.
+    def parameter_name(self, name: str) -> str:
+        """Return the name of a parameter, or of one of its components, in this case; see :mod:`.names`.
 
-        A robot may call its parameters what it likes. One that has the name of a number of the pose, such as ``p_x``,
-        is written ``robot.p_x``.
+        Args:
+            name: the name that the robot gives it.
         """
-        return tuple(f"robot.{name}" if name in self._pose_names else name for name in parameter.components)
+        return parameter_name(name, len(self.poses))
 
-    @property
-    def _pose_names(self) -> frozenset[str]:
-        """Names of the poses' numbers."""
-        return frozenset(
-            f"{prefix}{part}" for prefix in self.pose_prefixes for part in (*component_names("p", 3), "angle", "axis")
-        )
+    def component_names(self, parameter: Parameter) -> tuple[str, ...]:
+        """Return the names of a parameter's components in this case."""
+        return tuple(self.parameter_name(name) for name in parameter.components)
 
     @property
     def axis(self) -> FloatArray | None:
@@ -127,9 +125,8 @@ class Case:
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
-        """What stands before the names of each stated pose's numbers: nothing for a single one."""
-        count = 1 + len(self.further)
-        return ("",) if count == 1 else tuple(f"pose{k + 1}_" for k in range(count))
+        """Prefix of the names of each stated pose's numbers; an empty one for a single pose."""
+        return pose_prefixes(len(self.poses))
 
     @property
     def scalars(self) -> Mapping[str, Dimension]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from . import schema as document
 from .case import Case
 from .displacements import displacements
 from .limits.limits import Limits
-from .overrides import _set
+from .overrides import Settings, override_number
 from .pose import LARGEST, Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
 from .settings import Expectation, ExpectedValue, Published, Search
@@ -62,13 +61,14 @@ def _existing(name: str) -> Path | None:
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
-def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
+def load_case(name: str, settings: Settings | None = None) -> Case:
     """Read a case.
 
     Args:
         name: path of a TOML file, or the bare name of a shipped case.
-        settings: numbers by name that replace what the file says, in the file's units: a parameter or one of its
-            components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers.
+        settings: numbers by name that replace those of the file, in the file's units: a parameter or one of its
+            components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers. A
+            parameter with the name of a number of the pose is called ``robot.p_x`` and the like.
 
     Raises:
         InputError: the file cannot be read or says something that is not allowed.
@@ -88,7 +88,7 @@ def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
 
 
 def case_from_tables(
-    tables: dict[str, Any], *, name: str, source: str, settings: Mapping[str, Any] | None = None
+    tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None
 ) -> Case:
     """The case that the tables of a parsed TOML document describe.
 
@@ -105,7 +105,7 @@ def case_from_tables(
         written = document.parse_document(tables)
         if settings:
             for key, value in settings.items():
-                _set(tables, key, value)
+                override_number(tables, key, value)
             written = document.parse_document(tables)
         return _case(written, name, source)
     except CaseError as error:
