@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick check docs figures clean
 
-help: ## this list
+help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 $(VENV)/ready: pyproject.toml
@@ -20,7 +20,7 @@ demo: $(VENV)/ready ## set everything up and solve the paper's Section 4.1
 test: $(VENV)/ready ## set everything up and run every test
 	$(BIN)/python -P -m pytest --numprocesses auto
 
-quick: $(VENV)/ready ## the fast tests only
+quick: $(VENV)/ready ## run the fast tests only
 	$(BIN)/python -P -m pytest --numprocesses auto -m 'not slow'
 
 # Type checkers cannot follow the editable install's hook, so they get the folders under the package's name.
@@ -28,18 +28,18 @@ build/typing/screwsynth:
 	mkdir -p $@
 	ln -sfn ../../../models ../../../nlp ../../../cases $@
 
-check: $(VENV)/ready build/typing/screwsynth ## formatting, lint, types and import order
+check: $(VENV)/ready build/typing/screwsynth ## check formatting, lint, types and import contracts
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/basedpyright --level error
 	$(BIN)/lint-imports
 
-docs: $(VENV)/ready ## write what the documentation shows of the program's output
+docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/refresh.py
 
 figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py
 
-clean: ## remove the environment and everything built
+clean: ## remove the environment and all build results
 	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,9 +1,11 @@
 """Time of whole commands beside the bare import of their libraries, taken in turns so that a busy machine burdens all.
 
-Run by hand: ``.venv/bin/python bench/startup.py [rounds]``. The aims: a solve with 32 starts in at most 4 times the
-import, and help in no more than it.
+Run by hand: ``.venv/bin/python bench/startup.py [rounds] [bin folder of another environment]``. The aims: a solve with
+32 starts in at most 4 times the import, and help in no more than it. With another environment, such as one with an
+older version, every command is run in both, one after the other, and the median of the differences is shown.
 """
 
+import os
 import statistics
 import subprocess
 import sys
@@ -11,24 +13,45 @@ import time
 from pathlib import Path
 
 BIN = Path(sys.executable).parent
+BASE = "import casadi, numpy"
 COMMANDS = {
-    "import casadi, numpy": [str(BIN / "python"), "-c", "import casadi, numpy"],
-    "screwsynth --help": [str(BIN / "screwsynth"), "--help"],
-    "screwsynth solve paper-4.1-helical": [str(BIN / "screwsynth"), "solve", "paper-4.1-helical"],
+    BASE: ["python", "-P", "-c", BASE],
+    "import screwsynth.nlp": ["python", "-P", "-c", "import screwsynth.nlp"],
+    "screwsynth --version": ["screwsynth", "--version"],
+    "screwsynth --help": ["screwsynth", "--help"],
+    "screwsynth evaluate paper-4.1-helical": ["screwsynth", "evaluate", "paper-4.1-helical"],
+    "screwsynth solve paper-4.1-helical": ["screwsynth", "solve", "paper-4.1-helical"],
 }
 
 
-def seconds(command: list[str]) -> float:
+def times(folder: Path, command: list[str]) -> tuple[float, float]:
+    """Wall and processor milliseconds of a command in an environment."""
     began = time.perf_counter()
-    subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - began
+    running = subprocess.Popen([folder / command[0], *command[1:]], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(running.pid, 0)
+    running.returncode = os.waitstatus_to_exitcode(status)
+    if running.returncode:
+        raise subprocess.CalledProcessError(running.returncode, command)
+    return 1e3 * (time.perf_counter() - began), 1e3 * (used.ru_utime + used.ru_stime)
 
 
 rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 20
-for command in COMMANDS.values():  # files into the cache
-    seconds(command)
-times = [[seconds(command) for command in COMMANDS.values()] for _ in range(rounds)]
-base = [row[0] for row in times]
-for name, column in zip(COMMANDS, zip(*times, strict=True), strict=True):
-    ratio = statistics.median(c / b for c, b in zip(column, base, strict=True))
-    print(f"{name:36s} median {1e3 * statistics.median(column):6.0f} ms   {ratio:5.2f} times the import")
+folders = [BIN, *(Path(argument) for argument in sys.argv[2:3])]
+runs = [(name, folder) for name in COMMANDS for folder in folders]
+for name, folder in runs:  # files into the cache
+    times(folder, COMMANDS[name])
+taken: dict[tuple[str, Path], list[tuple[float, float]]] = {run: [] for run in runs}
+for k in range(rounds):
+    for run in runs if k % 2 else reversed(runs):
+        taken[run].append(times(run[1], COMMANDS[run[0]]))
+base = [wall for wall, _ in taken[BASE, BIN]]
+for name in COMMANDS:
+    wall, processor = zip(*taken[name, BIN], strict=True)
+    ratio = statistics.median(w / b for w, b in zip(wall, base, strict=True))
+    line = f"{name:38s} wall {statistics.median(wall):6.0f} ms, processor {statistics.median(processor):6.0f} ms"
+    line += f"   {ratio:5.2f} times the import"
+    for other in folders[1:]:
+        pairs = list(zip(taken[name, BIN], taken[name, other], strict=True))
+        more = [statistics.median(here[i] - there[i] for here, there in pairs) for i in (0, 1)]
+        line += f"   beside the other: wall {more[0]:+.1f} ms, processor {more[1]:+.1f} ms"
+    print(line)

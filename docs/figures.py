@@ -1,7 +1,6 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
-The paper's Figs. 4, 5, 7, 8, 10 and 11 from the cases that stand for them, the limited hexapod, and the robots with
-their parameters.
+The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, and the robots with their parameters.
 """
 
 from pathlib import Path

@@ -17,7 +17,13 @@ from .instance import (
 from .legs import LeggedPlatform, legged_platform
 from .model import Model, ModelError
 from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
-from .rotation import axis_angle_from_matrix, matrix_from_axis_angle, matrix_from_cayley, matrix_from_quaternion_vector
+from .rotation import (
+    AxisAngle,
+    axis_angle_from_matrix,
+    matrix_from_axis_angle,
+    matrix_from_cayley,
+    matrix_from_quaternion_vector,
+)
 from .screws import (
     Displacement,
     Screw,
@@ -35,6 +41,7 @@ from .three_upu import three_upu
 from .wrench import Wrench, WrenchKind, couple_about, force_along
 
 __all__ = [
+    "AxisAngle",
     "Body",
     "Circle",
     "Closure",

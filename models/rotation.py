@@ -9,7 +9,7 @@ fixed: as variables together they are redundant, and singular at zero angle.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -59,14 +59,21 @@ def matrix_from_axis_angle(axis: SX, angle: SX) -> SX:
     return SX.eye(3) + ca.sin(angle) * cross + (1 - ca.cos(angle)) * cross @ cross
 
 
-def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
+class AxisAngle(NamedTuple):
+    """A rotation: unit axis (3,), and angle in radians."""
+
+    axis: FloatArray
+    angle: float
+
+
+def axis_angle_from_matrix(matrix: ArrayLike) -> AxisAngle:
     """Return the unit axis and the angle of a rotation matrix.
 
     Args:
         matrix: (3, 3) rotation matrix of numbers.
 
     Returns:
-        (3,) unit axis and the angle in [0, pi]. Without rotation the axis is z by convention; at half a turn the
+        Unit axis, and angle in [0, pi]. Without rotation the axis is z by convention; at half a turn the
         axis's first component that is not zero is positive.
 
     Raises:
@@ -79,11 +86,11 @@ def axis_angle_from_matrix(matrix: ArrayLike) -> tuple[FloatArray, float]:
     angle = math.atan2(size, cosine)
     if cosine > 0:
         axis = sine / size if size > 0 else np.array([0.0, 0.0, 1.0])
-        return frozen_array(axis, (3,)), angle
+        return AxisAngle(frozen_array(axis, (3,)), angle)
     # Beyond a right angle the symmetric part, n n' (1 - cos), gives the axis more accurately than the sine, which tends
     # to zero at half a turn.
     outer = (R + R.T) / 2 - cosine * np.eye(3)
     axis = outer[:, int(np.argmax(np.diag(outer)))]
     axis = axis / np.linalg.norm(axis)
     lead = float(axis @ sine) if size > 1e-12 else float(axis[np.flatnonzero(np.abs(axis) > 1e-12)[0]])
-    return frozen_array(axis if lead > 0 else -axis, (3,)), angle
+    return AxisAngle(frozen_array(axis if lead > 0 else -axis, (3,)), angle)

@@ -1,15 +1,20 @@
 """The package as a whole: what it exports, what its wheel holds, and that its README is true."""
 
+import ast
+import html
 import os
+import pkgutil
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import screwsynth.cases
 import screwsynth.models
 import screwsynth.nlp
 from screwsynth.nlp.case.limits.limits import LIMIT_TYPES
@@ -27,6 +32,61 @@ def test_every_public_name_is_there_and_listed_in_order(package: object) -> None
         assert getattr(package, name) is not None
 
 
+def test_the_stub_is_the_one_list_of_public_names() -> None:
+    stub = Path(screwsynth.nlp.__file__).with_suffix(".pyi")
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    places = {alias.asname: (node.module, alias.name) for node in tree.body[1:] for alias in node.names}  # type: ignore[attr-defined]
+    assert all(isinstance(node, ast.ImportFrom) and node.level == 1 for node in tree.body[1:])
+    assert sorted(places) == screwsynth.nlp.__all__ == dir(screwsynth.nlp)
+    for name, (module, own_name) in places.items():
+        assert own_name == name
+        value = getattr(screwsynth.nlp, name)
+        assert value is getattr(import_module(f"screwsynth.nlp.{module}"), name)
+        # Where it is defined, not where another module imports it.
+        assert value.__module__ == f"screwsynth.nlp.{module}"
+    with pytest.raises(AttributeError, match="no attribute 'no_such_name'"):
+        _ = screwsynth.nlp.no_such_name  # type: ignore[attr-defined]
+
+
+def test_no_public_name_is_that_of_a_room() -> None:
+    # Importing the room would put it in the place of the name.
+    rooms = {module.name for module in pkgutil.iter_modules(screwsynth.nlp.__path__)}
+    assert rooms.isdisjoint(screwsynth.nlp.__all__)
+
+
+def test_the_commands_are_public_functions() -> None:
+    case = screwsynth.nlp.load_case("paper-4.2-rotation")
+    solution = screwsynth.nlp.solve(case, starts=4)
+    certified = screwsynth.nlp.certify(solution, gap=1e-2)
+    assert certified.solution.outcomes[0].own is solution.outcomes[0].own
+    assert certified.is_proved
+    assert screwsynth.nlp.certify(case, starts=4, gap=1e-2).is_proved
+    assert screwsynth.nlp.result_of(certified).certificate.status.value == "proved"
+    assert screwsynth.nlp.result_of(solution).certificate is None
+    (checked,) = screwsynth.nlp.check(["paper-4.2-rotation"])
+    assert checked.passed
+    files = screwsynth.nlp.generate_c(case)
+    assert {"case.toml", "Makefile"} < set(files)
+    tomllib.loads(files["case.toml"])
+
+
+def test_pictures_and_pages_are_public_functions(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("plotly")
+    case = screwsynth.nlp.load_case("paper-4.2-rotation")
+    solution = screwsynth.nlp.solve(case, starts=4)
+    for name, found in (("solution.svg", solution), ("model.png", case.model)):
+        screwsynth.nlp.plot(found, tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+    with pytest.raises(screwsynth.nlp.InputError, match="ends in"):
+        screwsynth.nlp.plot(solution, tmp_path / "solution.txt")
+    text = (Path(screwsynth.cases.__file__).parent / "paper-4.2-rotation.toml").read_text(encoding="utf-8")
+    page = screwsynth.nlp.report(solution, text=text)
+    assert page.startswith("<!DOCTYPE html>")
+    assert html.escape(text.splitlines()[0]) in page
+    assert "has no case file" in screwsynth.nlp.report(solution)
+
+
 def test_public_names_show_before_they_are_loaded() -> None:
     code = "import sys, screwsynth.nlp as n; sys.exit('numpy' in sys.modules or not {'solve', 'Case'} < set(dir(n)))"
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
@@ -34,7 +94,7 @@ def test_public_names_show_before_they_are_loaded() -> None:
 
 def test_help_does_not_import_the_numerical_libraries() -> None:
     heavy = "('casadi', 'numpy', 'rich.table')"
-    code = f"import sys, screwsynth.nlp.cli.main; sys.exit(any(m in sys.modules for m in {heavy}))"
+    code = f"import sys, screwsynth.nlp.cli.app; sys.exit(any(m in sys.modules for m in {heavy}))"
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
 
 
@@ -64,6 +124,17 @@ def test_the_readme_python_runs() -> None:
     space: dict[str, object] = {}
     exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - our own README
     assert pytest.approx(407.2107, abs=5e-5) == space["solution"].F  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("page", "name"), [("several-tasks.md", "paper-4.2"), ("certificate.md", "paper-4.2-rotation")]
+)
+def test_the_python_of_the_documentation_runs(page: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+    case = screwsynth.nlp.load_case(name)
+    space = {each: getattr(screwsynth.nlp, each) for each in screwsynth.nlp.__all__} | {"case": case}
+    exec(compile(code, page, "exec"), space)  # noqa: S102 - our own page
+    assert capsys.readouterr().out
 
 
 def test_the_readme_output_is_what_the_command_prints() -> None:

@@ -1,11 +1,12 @@
-/* The kernel of the search of a whole box: what enclosure.py and bounding.py do, over lists of boxes.
+/* Kernel of the search of a whole box: the examination of boxes, as in enclosure.py, univariate.py, quadratic.py and
+ * bounding.py.
  *
- * The list of instructions is interpreted over LANES boxes at once, so that an instruction is fetched once for all of
- * them and its loops become vector instructions; what the enclosures say is then read off box by box. Every formula is
- * that of the two Python modules, in the same order; their comments and docs/certificate.md explain them.
+ * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its
+ * loops become vector instructions; the boxes are then examined one by one. Every formula is that of the Python
+ * modules, in the same order; their docstrings and docs/certificate.md explain them.
  *
- * Rounding is to nearest. Never compile this with -ffast-math: it would drop the NaN tests that keep boxes; nor with
- * contraction to fused operations, which would make the two engines differ.
+ * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
+ * nor with contraction to fused operations, which would make the two engines differ.
  */
 #define Py_LIMITED_API 0x030B0000
 #define PY_SSIZE_T_CLEAN
@@ -37,7 +38,7 @@ enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
 
 typedef double Lane[LANES];
 
-/* An enclosure over LANES boxes: form, interval, and the sum of |a|. The n coefficients follow it in memory. */
+/* An enclosure over LANES boxes: form, interval, and the sum of |a|. The n coefficients a follow it in memory. */
 typedef struct {
     Lane c, p, q, s, lo, hi, rad;
 } Value;
@@ -49,10 +50,10 @@ typedef struct {
 } Tape;
 
 typedef struct {
-    int n, functions, expressions; /* R expressions, the functions first */
-    const int *equation;      /* (R) */
-    const int *depends;       /* (R, n) */
-    const double *low, *high; /* (n) the whole box */
+    int n, functions, expressions; /* R expressions, the functions first, then the conditions */
+    const int *equation;      /* (R) whether it must be 0 */
+    const int *depends;       /* (R, n) whether it depends on a variable */
+    const double *low, *high; /* (n) ends of the whole box */
     Tape tape;
 } Form;
 
@@ -66,7 +67,7 @@ static inline Lane *terms_of(Value *v) { return (Lane *)(v + 1); }
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
 
-/* ---- Rules for functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, and the interval of the result. ---- */
+/* ---- Functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, and their ranges; univariate.py. ---- */
 
 typedef struct {
     double value, slope, least, most, error, lo, hi;
@@ -116,13 +117,13 @@ static Rule rule_of(int op, double c, double lo, double hi)
     return r;
 }
 
-/* ---- The interpreter. ---- */
+/* ---- The interpreter; enclosure.py. ---- */
 
 typedef struct {
     Lane c, p, q, s, lo, hi;
 } Result;
 
-/* A form without its error: centre, size of the linear part, least and largest of second order. */
+/* A form without its rounding error: centre, sum of |a|, least and largest terms of second order. */
 typedef struct {
     const double *c, *rad, *p, *q;
 } Part;
@@ -141,7 +142,7 @@ INLINE void interval_product(const double *lo, const double *hi, const double *o
     }
 }
 
-/* What is of second order in a product; the sums are those of a a', |a a'|, |a r' + a' r| and |a r' - a' r|. */
+/* Terms of second order of a product; the sums are those of a a', |a a'|, |a r' + a' r| and |a r' - a' r|. */
 INLINE void second_order(Part x, Part y, const double *balance, const double *sizes, const double *plus,
                          const double *minus, Result *restrict out, double *restrict big, double *restrict other)
 {
@@ -160,7 +161,7 @@ INLINE void second_order(Part x, Part y, const double *balance, const double *si
     }
 }
 
-/* Write a value: poison what has no finite enclosure, intersect the interval with the form's range. */
+/* Writes a value: poisons one without a finite form, intersects the interval with the form's range. */
 INLINE void settle(Value *restrict v, int n, int first, int last, double slack, const Result *restrict from,
                    Lane *restrict t)
 {
@@ -379,17 +380,17 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
     }
 }
 
-/* ---- What the enclosures say about one box. ---- */
+/* ---- The examination of one box; bounding.py and quadratic.py. ---- */
 
-/* The expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a combination of them. */
+/* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
     int n, J, R;
-    double *c, *p, *q, *s, *lo, *hi, *a;  /* (R), a: (R, n): forms of the expressions */
-    double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): of their scaled gradients */
-    double *slope_lo, *slope_hi;  /* (R, n) scaled */
-    double *grad_lo, *grad_hi;    /* (R, n) */
+    double *c, *p, *q, *s, *lo, *hi, *a;  /* (R), a: (R, n): enclosures of the expressions */
+    double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): forms of their gradients, times r_i */
+    double *slope_lo, *slope_hi;  /* (R, n) interval gradients, times r_i */
+    double *grad_lo, *grad_hi;    /* (R, n) interval gradients */
     double *weights, *size, *left, *high, *low; /* (R), (R), (n), (R), (R) */
-    double *qb, *qw, *qlo, *qhi, *H;            /* the Lagrangian's model */
+    double *qb, *qw, *qlo, *qhi, *H;            /* (n), H: (n, n): the Lagrangian's model */
     double *sign, *fb, *fw, *fH, *diagonal, *t, *gradient; /* (n), fH: (n, n) */
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
@@ -438,7 +439,7 @@ static void choose_multipliers(Box *x, const int *equation)
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form: what bounding.py's "made" does. */
+/* One variable's part of a model, from the parts of a gradient's form: quadratic.py's _integrate. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
 {
     double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;
@@ -488,7 +489,7 @@ static void combine(Box *x)
             x->H[i * n + j] = x->H[j * n + i] = 0.5 * (x->H[i * n + j] + x->H[j * n + i]);
 }
 
-/* Largest of linear t + 1/2 quadratic t^2 for t in [0, 1], linear not negative. */
+/* Largest linear t + 1/2 quadratic t^2 for t in [0, 1], linear not negative. */
 static double largest_of(double linear, double quadratic)
 {
     if (quadratic < 0 && linear < -quadratic)
@@ -549,7 +550,7 @@ static double quadratic_bound(Box *x)
     return best + x->q_rounding;
 }
 
-/* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first where there is none. */
+/* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first without one. */
 static void roots(double linear, double quadratic, double need, double *first, double *last)
 {
     int at_start = need <= 0, at_end = linear + 0.5 * quadratic >= need;
@@ -577,7 +578,7 @@ static void keep(Box *x, int i, double low, double high, int reason)
         x->e_hi[i] = high, x->why_hi[i] = reason;
 }
 
-/* Bounds on the e_i for which a model reaches a level; H is that of sign times the model, not yet symmetric. */
+/* Ends of the e_i for which a model can reach a level; sign H is the matrix of the model, not made symmetric yet. */
 static void reach_quadratic(Box *x, double sign, double middle, const double *b, const double *H, const double *w,
                             double rounding, double level, int reason)
 {
@@ -630,7 +631,7 @@ static void reach_expression(Box *x, int r, double sign, double level)
     for (int i = 0; i < n; i++) {
         int at = r * n + i;
         double p = sign > 0 ? x->gp[at] : -x->gq[at], q = sign > 0 ? x->gq[at] : -x->gp[at], across = 0.0;
-        double low = 0.0, high = 0.0; /* a model's slopes are not needed here */
+        double low = 0.0, high = 0.0; /* the model's slopes are not used here */
         for (int j = 0; j < n; j++)
             across += fabs(A[i * n + j]);
         x->fb[i] = sign * x->gb[at];
@@ -639,7 +640,7 @@ static void reach_expression(Box *x, int r, double sign, double level)
     reach_quadratic(x, sign, sign * x->c[r] + x->s[r], x->fb, A, x->fw, 64 * ULP * (fabs(x->c[r]) + lost) + TINY, level, r);
 }
 
-/* Where the results go, for B boxes; the ends and reasons of variable i are at i * B. */
+/* Arrays of results for B boxes, as in examination.py; the ends and reasons of variable i begin at i * B. */
 typedef struct {
     Py_ssize_t B;
     const double *lower, *upper;
@@ -687,7 +688,7 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         x->e_lo[i] = -1.0, x->e_hi[i] = 1.0;
         x->why_lo[i] = x->why_hi[i] = -2;
     }
-    /* Monotone directions. */
+    /* Monotonicity. */
     for (int i = 0; i < n && defined; i++)
         for (int side = 1; side >= -1; side -= 2) {
             Py_ssize_t end = i * B + at;
@@ -738,7 +739,7 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         verdict = INFEASIBLE, reason = impossible;
     if (bound <= threshold)
         verdict = BOUNDED, reason = 0;
-    /* The variable to cut. */
+    /* The variable to bisect next. */
     double best = -2.0;
     int split = 0, finite = 1, flat = 1;
     for (int i = 0; i < n; i++) {
@@ -847,7 +848,7 @@ typedef struct {
     int count;
 } Borrowed;
 
-/* The memory of an array, which must be contiguous and hold so many items of a size. */
+/* Memory of an array, which must be contiguous and hold so many items of a size. NULL with an exception otherwise. */
 static void *borrow(Borrowed *all, PyObject *object, Py_ssize_t items, Py_ssize_t size, int writable)
 {
     Py_buffer *view = &all->buffers[all->count];

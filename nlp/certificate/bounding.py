@@ -1,31 +1,31 @@
-"""What enclosures say about boxes: bounds, conditions that cannot hold, monotone directions, contraction, where to cut.
+"""Examination of boxes with NumPy: bounds, impossible conditions, monotonicity, contraction, the next bisection.
 
-For each box: an upper bound of what is maximised over the feasible part of the box. With ``h = r e``, ``|e_i| <= 1``,
-the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the ray from the centre, give
+Each box gets an upper bound of the maximised value over its feasible part. With ``h = r e``, ``|e_i| <= 1``, the forms
+of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the ray from the centre, give
 
     L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
     b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
 
 a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
 ``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
-rows hold, so that its bound holds there, whatever the multipliers are. They are chosen to make the gradient small at
-the centre.
+conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
 
-This is the reference; ``_bounds.c`` does the same. Every formula is explained in ``docs/certificate.md``.
+This module is the reference; ``_bounds.c`` has the same formulas. ``docs/certificate.md`` explains each of them.
 """
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
-from . import instructions
-from .enclosure import ULP, Forms, enclose, midpoints
-from .quadratic import GradientModel, Quadratic, largest, reaching_affine
+from .enclosure import Enclosures, Midpoints, enclose, midpoints
+from .examination import COLLAPSED, UNMOVED, Examination, Verdict
+from .instructions import Tape, compile_tape
+from .intervals import ULP
+from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching, largest_on_unit_interval
 from .standardform import StandardForm
 
 if TYPE_CHECKING:
@@ -33,66 +33,55 @@ if TYPE_CHECKING:
 
     from ...models import FloatArray
 
-#: Rounds of the coordinate-wise searches for multipliers and for a tangent point: any result of them is sound.
+#: Rounds of the coordinate-wise searches for multipliers and for a tangent point: any result of them gives a bound.
 _MULTIPLIER_ROUNDS = 8
 _TANGENT_ROUNDS = 3
-#: What the linear part of the Lagrangian counts for beside the curved part when a box is cut.
+#: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
 _LINEAR = 0.3
-#: A contraction that takes off less than this part of a side is not made.
+#: Part of a side below which a contraction is not worth its leaf in a proof.
 _WORTH = 0.1
 
 
-class Verdict(enum.IntEnum):
-    """What became of a box."""
-
-    OPEN = 0
-    BOUNDED = 1  # its bound does not exceed the threshold
-    INFEASIBLE = 2  # a row cannot hold in it
-    MONOTONE = 3  # the function increases in a direction in which one can go on
-    EMPTIED = 4  # contraction along a variable left nothing of it
-
-
-@dataclass(frozen=True, eq=False)
-class Examined:
-    """What was found out about B boxes.
-
-    Attributes:
-        verdict: (B,) :class:`Verdict`.
-        reason: (B,) the expression that cannot hold, or the variable that is monotone or emptied.
-        bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
-        lower, upper: (n, B) what is left of the box after contraction, or the face that it collapsed on.
-        cut_lower, cut_upper: (n, B) why that end was moved: -2 not at all, -1 collapsed, or the index of an expression.
-        split: (B,) the variable to cut next.
-        value: (B,) a lower bound of what is maximised at the centre; -inf where a row may be violated.
-        centre: (n, B).
-    """
-
-    verdict: NDArray[np.int32]
-    reason: NDArray[np.int32]
-    bound: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    cut_lower: NDArray[np.int32]
-    cut_upper: NDArray[np.int32]
-    split: NDArray[np.int32]
-    value: FloatArray
-    centre: FloatArray
-
-
-def search_tape(form: StandardForm) -> instructions.Tape:
-    """The instructions of a form's R expressions and then of their derivatives, row by row.
+def search_tape(form: StandardForm) -> Tape:
+    """Compile a form's R expressions, then their derivatives, row by row.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    return instructions.lower(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+    return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+
+
+@dataclass(eq=False)
+class _Remainder:
+    """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
+
+    The attributes are those of :class:`Examination`.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    cut_lower: NDArray[np.int32]
+    cut_upper: NDArray[np.int32]
+    verdict: NDArray[np.int32]
+    reason: NDArray[np.int32]
+
+    @classmethod
+    def whole(cls, lower: FloatArray, upper: FloatArray) -> _Remainder:
+        """Return whole boxes, all open."""
+        cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
+        open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
+        return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
+
+    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
+        """Close some boxes for a reason."""
+        self.verdict[which], self.reason[which] = verdict, reason
 
 
 class NumpyEngine:
-    """The reference engine: everything on arrays with the boxes last.
+    """The reference engine: arithmetic on arrays with the boxes last.
 
     Args:
-        form: what is searched.
+        form: the form whose box is searched.
     """
 
     name = "numpy"
@@ -103,27 +92,28 @@ class NumpyEngine:
         self.form = form
         self._tape = search_tape(form)
         self.functions = len(form.functions)
-        self.equation = np.array([False] * self.functions + [row.is_equation for row in form.rows])
+        self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Do nothing: this engine has no threads."""
 
-    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
-        """Examine boxes against a value that their bounds must not exceed.
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+        """Examine boxes, and close those whose bounds do not exceed a threshold.
 
         Args:
-            lower: (n, B) ends.
-            upper: (n, B) ends.
+            lower: (n, B) lower ends.
+            upper: (n, B) upper ends.
             threshold: boxes whose bound is at most this are closed.
         """
         with np.errstate(all="ignore"):
             return self._examine(lower, upper, threshold)
 
-    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
+    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+        """Examine boxes; NumPy's warnings of invalid operations are off."""
         J = self.functions
-        centre, radius = midpoints(lower, upper)
-        model = self._model(lower, upper, radius)
+        box = midpoints(lower, upper)
+        model = self._model(lower, upper, box.radius)
         # Ranges of the expressions: of their forms, and by the mean value theorem.
         steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
         middle, error = model.value.c, model.value.s
@@ -131,34 +121,38 @@ class NumpyEngine:
         high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
         low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
         defined = (error[:J] < np.inf).all(axis=0)
-        verdict = np.zeros(lower.shape[1], dtype=np.int32)
-        reason = np.zeros(lower.shape[1], dtype=np.int32)
         bound = high[:J].min(axis=0)
-        multipliers = self._multipliers(model, high)
-        lagrangian, L = self._quadratic_bound(model, multipliers)
-        bound = np.where(defined, np.fmin(bound, lagrangian), np.inf)
+        L = model.sum_model(self._multipliers(model, high))
+        bound = np.where(defined, np.fmin(bound, self._quadratic_bound(L)), np.inf)
 
         impossible = (low > 0) | (self.equation[:, None] & (high < 0))
         impossible[:J] = False
         binding = (~(high < 0)) & ~impossible
         binding[:J] = False
-        lo, hi, cut_lower, cut_upper = self._monotone(model, binding, lower, upper, verdict, reason)
-        self._contract(model, L, lo, hi, cut_lower, cut_upper, (centre, radius), threshold, verdict, reason)
-        verdict[impossible.any(axis=0)] = Verdict.INFEASIBLE
-        reason[impossible.any(axis=0)] = impossible.argmax(axis=0)[impossible.any(axis=0)]
-        verdict[~defined & (verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
-        for array, original in ((lo, lower), (hi, upper)):
-            array[:, ~defined] = original[:, ~defined]
-        cut_lower[:, ~defined] = cut_upper[:, ~defined] = -2
-        closed = bound <= threshold
-        verdict[closed], reason[closed] = Verdict.BOUNDED, 0
-        rows_hold = (middle[J:] + error[J:] <= 0).all(axis=0)
-        value = np.where(rows_hold, (middle[:J] - error[:J]).min(axis=0), -np.inf)
-        return Examined(
-            verdict, reason, bound, lo, hi, cut_lower, cut_upper, self._split(L, lower, upper, lo, hi), value, centre
+        left = self._collapse_monotone(model, binding, lower, upper)
+        self._contract(model, L, left, box, threshold)
+        some = impossible.any(axis=0)
+        left.close(some, Verdict.INFEASIBLE, impossible.argmax(axis=0)[some])
+        left.verdict[~defined & (left.verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
+        left.lower[:, ~defined], left.upper[:, ~defined] = lower[:, ~defined], upper[:, ~defined]
+        left.cut_lower[:, ~defined] = left.cut_upper[:, ~defined] = UNMOVED
+        left.close(bound <= threshold, Verdict.BOUNDED, 0)
+        conditions_hold = (middle[J:] + error[J:] <= 0).all(axis=0)
+        return Examination(
+            verdict=left.verdict,
+            reason=left.reason,
+            bound=bound,
+            lower=left.lower,
+            upper=left.upper,
+            cut_lower=left.cut_lower,
+            cut_upper=left.cut_upper,
+            split=self._split(L, lower, upper, left),
+            value=np.where(conditions_hold, (middle[:J] - error[:J]).min(axis=0), -np.inf),
+            centre=box.centre,
         )
 
     def _model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
+        """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each."""
         n, R = self.form.n, len(self.equation)
         box = enclose(self._tape, lower, upper)
         shape = (R, n, lower.shape[1])
@@ -168,7 +162,7 @@ class NumpyEngine:
             return np.where(r > 0, values[R:].reshape(shape) * r, 0.0)
 
         return GradientModel(
-            value=Forms(*(each[:R] for each in vars(box).values())),
+            value=Enclosures(*(each[:R] for each in vars(box).values())),
             b=scaled(box.c),
             A=box.a[R:].reshape(R, n, n, lower.shape[1]) * radius[None, :, None],
             p=scaled(box.p),
@@ -181,9 +175,9 @@ class NumpyEngine:
         )
 
     def _multipliers(self, model: GradientModel, high: FloatArray) -> FloatArray:
-        """(R, B) weights that make the combined gradient small: of functions on the simplex, of rows negated.
+        """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
 
-        Coordinate descent on the least squares of the scaled gradient at the centre.
+        They make its scaled gradient at the centre small, by coordinate descent on the sum of squares.
         """
         J, R = self.functions, len(self.equation)
         weights = np.zeros_like(high)
@@ -208,15 +202,14 @@ class NumpyEngine:
                 weights[r] = new
                 if r < J:
                     weights[0] = np.maximum(weights[0] - change, 0.0)
-        # The weights of the functions must sum to 1, and rounding may have moved that.
+        # The weights of the functions must sum to 1 in spite of rounding.
         weights[0] += 1.0 - weights[:J].sum(axis=0)
         bad = weights[0] < 0
         weights[:J, bad], weights[0, bad] = 0.0, 1.0
         return weights
 
-    def _quadratic_bound(self, model: GradientModel, weights: FloatArray) -> tuple[FloatArray, Quadratic]:
-        """Upper bound of the Lagrangian over the box, and its model."""
-        L = Quadratic.combined(model, weights)
+    def _quadratic_bound(self, L: QuadraticModel) -> FloatArray:
+        """Return an upper bound (B,) of the Lagrangian over the box, from its model."""
         mean = L.middle + np.maximum(np.abs(L.slope_lo), np.abs(L.slope_hi)).sum(axis=0)
         # Where the slope has a sign, the largest value is on that face.
         s = np.where(L.slope_lo >= 0, 1.0, np.where(L.slope_hi <= 0, -1.0, 0.0))
@@ -228,16 +221,17 @@ class NumpyEngine:
         H = np.where(free[:, None] & free[None], L.H, 0.0)
         diagonal = np.einsum("iib->ib", H).copy()
         others = np.abs(H).sum(axis=1) - np.abs(diagonal)
-        separate = fixed + (largest(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
+        separate = fixed + (largest_on_unit_interval(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
         shift = np.maximum(diagonal + others, 0.0)
         tangent = fixed + self._tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
         best = np.fmin(mean, np.fmin(separate, tangent))
-        return best + L.rounding, L
+        return np.asarray(best + L.rounding)
 
     def _tangent(self, b: FloatArray, H: FloatArray, diagonal: FloatArray) -> FloatArray:
-        """Largest value over the box of a tangent plane to the concave ``b e + 1/2 e' C e``, C = H but its diagonal.
+        """Return the largest value over the box of a tangent plane to the concave ``b e + 1/2 e' C e``.
 
-        Any tangent plane of a concave function lies above it; this one touches near its maximum.
+        ``C`` is ``H`` with another diagonal. A tangent plane of a concave function is nowhere below it; this one
+        touches it near its maximum.
         """
         n = len(b)
         t = np.zeros_like(b)
@@ -256,23 +250,15 @@ class NumpyEngine:
         gradient = b + Ct
         return np.asarray(-0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0))
 
-    def _monotone(
-        self,
-        model: GradientModel,
-        binding: NDArray[np.bool_],
-        lower: FloatArray,
-        upper: FloatArray,
-        verdict: NDArray[np.int32],
-        reason: NDArray[np.int32],
-    ) -> tuple[FloatArray, FloatArray, NDArray[np.int32], NDArray[np.int32]]:
-        """Collapse boxes in which every function rises along a variable and no row stops a point from following.
+    def _collapse_monotone(
+        self, model: GradientModel, binding: NDArray[np.bool_], lower: FloatArray, upper: FloatArray
+    ) -> _Remainder:
+        """Close or collapse boxes in which every function rises along a variable and no condition stops a point.
 
-        A point where that holds is no maximum, unless it lies on the face of the whole box. A row stops it when it may
-        bind and may grow in that direction; an equation always does, if it depends on the variable.
+        Such a point is no maximum, unless it lies on the face of the whole box. A condition stops it when it may bind
+        and may grow in that direction; an equation always does, if it depends on the variable.
         """
-        lo, hi = lower.copy(), upper.copy()
-        cut_lower = np.full(lower.shape, -2, dtype=np.int32)
-        cut_upper = cut_lower.copy()
+        left = _Remainder.whole(lower, upper)
         J = self.functions
         for i in range(self.form.n):
             width = upper[i] > lower[i]
@@ -283,37 +269,27 @@ class NumpyEngine:
                 else:
                     rises, falls = (g_hi[:J] < 0).all(axis=0), g_lo > 0
                 stopped = binding & self.depends[:, i, None] & ~(falls & ~self.equation[:, None])
-                applies = rises & ~stopped.any(axis=0) & width & (verdict == Verdict.OPEN)
+                applies = rises & ~stopped.any(axis=0) & width & (left.verdict == Verdict.OPEN)
                 whole = self.form.upper[i] if side > 0 else self.form.lower[i]
                 at_face = (upper[i] if side > 0 else lower[i]) == whole
-                dropped, moved = applies & ~at_face, applies & at_face
-                verdict[dropped], reason[dropped] = Verdict.MONOTONE, i
-                (lo if side > 0 else hi)[i, moved] = whole
-                (cut_lower if side > 0 else cut_upper)[i, moved] = -1
-        return lo, hi, cut_lower, cut_upper
+                left.close(applies & ~at_face, Verdict.MONOTONE, i)
+                collapsed = applies & at_face
+                (left.lower if side > 0 else left.upper)[i, collapsed] = whole
+                (left.cut_lower if side > 0 else left.cut_upper)[i, collapsed] = COLLAPSED
+        return left
 
     def _contract(
-        self,
-        model: GradientModel,
-        L: Quadratic,
-        lo: FloatArray,
-        hi: FloatArray,
-        cut_lower: NDArray[np.int32],
-        cut_upper: NDArray[np.int32],
-        box: tuple[FloatArray, FloatArray],
-        threshold: float,
-        verdict: NDArray[np.int32],
-        reason: NDArray[np.int32],
+        self, model: GradientModel, L: QuadraticModel, left: _Remainder, box: Midpoints, threshold: float
     ) -> None:
-        """Move ends of boxes past points where a function is at most the threshold, or a row cannot hold."""
+        """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold."""
         centre, radius = box
         J = self.functions
-        e_lo, e_hi = np.full(lo.shape, -1.0), np.full(lo.shape, 1.0)
-        why_lo, why_hi = cut_lower.copy(), cut_upper.copy()
+        e_lo, e_hi = np.full(left.lower.shape, -1.0), np.full(left.lower.shape, 1.0)
+        why_lo, why_hi = left.cut_lower.copy(), left.cut_upper.copy()
 
-        def keep(part: tuple[FloatArray, FloatArray], r: int) -> None:
-            raised, lowered = part[0] > e_lo, part[1] < e_hi
-            e_lo[raised], e_hi[lowered] = part[0][raised], part[1][lowered]
+        def keep(part: Ends, r: int) -> None:
+            raised, lowered = part.low > e_lo, part.high < e_hi
+            e_lo[raised], e_hi[lowered] = part.low[raised], part.high[lowered]
             why_lo[raised], why_hi[lowered] = r, r
 
         for r in range(len(self.equation)):
@@ -321,35 +297,34 @@ class NumpyEngine:
                 if (r < J and sign < 0) or (r >= J and sign > 0 and not self.equation[r]):
                     continue
                 level = threshold if r < J else 0.0
-                keep(reaching_affine(model.value, r, sign, level), r)
-                keep(model.expression(r, sign).reaching(level), r)
+                keep(affine_ends_reaching(model.value, r, sign, level), r)
+                keep(model.expression_model(r, sign).ends_reaching(level), r)
         if len(self.equation) > 1:
-            keep(L.reaching(threshold), 0)
+            keep(L.ends_reaching(threshold), 0)
         new_lo = centre + radius * e_lo
         new_lo -= (np.abs(centre) + radius) * (4 * ULP)
         new_hi = centre + radius * e_hi
         new_hi += (np.abs(centre) + radius) * (4 * ULP)
-        # A cut is worth its leaf in a proof when it takes off a part that one can see.
-        worth = _WORTH * (hi - lo)
-        moved = (why_lo >= 0) & (cut_lower == -2) & (cut_upper == -2) & (new_lo - lo > worth)
-        lo[moved], cut_lower[moved] = new_lo[moved], why_lo[moved]
-        moved = (why_hi >= 0) & (cut_upper == -2) & (cut_lower != -1) & (hi - new_hi > worth)
-        hi[moved], cut_upper[moved] = new_hi[moved], why_hi[moved]
-        emptied = lo > hi
-        which = emptied.any(axis=0)
-        verdict[which], reason[which] = Verdict.EMPTIED, emptied.argmax(axis=0)[which]
+        worth = _WORTH * (left.upper - left.lower)
+        unmoved = (left.cut_lower == UNMOVED) & (left.cut_upper == UNMOVED)
+        moved = (why_lo >= 0) & unmoved & (new_lo - left.lower > worth)
+        left.lower[moved], left.cut_lower[moved] = new_lo[moved], why_lo[moved]
+        moved = (why_hi >= 0) & (left.cut_upper == UNMOVED) & (left.cut_lower != COLLAPSED)
+        moved &= left.upper - new_hi > worth
+        left.upper[moved], left.cut_upper[moved] = new_hi[moved], why_hi[moved]
+        emptied = left.lower > left.upper
+        which = np.asarray(emptied.any(axis=0))
+        left.close(which, Verdict.EMPTIED, emptied.argmax(axis=0)[which])
 
-    def _split(
-        self, L: Quadratic, lower: FloatArray, upper: FloatArray, lo: FloatArray, hi: FloatArray
-    ) -> NDArray[np.int32]:
-        """The variable along which the Lagrangian can change most on what is left of the box."""
+    def _split(self, L: QuadraticModel, lower: FloatArray, upper: FloatArray, left: _Remainder) -> NDArray[np.int32]:
+        """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left."""
         width = upper - lower
-        left = (hi - lo) / np.where(width > 0, width, 1.0)
-        score = (_LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) + L.w) * left
-        relative = (hi - lo) / (self.form.upper - self.form.lower)[:, None]
+        part = (left.upper - left.lower) / np.where(width > 0, width, 1.0)
+        score = (_LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) + L.w) * part
+        relative = (left.upper - left.lower) / (self.form.upper - self.form.lower)[:, None]
         finite = np.isfinite(score).all(axis=0)
         score = np.where(finite, score, relative)
         # Where nothing changes, the longest side.
         score = np.where((score > 0).any(axis=0), score, relative)
-        score[~(hi > lo)] = -1.0
+        score[~(left.upper > left.lower)] = -1.0
         return np.asarray(score.argmax(axis=0), dtype=np.int32)

@@ -1,11 +1,11 @@
 """A proven bound of the global optimum, by branch and bound over the whole box.
 
-Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.bounding`, or by the C kernel that does the same. A box
-is closed when its bound does not exceed the best value known by more than the gap, when a condition cannot hold in it,
-or when no maximum can lie in it; otherwise it is cut in two. What is left when the search is stopped still gives a
-bound, which is as sure as that at the end.
+Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.bounding`, or by the C kernel with the same formulas. A
+box is closed when its bound does not exceed the incumbent by more than the gap, when a condition cannot hold in it, or
+when no maximum can lie in it; otherwise it is bisected. A search that stops early has a bound too, from the boxes that
+are open: it is wider, and as certain as that at the end.
 
-Nothing here trusts a solver: an incumbent is a point at which the program's own functions are evaluated.
+No solver is trusted: the value of an incumbent is that of the program's own functions at the point.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,49 +23,31 @@ from ..case.task import Sense
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
 from ..program.nlp import Nlp
-from .bounding import Examined, Verdict
 from .certificate import Certificate, CertificateStatus
 from .engines import Engine, engine_for
+from .examination import Examination, Verdict
 from .incumbent import Incumbent, IncumbentError
 from .openboxes import Boxes, OpenBoxes
+from .proofwriter import ProofWriter
 from .standardform import StandardForm, standard_form
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-#: The gap that is asked for when none is given: a ten-thousandth.
+#: The gap asked for when none is given: a ten-thousandth.
 GAP = 1e-4
-#: What every bound is moved outwards by in the end, in parts of itself: constants that CasADi folded when it built the
-#: graph are rounded doubles of their own.
+#: Part of itself by which every bound moves outwards in the end: constants that CasADi folded when it built the graph
+#: are rounded doubles of their own.
 _FOLDED = 1e-12
-#: An incumbent below this part of the objective's scale counts as 0 when a gap is asked for as a part of it.
+#: Part of the objective's scale below which an incumbent counts as 0: a gap relative to it would have no meaning.
 _NEAR_ZERO = 1e-6
-#: A box all of whose sides are below this part of the whole box's and that has no finite bound holds, for every
-#: practical purpose, a point without a value.
+#: Width, in parts of the whole box, below which a box without a finite bound is taken to hold a point without a value.
 _SINGULAR_WIDTH = 2.0**-16
-#: A box below this is not cut further.
+#: Width, in parts of the whole box, below which a box is not bisected.
 _LEAST_WIDTH = 2.0**-40
-#: Seconds between two reports of progress, and the most entries of a history.
+#: Seconds between two reports of progress, and the largest number of entries in a history.
 _REPORT_EVERY = 0.1
 _HISTORY = 200
 
-#: Called with seconds, bound, incumbent, boxes examined, boxes open.
+#: Callback with seconds, bound, incumbent, number of boxes examined, number of boxes open.
 CertifyProgress = Callable[[float, float, float, int, int], None]
-
-
-class Recorder(Protocol):
-    """Takes down what became of every box: see :mod:`screwsynth.nlp.certificate.proof`."""
-
-    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
-        """A block of examined boxes.
-
-        Args:
-            boxes: as they were.
-            found: what became of them.
-            cut: (B,) where ``found.split`` was cut in two; NaN where it was not.
-            first_child: (B,) place of the lower half, of which the upper half's is the next; without a cut, of what is
-                left of the box; -1 where nothing follows.
-        """
 
 
 def certify_program(
@@ -79,31 +61,31 @@ def certify_program(
     jobs: int | None = None,
     engine: str | None = None,
     progress: CertifyProgress | None = None,
-    recorder: Recorder | None = None,
+    recorder: ProofWriter | None = None,
 ) -> Certificate:
     """Prove a bound of a program's global optimum.
 
     Args:
         nlp: the program.
         x: (n,) the best point known, as from :func:`screwsynth.nlp.solve`; without one a few are tried.
-        claimed: what the objective is said to be there; refused when it is not.
-        gap: part of the incumbent that the bound may be off by, or of the objective's scale where the incumbent is 0.
+        claimed: the objective claimed there; the claim is refused when it is wrong.
+        gap: largest difference of bound and incumbent, as a part of the incumbent; near 0, of the objective's scale.
         above: prove, instead, that F is above this value on the whole box. The program must be a minimisation.
-        time_limit: seconds after which the search stops with what it has.
+        time_limit: seconds after which the search stops with the bound reached.
         jobs: threads of the C kernel; the result does not depend on it. Left out, one for each processor.
         engine: ``"c"`` or ``"numpy"``; left out, the C kernel where it was built.
-        progress: called now and then.
-        recorder: takes down the proof.
+        progress: called about ten times a second.
+        recorder: records the search's tree for a proof.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
-        ValueError: ``above`` for a maximisation, or an engine that is not there.
+        ValueError: ``above`` for a maximisation, or an engine that does not exist here.
     """
     began = time.perf_counter()
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
     if nlp.n == 0:
-        return _fixed(nlp, above, time.perf_counter() - began)
+        return _certify_point(nlp, above, time.perf_counter() - began)
     form = standard_form(nlp)
     chosen = engine_for(form, engine, jobs)
     search = _Search(form, chosen, gap, above, began, recorder)
@@ -121,8 +103,8 @@ def certify_program(
     return search.certificate(reason)
 
 
-def _fixed(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
-    """Nothing is free: the value at the one point is its own bound."""
+def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
+    """Return the certificate of a program without variables: its value at the one point is the bound."""
     x = frozen_array(nlp.start, (0,))
     F, violation = nlp.evaluate(x)[0], linearise(nlp, x).violation
     status, reason = CertificateStatus.PROVED, ""
@@ -138,16 +120,39 @@ def _fixed(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
     )
 
 
+class _Gap(NamedTuple):
+    """Largest difference of bound and incumbent, in the objective's unit, and whether it is a part of the incumbent."""
+
+    size: float
+    is_relative: bool
+
+
 @dataclass
 class _Search:
-    """The state of a search; all values are those of the standard form, which is maximised."""
+    """The state of a search; all values are those of the standard form, which is maximised.
+
+    Attributes:
+        form: the form.
+        engine: examines boxes.
+        gap: as for :func:`certify`.
+        above: as for :func:`certify`.
+        began: time at the start.
+        recorder: records the search's tree for a proof.
+        incumbent: the best feasible point known.
+        opened: boxes to be examined.
+        current: boxes under examination; None between two blocks.
+        undivided: open boxes that are too small to bisect.
+        closed_bound: largest bound of all boxes that were closed because of their bounds.
+        boxes, nodes: number of boxes examined, and of nodes in the tree.
+        history: (seconds, bound, incumbent) in the program's own sense.
+    """
 
     form: StandardForm
     engine: Engine
     gap: float
     above: float | None
     began: float
-    recorder: Recorder | None
+    recorder: ProofWriter | None
 
     def __post_init__(self) -> None:
         form = self.form
@@ -155,49 +160,50 @@ class _Search:
         self.opened = OpenBoxes()
         root = np.zeros(1, dtype=np.int64)
         self.opened.push(Boxes(form.lower[:, None], form.upper[:, None], np.array([np.inf]), root))
-        self.taken: Boxes | None = None
-        self.aside: list[Boxes] = []
-        self.proved = -math.inf
-        self.boxes, self.places = 0, 1
+        self.current: Boxes | None = None
+        self.undivided: list[Boxes] = []
+        self.closed_bound = -math.inf
+        self.boxes, self.nodes = 0, 1
         self.history: list[tuple[float, float, float]] = []
 
     @property
     def threshold(self) -> float:
-        """Boxes are closed when their bound is at most this."""
+        """Largest bound of a box that may be closed."""
         if self.above is not None:
-            # Strictly below, and by more than the bound is moved outwards in the end.
+            # Strictly below, and by more than the bound moves outwards in the end.
             return math.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf)
         if self.incumbent.x is None:
             return -math.inf
-        # Less what the bound is moved outwards by in the end, so that the gap holds with it.
-        return self.incumbent.value + self._allowed()[0] - 2 * _FOLDED * abs(self.incumbent.value)
+        # The bound moves outwards in the end, and the gap must hold with that.
+        return self.incumbent.value + self._allowed_gap().size - 2 * _FOLDED * abs(self.incumbent.value)
 
-    def _refuted(self) -> bool:
-        """Whether a point is known where F is not above the value; an F that is rounding error counts as 0."""
+    def _has_counterexample(self) -> bool:
+        """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
         if self.above is None or self.incumbent.x is None:
             return False
         return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_scale
 
-    def _allowed(self) -> tuple[float, bool]:
-        """The absolute gap, and whether it is a part of the incumbent."""
+    def _allowed_gap(self) -> _Gap:
         floor, value = _NEAR_ZERO * self.form.nlp.objective_scale, abs(self.incumbent.value)
-        return (self.gap * value, True) if floor < value < math.inf else (self.gap * floor, False)
+        if floor < value < math.inf:
+            return _Gap(self.gap * value, is_relative=True)
+        return _Gap(self.gap * floor, is_relative=False)
 
     @property
     def bound(self) -> float:
-        """Upper bound of the maximum as it stands."""
-        waiting = [float(boxes.bound.max()) for boxes in self.aside]
-        if self.taken is not None:
-            waiting.append(float(self.taken.bound.max()))
-        known = max(self.proved, self.opened.bound, *waiting, self.incumbent.value)
+        """Upper bound of the maximum, at this state of the search."""
+        others = [float(boxes.bound.max()) for boxes in self.undivided]
+        if self.current is not None:
+            others.append(float(self.current.bound.max()))
+        known = max(self.closed_bound, self.opened.bound, *others, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
-        """Search until nothing is left; returns why it stopped before, or nothing."""
+        """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         turn = 0
         while self.opened.count:
-            if self._refuted():
+            if self._has_counterexample():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began
             if time_limit is not None and seconds >= time_limit:
@@ -205,33 +211,36 @@ class _Search:
             if seconds - reported >= _REPORT_EVERY:
                 reported = seconds
                 self._report(seconds, progress)
-            self.taken = self.opened.pop(self.engine.block if turn else 1)
+            self.current = self.opened.pop(self.engine.block if turn else 1)
             turn += 1
-            found = self.engine.examine(self.taken.lower, self.taken.upper, self.threshold)
+            found = self.engine.examine(self.current.lower, self.current.upper, self.threshold)
             self._improve(found, turn)
-            self._branch(self.taken, found)
-            self.taken = None
-            undefined = [boxes for boxes in self.aside if not np.isfinite(boxes.bound).all()]
+            self._branch(self.current, found)
+            self.current = None
+            undefined = [boxes for boxes in self.undivided if not np.isfinite(boxes.bound).all()]
             if undefined:
-                return self._undefined(undefined[0])
-        return "boxes are left that are too small to cut" if self.aside else ""
+                return self._reason_without_bound(undefined[0])
+        return "boxes are left that are too small to cut" if self.undivided else ""
 
-    def _improve(self, found: Examined, turn: int) -> None:
-        """Take a better point where one is met; now and then look for one near the most promising box."""
+    def _improve(self, found: Examination, turn: int) -> None:
+        """Improve the incumbent from the best centre of a block, or from the centre of the box with the largest bound.
+
+        The latter costs more, and is tried at turns 1, 2, 4, 8 and so on.
+        """
         best = int(np.argmax(found.value))
         if found.value[best] > self.incumbent.value:
-            self.incumbent.take(found.centre[:, best])
+            self.incumbent.consider(found.centre[:, best])
         if turn & (turn - 1) == 0:
-            self.incumbent.look_near(found.centre[:, int(np.argmax(np.nan_to_num(found.bound, posinf=-math.inf)))])
+            self.incumbent.improve_near(found.centre[:, int(np.argmax(np.nan_to_num(found.bound, posinf=-math.inf)))])
 
-    def _branch(self, boxes: Boxes, found: Examined) -> None:
-        """Cut the open boxes in two, and keep account of the others."""
+    def _branch(self, boxes: Boxes, found: Examination) -> None:
+        """Bisect the open boxes, and account for the others."""
         threshold = self.threshold
         closed = found.verdict == Verdict.BOUNDED
         if closed.any():
-            self.proved = max(self.proved, float(found.bound[closed].max()))
-        if self._cut_by_value(found):
-            self.proved = max(self.proved, threshold)
+            self.closed_bound = max(self.closed_bound, float(found.bound[closed].max()))
+        if self._is_contracted_by_value(found):
+            self.closed_bound = max(self.closed_bound, threshold)
         self.boxes += boxes.count
         bound = np.fmin(found.bound, boxes.bound)
         lower, upper, split = found.lower, found.upper, found.split
@@ -243,18 +252,18 @@ class _Search:
         least = np.where(np.isfinite(bound), _LEAST_WIDTH, _SINGULAR_WIDTH)
         is_open = found.verdict == Verdict.OPEN
         small = is_open & ((width < least) | ~((low < middle) & (middle < high)))
-        # A box that collapsed to less than can be cut, such as a corner, was not examined as what it is now.
+        # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
         again = small & ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
         once, done, cut = (np.flatnonzero(which) for which in (again, small & ~again, is_open & ~small))
         first_child = np.full(boxes.count, -1, dtype=np.int64)
-        first_child[cut] = self.places + 2 * np.arange(cut.size)
-        first_child[once] = self.places + 2 * cut.size + np.arange(once.size)
-        self.places += 2 * cut.size + once.size
+        first_child[cut] = self.nodes + 2 * np.arange(cut.size)
+        first_child[once] = self.nodes + 2 * cut.size + np.arange(once.size)
+        self.nodes += 2 * cut.size + once.size
         if self.recorder is not None:
             is_cut = is_open & ~small
             self.recorder.record(boxes, found, np.where(is_cut, middle, np.nan), first_child)
         if done.size:
-            self.aside.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[done]))
+            self.undivided.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[done]))
         self.opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_child[once]))
         left, right = upper[:, cut].copy(), lower[:, cut].copy()
         columns = np.arange(cut.size)
@@ -268,18 +277,20 @@ class _Search:
             )
         )
 
-    def _cut_by_value(self, found: Examined) -> bool:
-        """Whether a contraction took off points because of their value, which is then at most the threshold."""
+    def _is_contracted_by_value(self, found: Examination) -> bool:
+        """Return whether a contraction excluded points because of their value, which is at most the threshold."""
         count = len(self.form.functions)
         return any(bool(((why >= 0) & (why < count)).any()) for why in (found.cut_lower, found.cut_upper))
 
-    def _undefined(self, boxes: Boxes) -> str:
+    def _reason_without_bound(self, boxes: Boxes) -> str:
+        """Return the reason for stopping at boxes without a finite bound, with the place of the first."""
         which = int(np.argmin(np.isfinite(boxes.bound)))
         point = 0.5 * (boxes.lower[:, which] + boxes.upper[:, which])
         at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.form.names, point, strict=True))
         return f"the expressions have no finite bound near {at}, as where a limb has zero length"
 
     def _report(self, seconds: float, progress: CertifyProgress | None) -> None:
+        """Report progress, and add to the history; a full history loses every second entry."""
         bound, incumbent = self.form.sign * self.bound, self.form.sign * self.incumbent.value
         if math.isfinite(bound) and math.isfinite(incumbent):
             if len(self.history) >= _HISTORY:
@@ -289,28 +300,29 @@ class _Search:
             progress(seconds, bound, incumbent, self.boxes, self.opened.count)
 
     def certificate(self, reason: str) -> Certificate:
-        """What is known now."""
+        """Return the certificate at this state of the search."""
         nlp, sign = self.form.nlp, self.form.sign
         seconds = time.perf_counter() - self.began
         self._report(seconds, None)
-        left = self.opened.count + sum(boxes.count for boxes in self.aside)
-        left += 0 if self.taken is None else self.taken.count
+        left = self.opened.count + sum(boxes.count for boxes in self.undivided)
+        left += 0 if self.current is None else self.current.count
         known = self.incumbent.x is not None
-        if self._refuted():
+        if self._has_counterexample():
             status = CertificateStatus.REFUSED
             at = ", ".join(
-                f"{name} = {value:.6g}" for name, value in zip(self.form.names, self.incumbent.full(), strict=False)
+                f"{name} = {value:.6g}"
+                for name, value in zip(self.form.names, self.incumbent.program_point(), strict=False)
             )
             reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
         elif left:
             status = CertificateStatus.INCOMPLETE
         else:
             status = CertificateStatus.PROVED if known else CertificateStatus.INFEASIBLE
-        allowed, is_relative = self._allowed()
+        allowed, is_relative = self._allowed_gap()
         return Certificate(
             status=status,
             nlp=nlp,
-            x=None if self.incumbent.x is None else frozen_array(self.incumbent.full(), (nlp.n,)),
+            x=None if self.incumbent.x is None else frozen_array(self.incumbent.program_point(), (nlp.n,)),
             incumbent=sign * self.incumbent.value if known else math.nan,
             bound=sign * self.bound if status is not CertificateStatus.INFEASIBLE else math.nan,
             allowed=allowed,

@@ -1,4 +1,4 @@
-"""What a search of the whole box proved: a value with a sentence that says what it means and what it does not."""
+"""Certificates: proven bounds, each with a sentence that states its meaning and its limits."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ...models import FloatArray
 from ..case.task import Sense
 from ..program.nlp import Nlp
 
-#: What every statement is about: the proof covers the expressions as CasADi holds them, not the machine.
+#: Scope of every statement: the expressions as CasADi holds them, not the machine.
 SCOPE = "for the double-precision expression graph of this case"
 
 
 class CertificateStatus(enum.Enum):
-    """How a search ended; each value is the word in results."""
+    """Result of a search; each value is the word in results."""
 
     PROVED = "proved"
     INCOMPLETE = "incomplete"
@@ -28,23 +28,23 @@ class Certificate:
     """A proven bound.
 
     Attributes:
-        status: ``proved``: the gap that was asked for holds, or F is above the value on the whole box; ``incomplete``:
-            the bound holds, but is not as tight as asked; ``infeasible``: no point of the box keeps the limits;
-            ``refused``: a point shows that what was claimed is wrong.
+        status: ``proved``: the gap asked for holds, or F is above the value on the whole box; ``incomplete``: the bound
+            holds, but is wider than asked for; ``infeasible``: no point of the box keeps the limits; ``refused``: the
+            claim is wrong, as a point shows.
         nlp: the program.
-        x: (n,) the best point known, or None. It differs from the incumbent that was given where that was beaten.
+        x: (n,) the incumbent; None without one. It may be another point than the one given: see ``was_beaten``.
         incumbent: objective at ``x``; NaN without a point.
         bound: no feasible point of the box has a better objective; infinite where nothing is known.
-        allowed: the gap that was asked for, in the objective's own unit.
-        is_relative: whether it was asked for as a part of the incumbent; near 0 it is a part of the objective's scale.
-        above: the value that F was to be shown to be above, if any.
-        was_beaten: whether the search came upon a better point than the one it was given.
+        allowed: the gap asked for, in the objective's own unit.
+        is_relative: whether that gap is a part of the incumbent; near 0 it is a part of the objective's scale.
+        above: the value that F is claimed to be above; None without such a claim.
+        was_beaten: whether the search found a better point than the one given.
         engine: ``c`` or ``numpy``.
         boxes: number of boxes examined.
-        open: number of boxes that the search did not come to.
+        open: number of boxes that are still open.
         seconds: wall time.
-        reason: why the search ended before it was done, or why the claim is refused; else empty.
-        history: (seconds, bound, incumbent) on the way, finite numbers only.
+        reason: for stopping before every box was closed, or for refusing the claim; else empty.
+        history: (seconds, bound, incumbent) during the search, finite numbers only.
     """
 
     status: CertificateStatus
@@ -65,7 +65,7 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """How far the bound is from the incumbent; not negative."""
+        """Distance of the bound from the incumbent; not negative."""
         return abs(self.bound - self.incumbent)
 
     @property
@@ -77,7 +77,7 @@ class Certificate:
 
     @property
     def statement(self) -> str:
-        """What is proved, in one sentence, with its limits."""
+        """The proven statement in one sentence, with its limits."""
         word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
         best = "" if math.isnan(self.incumbent) else f"; the best point known has {self.incumbent:.10g}"
         beaten = ", better than the one given" if self.was_beaten else ""

@@ -1,21 +1,21 @@
-"""Taylor forms and intervals of a tape's results over many boxes at once, with rigorous rounding terms.
+"""Enclosures of a tape's results over many boxes at once: Taylor forms and intervals with rigorous rounding terms.
 
-On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, every value ``v`` of the tape is enclosed twice: for ``0 <= t <= 1``
+On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` of the tape has two enclosures: for ``0 <= t <= 1``
 
     v(t e) in c + t sum_i a_i e_i + t^2 [p, q] +- s        and        lo <= v <= hi,
 
-where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and everything of second
-order (that it shrinks with ``t^2`` is what makes the gradient's forms a third as wrong when they are integrated along a
-ray), and ``s`` is what rounding may have done. The interval is intersected with the form's range at every operation.
-These are Taylor models of first order (M. Berz and K. Makino, *Verified integration of ODEs and flows using
+where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
+order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
+gradient's form along a ray has a third of their width. The interval is intersected with the form's range at every
+operation. These are Taylor models of first order (M. Berz and K. Makino, *Verified integration of ODEs and flows using
 differential algebraic methods on high-order Taylor models*, Reliable Computing 4 (1998)) with the products bounded as
 in affine arithmetic (J. Stolfi and L. H. de Figueiredo, 1997; F. Messine, *Extensions of affine arithmetic*, 2002).
 
-All arithmetic is in round to nearest; each operation adds to ``s``, and to both ends, more than its roundings can have
-cost (the model is in ``docs/certificate.md``). A value that may be undefined somewhere in the box, or that overflows,
-is *poisoned*: its ``s`` and its ends are infinite, and everything computed from it is poisoned too.
+All arithmetic is in round to nearest; each operation adds more to ``s``, and to both ends, than its roundings can cost
+(see ``docs/certificate.md``). A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its
+``s`` and its ends are infinite, and so are those of every value computed from it.
 
-This is the reference; ``_bounds.c`` does the same.
+This module is the reference; ``_bounds.c`` has the same formulas.
 """
 
 from __future__ import annotations
@@ -26,27 +26,22 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .instructions import Op, Tape
+from .intervals import TINY, ULP, interval_product, widen
+from .univariate import RULES
 
 if TYPE_CHECKING:
     from ...models import FloatArray
 
-#: Four times the rounding unit 2^-53: what an end of an interval moves outwards per operation, in parts of itself.
-ULP = 2.0**-51
-#: More than what underflow can cost an operation. Additions are exact there.
-TINY = 1e-300
-#: Error, in parts of 2^-51, of sine, cosine, exponential, logarithm and arc tangent as libraries compute them.
-LIBRARY = 8.0
-
 
 @dataclass(eq=False)
-class Forms:
+class Enclosures:
     """Enclosures of R values over B boxes.
 
     Attributes:
         c: (R, B) values at the centres.
         a: (R, n, B) scaled gradients there.
-        p, q: (R, B) least and largest of what is of second order, ``p <= 0 <= q``.
-        s: (R, B) rounding errors; infinite where a value is poisoned.
+        p, q: (R, B) least and largest sum of the terms of second order, ``p <= 0 <= q``.
+        s: (R, B) bounds of the rounding errors; infinite where a value is poisoned.
         lo, hi: (R, B) intervals.
     """
 
@@ -59,34 +54,41 @@ class Forms:
     hi: FloatArray
 
     @classmethod
-    def empty(cls, values: int, symbols: int, boxes: int) -> Forms:
-        """Room for enclosures."""
+    def zeros(cls, values: int, symbols: int, boxes: int) -> Enclosures:
+        """Return enclosures of zero, to be written to."""
         c, p, q, s, lo, hi = (np.zeros((values, boxes)) for _ in range(6))
         return cls(c, np.zeros((values, symbols, boxes)), p, q, s, lo, hi)
 
 
-def midpoints(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centres and radii of boxes, (n, B) each: ``centre +- radius`` holds the box whatever rounding does."""
+class Midpoints(NamedTuple):
+    """Centres and radii of boxes, (n, B) each; ``centre +- radius`` holds the box in spite of rounding."""
+
+    centre: FloatArray
+    radius: FloatArray
+
+
+def midpoints(lower: FloatArray, upper: FloatArray) -> Midpoints:
+    """Return the centres and radii of boxes with ends (n, B)."""
     centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
     radius = np.maximum(upper - centre, centre - lower)
-    return centre, np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0)
+    return Midpoints(centre, np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0))
 
 
-def enclose(tape: Tape, lower: FloatArray, upper: FloatArray) -> Forms:
-    """Enclosures of a tape's results over boxes.
+def enclose(tape: Tape, lower: FloatArray, upper: FloatArray) -> Enclosures:
+    """Return enclosures of a tape's results over boxes.
 
     Args:
         tape: the instructions.
-        lower: (n, B) ends of the boxes.
-        upper: (n, B) ends of the boxes.
+        lower: (n, B) lower ends of the boxes.
+        upper: (n, B) upper ends of the boxes.
     """
     centre, radius = midpoints(lower, upper)
     with np.errstate(all="ignore"):
-        return _Machine(tape, centre.shape[1]).run(centre, radius, lower, upper)
+        return _Interpreter(tape, centre.shape[1]).run(centre, radius, lower, upper)
 
 
 class _Result(NamedTuple):
-    """A form and an interval before they are settled; ``a`` covers the instruction's span of variables."""
+    """A form and an interval before their intersection; ``a`` covers the instruction's span of variables."""
 
     c: FloatArray
     a: FloatArray
@@ -97,18 +99,69 @@ class _Result(NamedTuple):
     hi: FloatArray
 
 
-class _Machine:
-    """Runs a tape over B boxes."""
+class _Factor(NamedTuple):
+    """A form without its rounding error.
+
+    Attributes:
+        c: (B,) centre.
+        a: (n, B) linear part.
+        rad: (B,) sum of ``|a|``.
+        p, q: (B,) least and largest of second order.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    rad: FloatArray
+    p: FloatArray
+    q: FloatArray
+
+
+class _SecondOrder(NamedTuple):
+    """Least and largest terms of second order of a product, and bounds of the sizes of its factors, (B,) each."""
+
+    p: FloatArray
+    q: FloatArray
+    size: FloatArray
+    other_size: FloatArray
+
+
+def _second_order(one: _Factor, other: _Factor) -> _SecondOrder:
+    """Return the terms of second order in the product of two forms.
+
+    The product of the linear parts has two bounds: ``e_i^2`` lies in [0, 1]; and ``4 A B = (A + B)^2 - (A - B)^2``,
+    with both scaled to the same size.
+    """
+    (cx, ax, rx, px, qx), (cy, ay, ry, py, qy) = one, other
+    products = ax * ay
+    sizes = np.abs(products).sum(axis=0)
+    balance = products.sum(axis=0)
+    both = rx * ry
+    cross = both - sizes
+    most, least = 0.5 * (sizes + balance) + cross, 0.5 * (sizes - balance) + cross
+    first, second = ax * ry, ay * rx
+    plus, minus = np.abs(first + second).sum(axis=0), np.abs(first - second).sum(axis=0)
+    quarter = 0.25 / np.where(both > 0, both, 1.0)
+    most, least = np.minimum(most, plus * plus * quarter), np.minimum(least, minus * minus * quarter)
+    mx, my = np.maximum(-px, qx), np.maximum(-py, qy)
+    mixed = rx * my + ry * mx + mx * my
+    p = np.minimum(cx * py, cx * qy) + np.minimum(cy * px, cy * qx) - (least + mixed)
+    q = np.maximum(cx * py, cx * qy) + np.maximum(cy * px, cy * qx) + (most + mixed)
+    return _SecondOrder(p, q, np.abs(cx) + rx + mx, np.abs(cy) + ry + my)
+
+
+class _Interpreter:
+    """A tape's registers over B boxes, and the rule of each operation."""
 
     def __init__(self, tape: Tape, boxes: int) -> None:
         self.tape = tape
-        self.work = Forms.empty(tape.registers, tape.inputs, boxes)
+        self.work = Enclosures.zeros(tape.registers, tape.inputs, boxes)
         self.rad = np.zeros((tape.registers, boxes))
-        self.out = Forms.empty(tape.outputs, tape.inputs, boxes)
+        self.out = Enclosures.zeros(tape.outputs, tape.inputs, boxes)
         # An operation makes about n + 4 roundings of each of its terms.
         self.slack = (tape.inputs + 8) * ULP
 
-    def run(self, centre: FloatArray, radius: FloatArray, lower: FloatArray, upper: FloatArray) -> Forms:
+    def run(self, centre: FloatArray, radius: FloatArray, lower: FloatArray, upper: FloatArray) -> Enclosures:
+        """Run the tape over boxes, (n, B) each, and return its results."""
         tape, work, out = self.tape, self.work, self.out
         columns = (tape.op, tape.to, tape.a, tape.b, tape.k, tape.first, tape.last)
         for op, to, a, b, k, first, last in zip(*(column.tolist() for column in columns), strict=True):
@@ -127,10 +180,11 @@ class _Machine:
                 self.rad[to] = 0.0
             else:
                 span = slice(first, last)
-                self._settle(to, self._step(op, a, b, k, span), span)
+                self._write(to, self._apply(op, a, b, k, span), span)
         return out
 
-    def _step(self, op: int, x: int, y: int, k: float, span: slice) -> _Result:  # noqa: PLR0911 - one for each rule
+    def _apply(self, op: int, x: int, y: int, k: float, span: slice) -> _Result:  # noqa: PLR0911 - one for each rule
+        """Return the result of an operation on registers ``x`` and ``y`` and the constant ``k``."""
         if op in (Op.ADD, Op.SUB):
             return self._sum(op, x, y, span)
         if op == Op.MUL:
@@ -140,15 +194,16 @@ class _Machine:
         if op == Op.SQUARE:
             return self._square(x, span)
         if op == Op.SCALE:
-            return self._scaled(x, k, span)
+            return self._multiple(x, k, span)
         w = self.work
         if op == Op.SHIFT:
             c = w.c[x] + k
-            lo, hi = _widened(w.lo[x] + k, w.hi[x] + k)
+            lo, hi = widen(w.lo[x] + k, w.hi[x] + k)
             return _Result(c, w.a[x, span], w.p[x], w.q[x], w.s[x] + self.slack * np.abs(c), lo, hi)
         return self._univariate(op, x, span)
 
     def _sum(self, op: int, x: int, y: int, span: slice) -> _Result:
+        """Return the sum or the difference of two registers."""
         w = self.work
         combine = np.add if op == Op.ADD else np.subtract
         p, q, low, high = w.p[y], w.q[y], w.lo[y], w.hi[y]
@@ -156,11 +211,11 @@ class _Machine:
             p, q, low, high = q, p, high, low
         c = combine(w.c[x], w.c[y])
         s = w.s[x] + w.s[y] + self.slack * (np.abs(c) + self.rad[x] + self.rad[y])
-        ends = _widened(combine(w.lo[x], low), combine(w.hi[x], high))
+        ends = widen(combine(w.lo[x], low), combine(w.hi[x], high))
         return _Result(c, combine(w.a[x, span], w.a[y, span]), combine(w.p[x], p), combine(w.q[x], q), s, *ends)
 
-    def _scaled(self, x: int, k: float, span: slice) -> _Result:
-        """Times a constant; by 1 or -1 nothing is rounded."""
+    def _multiple(self, x: int, k: float, span: slice) -> _Result:
+        """Return a register times a constant; 1 and -1 cause no rounding."""
         w, size = self.work, abs(k)
         c, a = w.c[x] * k, w.a[x, span] * k
         p, q = (w.p[x] * k, w.q[x] * k) if k >= 0 else (w.q[x] * k, w.p[x] * k)
@@ -168,44 +223,21 @@ class _Machine:
         if size == 1:
             return _Result(c, a, p, q, w.s[x], lo, hi)
         s = w.s[x] * size + (self.slack * (np.abs(c) + size * self.rad[x]) + TINY)
-        return _Result(c, a, p, q, s, *_widened(lo, hi, TINY))
+        return _Result(c, a, p, q, s, *widen(lo, hi, TINY))
 
     def _product(self, x: int, y: int, span: slice) -> _Result:
+        """Return the product of two registers."""
         w = self.work
         cx, cy, ax, ay = w.c[x], w.c[y], w.a[x, span], w.a[y, span]
-        p, q, big, other = self._second_order(
-            (cx, ax, self.rad[x], w.p[x], w.q[x]), (cy, ay, self.rad[y], w.p[y], w.q[y])
+        p, q, big, other = _second_order(
+            _Factor(cx, ax, self.rad[x], w.p[x], w.q[x]), _Factor(cy, ay, self.rad[y], w.p[y], w.q[y])
         )
         s = (big * w.s[y] + other * w.s[x] + w.s[x] * w.s[y]) + (self.slack * (big * other) + TINY)
-        ends = _interval_product(w.lo[x], w.hi[x], w.lo[y], w.hi[y])
+        ends = interval_product(w.lo[x], w.hi[x], w.lo[y], w.hi[y])
         return _Result(cx * cy, cx * ay + cy * ax, p, q, s, *ends)
 
-    @staticmethod
-    def _second_order(one: Part, other: Part) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What is of second order in a product of two forms, and the size of each factor.
-
-        The product of the linear parts is bounded twice: ``e_i^2`` lies in [0, 1]; and
-        ``4 A B = (A + B)^2 - (A - B)^2``, with both scaled to the same size.
-        """
-        (cx, ax, rx, px, qx), (cy, ay, ry, py, qy) = one, other
-        products = ax * ay
-        sizes = np.abs(products).sum(axis=0)
-        balance = products.sum(axis=0)
-        both = rx * ry
-        cross = both - sizes
-        most, least = 0.5 * (sizes + balance) + cross, 0.5 * (sizes - balance) + cross
-        first, second = ax * ry, ay * rx
-        plus, minus = np.abs(first + second).sum(axis=0), np.abs(first - second).sum(axis=0)
-        quarter = 0.25 / np.where(both > 0, both, 1.0)
-        most, least = np.minimum(most, plus * plus * quarter), np.minimum(least, minus * minus * quarter)
-        mx, my = np.maximum(-px, qx), np.maximum(-py, qy)
-        mixed = rx * my + ry * mx + mx * my
-        p = np.minimum(cx * py, cx * qy) + np.minimum(cy * px, cy * qx) - (least + mixed)
-        q = np.maximum(cx * py, cx * qy) + np.maximum(cy * px, cy * qx) + (most + mixed)
-        return p, q, np.abs(cx) + rx + mx, np.abs(cy) + ry + my
-
     def _square(self, x: int, span: slice) -> _Result:
-        """The square of the linear part is not negative."""
+        """Return the square of a register; that of its linear part is not negative."""
         w = self.work
         c, rad, p, q, s = w.c[x], self.rad[x], w.p[x], w.q[x], w.s[x]
         m = np.maximum(-p, q)
@@ -221,7 +253,7 @@ class _Machine:
         return _Result(c * c, 2 * c * w.a[x, span], low, high, error, lo, hi + (hi * ULP + TINY))
 
     def _quotient(self, x: int, y: int, span: slice) -> _Result:
-        """``k + (x - k y) / y`` with ``k`` the quotient of the centres, so that the numerator has no centre.
+        """Return ``x / y`` as ``k + (x - k y) / y``, where ``k = c_x / c_y`` leaves the numerator without a centre.
 
         ``1 / (c + Y) = 1 / c - Y / c^2 + Y^2 / (c^2 (c + Y))``.
         """
@@ -250,18 +282,20 @@ class _Machine:
         sn = w.s[x] + steepness * w.s[y] + (self.slack * whole + TINY)
         rn = np.abs(an).sum(axis=0)
         nothing = np.zeros_like(k)
-        p, q, big, other = self._second_order((nothing, an, rn, pn, qn), (inverse, -steep * w.a[y, span], ri, pi, qi))
+        p, q, big, other = _second_order(
+            _Factor(nothing, an, rn, pn, qn), _Factor(inverse, -steep * w.a[y, span], ri, pi, qi)
+        )
         s = big * si + other * sn + sn * si + (self.slack * (np.abs(k) + big * other) + TINY)
         one, two = sign / far, sign / near
-        ends = _widened(np.minimum(one, two), np.maximum(one, two), TINY)
-        return _Result(k, inverse * an, p, q, s, *_interval_product(w.lo[x], w.hi[x], *ends))
+        ends = widen(np.minimum(one, two), np.maximum(one, two), TINY)
+        return _Result(k, inverse * an, p, q, s, *interval_product(w.lo[x], w.hi[x], *ends))
 
     def _univariate(self, op: int, x: int, span: slice) -> _Result:
-        """``f(c) + f'(c) Y + [least, most] Y^2``, where the bracket holds ``f'' / 2`` on the interval."""
+        """Return a function of one variable as ``f(c) + f'(c) Y + [least, most] Y^2``."""
         w = self.work
         c = w.c[x]
-        # The centre as it was rounded may lie outside of a narrow interval.
-        value, slope, least, most, error, lo, hi = _RULES[Op(op)](c, np.minimum(w.lo[x], c), np.maximum(w.hi[x], c))
+        # The rounded centre may lie outside of a narrow interval.
+        value, slope, least, most, error, lo, hi = RULES[Op(op)](c, np.minimum(w.lo[x], c), np.maximum(w.hi[x], c))
         moved = self.rad[x] + np.maximum(-w.p[x], w.q[x])
         square = moved * moved
         p = np.minimum(slope * w.p[x], slope * w.q[x]) + np.minimum(least * square, 0.0)
@@ -271,11 +305,11 @@ class _Machine:
         s = steep * w.s[x] + error * (1 + moved) + (self.slack * size + TINY)
         return _Result(value, slope * w.a[x, span], p, q, s, lo, hi)
 
-    def _settle(self, to: int, made: _Result, span: slice) -> None:
-        """Write a register: poison what has no finite enclosure, intersect the interval with the form's range."""
-        w, (c, a, p, q, s, lo, hi) = self.work, made
+    def _write(self, to: int, result: _Result, span: slice) -> None:
+        """Write a register: poison a value without a finite form, intersect the interval with the form's range."""
+        w, (c, a, p, q, s, lo, hi) = self.work, result
         rad = np.abs(a).sum(axis=0)
-        # The terms of p, q and s, and the sum of |a|, were themselves rounded.
+        # The terms of p, q and s, and the sum of |a|, have rounding errors of their own.
         grown = 1 + self.slack
         p, q, s = np.minimum(p * grown, 0.0), np.maximum(q * grown, 0.0), s * grown
         ends = ULP * np.abs(c) + s
@@ -293,90 +327,5 @@ class _Machine:
         w.a[to, : span.start] = 0.0
         w.a[to, span.stop :] = 0.0
         w.c[to], w.p[to], w.q[to], w.s[to], self.rad[to] = c, p, q, s, rad
-        # fmax and fmin: an end that is NaN says nothing.
+        # fmax and fmin ignore an end that is NaN, which bounds nothing.
         w.lo[to], w.hi[to] = np.fmax(lo, low), np.fmin(hi, high)
-
-
-if TYPE_CHECKING:
-    #: Centre, linear part, its size, least and largest of second order.
-    Part = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-    #: Value and slope at the centre, least and largest of half the second derivative, error, ends.
-    Rule = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-
-
-def _widened(lo: FloatArray, hi: FloatArray, tiny: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """Ends that were rounded to nearest, moved outwards."""
-    return lo - (np.abs(lo) * ULP + tiny), hi + (np.abs(hi) * ULP + tiny)
-
-
-def _interval_product(
-    lo: FloatArray, hi: FloatArray, other_lo: FloatArray, other_hi: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Interval product, outwards; an end is NaN where infinity meets zero."""
-    p, q, r, s = lo * other_lo, lo * other_hi, hi * other_lo, hi * other_hi
-    least, most = np.minimum(np.minimum(p, q), np.minimum(r, s)), np.maximum(np.maximum(p, q), np.maximum(r, s))
-    least, most = _widened(least, most, TINY)
-    # Two factors that are not negative have no negative product, however far down it was rounded.
-    return np.where((lo >= 0) & (other_lo >= 0), np.maximum(least, 0.0), least), most
-
-
-#: What a library's function may be off by, in parts of its size.
-_OFF = LIBRARY * ULP
-
-
-def _sqrt(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
-    """``sqrt(c + Y) = r + Y / (2 r) - Y^2 / (2 r (sqrt(c + Y) + r)^2)`` with ``r = sqrt(c)``. NaN below 0."""
-    root, low, high = np.sqrt(c), np.sqrt(lo), np.sqrt(hi)
-    slope = 0.5 / root
-    least, most = -slope / ((low + root) * (low + root)), -slope / ((high + root) * (high + root))
-    # The slope's own rounding is in parts of slope * |Y|, which the general term covers.
-    return root, slope, least, most, _OFF * root, *_widened(low, high)
-
-
-def _wave(c: FloatArray, lo: FloatArray, hi: FloatArray, shifted: bool) -> Rule:
-    """Sine, or cosine. Within r of the middle it stays within ``|f'| r + r^2 / 2`` of its value there."""
-    middle = 0.5 * lo + 0.5 * hi
-    radius = np.maximum(hi - middle, middle - lo) * (1 + ULP) + TINY
-    centred = np.cos(middle) if shifted else np.sin(middle)
-    steep = np.abs(np.sin(middle)) if shifted else np.abs(np.cos(middle))
-    spread = steep * radius + 0.5 * radius * radius
-    spread = spread + 2 * _OFF * (1 + spread)
-    least, most = np.maximum(centred - spread, -1.0), np.minimum(centred + spread, 1.0)
-    sine, cosine = np.sin(c), np.cos(c)
-    value, slope = (cosine, -sine) if shifted else (sine, cosine)
-    # The second derivative is minus the function; errors are of order 1, not of the value's own size.
-    return value, slope, -0.5 * most, -0.5 * least, np.full_like(c, 4 * _OFF), least, most
-
-
-def _exp(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
-    value, low, high = np.exp(c), np.exp(lo), np.exp(hi)
-    least, most = np.maximum(low * (1 - _OFF) - TINY, 0.0), high * (1 + _OFF) + TINY
-    return value, value, 0.5 * least, 0.5 * most, 2 * _OFF * value, least, most
-
-
-def _log(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
-    """Logarithm; NaN unless the whole interval is positive."""
-    lo = np.where(lo > 0, lo, np.nan)
-    low, high, value, slope = np.log(lo), np.log(hi), np.log(c), 1 / c
-    grown = 1 + _OFF
-    ends = low - (np.abs(low) * _OFF + TINY), high + (np.abs(high) * _OFF + TINY)
-    return value, slope, -0.5 * grown / (lo * lo), -0.5 / (grown * hi * hi), 2 * _OFF * (np.abs(value) + slope), *ends
-
-
-def _atan(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
-    """Arc tangent; its second derivative ``-2 v / (1 + v^2)^2`` is at most 0.6496 in size, and has the sign of -v."""
-    low, high, value = np.arctan(lo), np.arctan(hi), np.arctan(c)
-    most = np.where(lo >= 0, 0.0, np.minimum(0.325, -lo * (1 + ULP)))
-    least = np.where(hi <= 0, 0.0, np.maximum(-0.325, -hi * (1 + ULP)))
-    ends = low - (np.abs(low) * _OFF + TINY), high + (np.abs(high) * _OFF + TINY)
-    return value, 1 / (1 + c * c), least, most, 2 * _OFF * (np.abs(value) + 1), *ends
-
-
-_RULES = {
-    Op.SQRT: _sqrt,
-    Op.SIN: lambda c, lo, hi: _wave(c, lo, hi, shifted=False),
-    Op.COS: lambda c, lo, hi: _wave(c, lo, hi, shifted=True),
-    Op.EXP: _exp,
-    Op.LOG: _log,
-    Op.ATAN: _atan,
-}

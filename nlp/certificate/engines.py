@@ -1,4 +1,4 @@
-"""The two engines that examine boxes: the C kernel where it was built, and NumPy, which is always there."""
+"""Engines that examine boxes: the C kernel where it was built, and NumPy, which is always there."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .bounding import Examined, NumpyEngine, search_tape
+from .bounding import NumpyEngine, search_tape
+from .examination import Examination
 from .instructions import Tape
 from .standardform import StandardForm
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Engine(Protocol):
-    """Examines blocks of boxes."""
+    """Examination of boxes, block by block."""
 
     @property
     def name(self) -> str:
@@ -28,24 +29,26 @@ class Engine(Protocol):
 
     @property
     def block(self) -> int:
-        """How many boxes it takes at once."""
+        """Number of boxes that it examines at once."""
 
-    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
-        """As :meth:`screwsynth.nlp.bounding.NumpyEngine.examine`."""
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+        """Examine boxes: see :meth:`screwsynth.nlp.certificate.bounding.NumpyEngine.examine`."""
 
     def close(self) -> None:
-        """Let its threads go."""
+        """Stop its threads."""
 
 
-#: Boxes of the kernel's block for each thread: enough that what Python does between blocks does not show.
+#: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
 _BOXES_PER_JOB = 2048
+#: Boxes for each thread below which starting threads costs more than it saves.
+_WORTH_A_THREAD = 64
 
 
 class KernelEngine:
-    """The C kernel, on several threads. What becomes of a box does not depend on their number.
+    """The C kernel on several threads. The results do not depend on their number.
 
     Args:
-        form: what is searched.
+        form: the form whose box is searched.
         module: the kernel.
         jobs: threads; one for each processor when left out.
     """
@@ -55,11 +58,11 @@ class KernelEngine:
     def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None) -> None:
         self._module = module
         self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
-        # The size of a block decides the order of the search, so that it must not depend on the number of threads.
+        # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
-        equation = np.array([0] * functions + [row.is_equation for row in form.rows], dtype=np.int32)
+        equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
             form.n,
@@ -68,11 +71,11 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            _packed(search_tape(form)),
+            _kernel_tape(search_tape(form)),
         )
 
-    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examined:
-        """As :meth:`screwsynth.nlp.bounding.NumpyEngine.examine`."""
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+        """Examine boxes: see :meth:`screwsynth.nlp.certificate.bounding.NumpyEngine.examine`."""
         n, count = lower.shape
         verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
         cut_lower, cut_upper = np.empty((n, count), dtype=np.int32), np.empty((n, count), dtype=np.int32)
@@ -81,35 +84,32 @@ class KernelEngine:
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
-        def part(begin: int, finish: int) -> None:
+        def examine_part(begin: int, finish: int) -> None:
             self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold)
 
         pieces = self._jobs if count >= _WORTH_A_THREAD * self._jobs else 1
         edges = [count * k // pieces for k in range(pieces + 1)]
         if pieces == 1 or self._pool is None:
-            part(0, count)
+            examine_part(0, count)
         else:
-            for each in [self._pool.submit(part, *edge) for edge in itertools.pairwise(edges)]:
+            for each in [self._pool.submit(examine_part, *edge) for edge in itertools.pairwise(edges)]:
                 each.result()
-        return Examined(*found)
+        return Examination(*found)
 
     def close(self) -> None:
-        """Let the threads go."""
+        """Stop the threads."""
         if self._pool is not None:
             self._pool.shutdown()
 
 
-#: Fewer boxes than this are not worth a thread's start.
-_WORTH_A_THREAD = 64
-
-
-def _packed(tape: Tape) -> tuple[Any, ...]:
+def _kernel_tape(tape: Tape) -> tuple[Any, ...]:
+    """Return a tape as the kernel reads it: code, constants, and the numbers of instructions, registers and results."""
     code = np.stack([tape.op, tape.to, tape.a, tape.b, tape.first, tape.last], axis=1).astype(np.int32)
     return np.ascontiguousarray(code), tape.k, len(tape), tape.registers, tape.outputs
 
 
 def kernel() -> ModuleType | None:
-    """The C kernel, or None where it was not built."""
+    """Return the C kernel, or None where it was not built."""
     try:
         return import_module("screwsynth.nlp.certificate._bounds")
     except ImportError:
@@ -117,10 +117,10 @@ def kernel() -> ModuleType | None:
 
 
 def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
-    """An engine for a form.
+    """Return an engine for a form.
 
     Args:
-        form: what is searched.
+        form: the form whose box is searched.
         name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         jobs: threads of the C kernel.
 

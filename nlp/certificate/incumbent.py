@@ -1,4 +1,4 @@
-"""The best point that a search of the whole box knows."""
+"""The incumbent of a search of the whole box: the best feasible point known."""
 
 from __future__ import annotations
 
@@ -12,23 +12,27 @@ from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..program.sampling import starting_points
 from .standardform import StandardForm
 
-#: A value that is claimed for a point may differ from what the program computes there by this part of its scale.
+#: Difference allowed between a claimed value and the one computed there, in parts of the objective's scale.
 _SAME_VALUE = 1e-9
 #: Points that are tried when none is given.
-_TRIED = 8
-#: A new point must be better by this part of the objective's scale to count as having beaten the one that was given.
+_POINTS = 8
+#: Improvement, in parts of the objective's scale, from which on a new point counts as better than the one given.
 _BETTER = 1e-9
 
 
 class IncumbentError(InputError):
-    """The incumbent that was given is not what it is said to be."""
+    """The point that was given is not feasible, or does not have the value claimed."""
 
 
 class Incumbent:
     """The best feasible point known, and its value in the standard form.
 
     Args:
-        form: what is searched.
+        form: the form whose box is searched.
+
+    Attributes:
+        x: (n,) the point in the form's variables; None without one.
+        value: of the form there; -inf without a point.
     """
 
     def __init__(self, form: StandardForm) -> None:
@@ -39,30 +43,30 @@ class Incumbent:
 
     @property
     def was_beaten(self) -> bool:
-        """Whether a better point than the given one was met."""
+        """Whether the search has found a better point than the one given."""
         return self.value > self._given + _BETTER * self._form.nlp.objective_scale
 
-    def full(self) -> FloatArray:
-        """(n,) the point in the program's variables."""
-        return self._whole(np.zeros(self._form.n) if self.x is None else self.x, self.value)
+    def program_point(self) -> FloatArray:
+        """Return the point (n,) in the program's variables; zeros without one."""
+        return self._with_level(np.zeros(self._form.n) if self.x is None else self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
-        """Begin with a point that was given, or with the best of a few.
+        """Begin with a given point, or with the best of a few.
 
         Args:
             x: (n,) in the program's variables, or None.
-            claimed: the objective that is claimed there.
+            claimed: the objective claimed there.
 
         Raises:
-            IncumbentError: it lies outside of a limit, or has another value.
+            IncumbentError: the point violates a limit, or has a worse value.
         """
         form, nlp = self._form, self._form.nlp
         if x is None:
-            for point in starting_points(nlp, _TRIED, seed=0):
-                self.look_near(point[: form.n])
+            for point in starting_points(nlp, _POINTS, seed=0):
+                self.improve_near(point[: form.n])
             return
         point = np.asarray(x, dtype=np.float64)[: form.n]
-        value = form.level_of(point)
+        value = form.value_at(point)
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
             raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
@@ -70,36 +74,37 @@ class Incumbent:
             raise IncumbentError(f"the incumbent is said to have F = {claimed:.10g}, but has {form.sign * value:.10g}")
         self.x, self.value, self._given = point, value, value
 
-    def take(self, point: FloatArray) -> None:
-        """Take a feasible point (n,) that was met, and what Newton's method makes of it."""
-        self._offer(point)
-        self.look_near(point)
+    def consider(self, point: FloatArray) -> None:
+        """Keep a point (n,) if it is feasible and better; likewise the points that Newton's method reaches from it."""
+        self._keep_if_better(point)
+        self.improve_near(point)
 
-    def look_near(self, point: FloatArray) -> None:
-        """Correct a point onto the limits and towards an optimum; keep what is better."""
+    def improve_near(self, point: FloatArray) -> None:
+        """Correct a point (n,) onto the limits and towards an optimum, and keep the result if it is better."""
         nlp = self._form.nlp
-        value = self._form.level_of(point)
+        value = self._form.value_at(point)
         if not math.isfinite(value):
             return
-        whole = close_equations(nlp, self._whole(point, value))
+        whole = close_equations(nlp, self._with_level(point, value))
         at = linearise(nlp, whole)
         if not math.isfinite(at.violation):
             return
-        self._offer(whole[: self._form.n])
+        self._keep_if_better(whole[: self._form.n])
         corrected = correct_point(nlp, whole, at.active())
-        self._offer(np.clip(corrected.x, nlp.lower, nlp.upper)[: self._form.n])
+        self._keep_if_better(np.clip(corrected.x, nlp.lower, nlp.upper)[: self._form.n])
 
-    def _whole(self, point: FloatArray, value: float) -> FloatArray:
-        """The point with the level of a worst case, where the program has one."""
-        if not self._form.has_level:
+    def _with_level(self, point: FloatArray, value: float) -> FloatArray:
+        """Return the point with the program's epigraph variable, where it has one."""
+        if not self._form.has_epigraph:
             return np.array(point)
         nlp = self._form.nlp
         return np.append(point, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
 
     def _violation(self, point: FloatArray, value: float) -> float:
-        return linearise(self._form.nlp, self._whole(point, value)).violation
+        """Return the largest violation of the program's limits, in half ranges."""
+        return linearise(self._form.nlp, self._with_level(point, value)).violation
 
-    def _offer(self, point: FloatArray) -> None:
-        value = self._form.level_of(point)
+    def _keep_if_better(self, point: FloatArray) -> None:
+        value = self._form.value_at(point)
         if value > self.value and self._violation(point, value) <= FEASIBLE:
             self.x, self.value = np.array(point), value

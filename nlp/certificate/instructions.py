@@ -1,8 +1,8 @@
-"""A function's expression graph as a flat list of instructions, which any arithmetic can run.
+"""A function's expression graph as a tape: a flat list of instructions for any arithmetic.
 
-CasADi lists the operations of an ``SX`` function one by one. :func:`lower` writes that list in a dozen operations,
-with exact identities of real numbers for the others (``tan = sin / cos``, ``2 x = x * 2``, a whole power as products),
-so that an arithmetic needs rules for these only. What the list cannot say is refused by name.
+CasADi lists the operations of an ``SX`` function one by one. :func:`compile_tape` writes that list in a dozen
+operations, and the others by exact identities of real numbers (``tan = sin / cos``, ``2 x = x * 2``, a whole power as
+products), so that an arithmetic needs few rules. An operation without an identity is refused by its name.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -49,14 +49,14 @@ class Op(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Tape:
-    """A list of instructions.
+    """A list of N instructions.
 
     Attributes:
         op: (N,) :class:`Op` of each instruction.
         to: (N,) register written, or the index of the result for an output.
         a, b: (N,) registers read, or the index of the variable for an input; 0 where there is none.
         k: (N,) constants.
-        first, last: (N,) the written value depends on no variable outside of ``first <= i < last``.
+        first, last: (N,) span of variables: the written value depends on no others than ``first <= i < last``.
         inputs: number of variables.
         outputs: number of results.
         registers: number of registers.
@@ -92,79 +92,103 @@ _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.starts
 _LARGEST_POWER = 64
 
 
-class _Writer:
-    """Collects instructions; knows which registers hold constants, so that these are folded into the instructions."""
+class _Reach(NamedTuple):
+    """Span of the variables that a register depends on, ``first <= i < last``; empty for a constant."""
+
+    first: int
+    last: int
+
+    def union(self, other: _Reach) -> _Reach:
+        """Return the span of both; an empty one adds nothing."""
+        if self.last and other.last:
+            return _Reach(min(self.first, other.first), max(self.last, other.last))
+        return max(self, other, key=lambda reach: reach.last - reach.first)
+
+
+class _Instruction(NamedTuple):
+    """An instruction, with the numbers of a :class:`Tape`'s columns."""
+
+    op: int
+    to: int
+    a: int
+    b: int
+    k: float
+    first: int
+    last: int
+
+
+class _TapeWriter:
+    """A tape under construction.
+
+    It knows which registers hold constants, so that operations with a constant need no register for it.
+
+    Args:
+        inputs: number of variables.
+        registers: number of registers of the CasADi function.
+    """
 
     def __init__(self, inputs: int, registers: int) -> None:
-        self.rows: list[tuple[int, int, int, int, float, int, int]] = []
+        self.instructions: list[_Instruction] = []
         self.inputs, self.registers, self.spare = inputs, registers, registers
         self.constant: dict[int, float] = {}
         self.written: set[int] = set()
-        self.range: dict[int, tuple[int, int]] = {}
+        self.reach: dict[int, _Reach] = {}
 
     def temporary(self) -> int:
-        """A register that CasADi does not know."""
+        """Return a new register beyond those of the CasADi function."""
         self.spare += 1
         return self.spare - 1
 
     def read(self, register: int) -> int:
-        """The register, once its constant is written in it where it holds one."""
+        """Return the register, after writing its constant where it holds one."""
         if register in self.constant and register not in self.written:
-            self._append(Op.CONSTANT, register, 0, 0, self.constant[register], (0, 0))
+            self._append(Op.CONSTANT, register, 0, 0, self.constant[register], _Reach(0, 0))
             self.written.add(register)
         return register
 
-    def hold(self, register: int, value: float) -> None:
-        """A constant, which is written only when an instruction reads it."""
+    def set_constant(self, register: int, value: float) -> None:
+        """Set a register to a constant, which is written only when an instruction reads it."""
         self.constant[register] = value
         self.written.discard(register)
 
     def write(self, op: Op, to: int, a: int, b: int | None = None, k: float = 0.0) -> None:
-        """An instruction on registers."""
+        """Append an instruction on registers."""
         a = self.read(a)
         b = a if b is None else self.read(b)
-        one, other = self.range[a], self.range[b]
-        reach = (min(one[0], other[0]), max(one[1], other[1])) if one[1] and other[1] else max(one, other, key=_size)
-        self._append(op, to, a, b, k, reach)
+        self._append(op, to, a, b, k, self.reach[a].union(self.reach[b]))
 
-    def input(self, to: int, index: int) -> None:
-        """A variable."""
-        self._append(Op.INPUT, to, index, 0, 0.0, (index, index + 1))
+    def write_input(self, to: int, index: int) -> None:
+        """Append the instruction that reads a variable."""
+        self._append(Op.INPUT, to, index, 0, 0.0, _Reach(index, index + 1))
 
-    def _append(self, op: Op, to: int, a: int, b: int, k: float, reach: tuple[int, int]) -> None:
-        self.rows.append((int(op), to, a, b, k, *reach))
+    def _append(self, op: Op, to: int, a: int, b: int, k: float, reach: _Reach) -> None:
+        self.instructions.append(_Instruction(int(op), to, a, b, k, *reach))
         if op is not Op.OUTPUT:
-            self.range[to] = reach
+            self.reach[to] = reach
             if op is not Op.CONSTANT:
                 self.constant.pop(to, None)
 
-    def tape(self, outputs: int) -> Tape:
-        """What was written."""
-        columns = list(zip(*self.rows, strict=True))
-        whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 2, 3, 5, 6)]
-        constants = np.array(columns[4], dtype=np.float64)
-        for column in whole:
+    def finish(self, outputs: int) -> Tape:
+        """Return the tape."""
+        columns = list(zip(*self.instructions, strict=True))
+        op, to, a, b, first, last = (np.array(columns[i], dtype=np.int32) for i in (0, 1, 2, 3, 5, 6))
+        k = np.array(columns[4], dtype=np.float64)
+        for column in (op, to, a, b, k, first, last):
             column.setflags(write=False)
-        constants.setflags(write=False)
-        op, to, a, b, first, last = whole
-        return Tape(op, to, a, b, constants, first, last, self.inputs, outputs, self.spare)
+        return Tape(op, to, a, b, k, first, last, self.inputs, outputs, self.spare)
 
 
-def _size(reach: tuple[int, int]) -> int:
-    return reach[1] - reach[0]
-
-
-def lower(function: ca.Function) -> Tape:
-    """The instructions of a function of one vector.
+def compile_tape(function: ca.Function) -> Tape:
+    """Compile a function of one vector.
 
     Args:
         function: made of ``SX``, with one dense input (n, 1) and any number of dense outputs; their elements, column by
             column, are the results in order.
 
     Raises:
-        UncoveredError: it holds an operation without a rule, or a constant that is not finite.
+        UncoveredError: the function holds an operation without a rule, or a constant that is not finite.
     """
-    writer = _Writer(function.numel_in(0), function.sz_w())
+    writer = _TapeWriter(function.numel_in(0), function.sz_w())
     sizes = [function.numel_out(i) for i in range(function.n_out())]
     offset = np.concatenate([[0], np.cumsum(sizes)])
     for index in range(function.n_instructions()):
@@ -174,18 +198,18 @@ def lower(function: ca.Function) -> Tape:
             value = function.instruction_constant(index)
             if not math.isfinite(value):
                 raise UncoveredError(f"the constant {value}")
-            writer.hold(target[0], value)
+            writer.set_constant(target[0], value)
         elif op == ca.OP_INPUT:
-            writer.input(target[0], source[1])
+            writer.write_input(target[0], source[1])
         elif op == ca.OP_OUTPUT:
             writer.write(Op.OUTPUT, int(offset[target[0]]) + target[1], source[0])
         else:
-            _write(writer, op, target[0], source)
-    return writer.tape(int(offset[-1]))
+            _write_operation(writer, op, target[0], source)
+    return writer.finish(int(offset[-1]))
 
 
-def _write(writer: _Writer, op: int, to: int, source: list[int]) -> None:
-    """One operation of CasADi's in the operations of a tape."""
+def _write_operation(writer: _TapeWriter, op: int, to: int, source: list[int]) -> None:
+    """Write an operation of CasADi's in the operations of a tape."""
     a = source[0]
     b = source[1] if len(source) > 1 else a
     known = writer.constant
@@ -207,14 +231,14 @@ def _write(writer: _Writer, op: int, to: int, source: list[int]) -> None:
     elif op == ca.OP_ASSIGN:
         writer.write(Op.SCALE, to, a, k=1.0)
     else:
-        _write_composed(writer, op, to, a, b)
+        _write_composition(writer, op, to, a, b)
 
 
-def _write_composed(writer: _Writer, op: int, to: int, a: int, b: int) -> None:
-    """Operations that are others put together, by identities that are exact for real numbers."""
+def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
+    """Write an operation as several others, by an identity that is exact for real numbers."""
     one = writer.temporary()
     if op == ca.OP_INV:
-        writer.hold(one, 1.0)
+        writer.set_constant(one, 1.0)
         writer.write(Op.DIV, to, one, a)
     elif op == ca.OP_TAN:
         other = writer.temporary()
@@ -255,17 +279,17 @@ def _write_composed(writer: _Writer, op: int, to: int, a: int, b: int) -> None:
         raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
 
 
-def _add_half_pi(writer: _Writer, to: int) -> None:
-    """Add pi / 2, as four times the arc tangent of 1 halved: no double is pi."""
+def _add_half_pi(writer: _TapeWriter, to: int) -> None:
+    """Write an addition of pi / 2, as twice the arc tangent of 1: no double is pi."""
     quarter = writer.temporary()
-    writer.hold(quarter, 1.0)
+    writer.set_constant(quarter, 1.0)
     writer.write(Op.ATAN, quarter, quarter)
     writer.write(Op.SCALE, quarter, quarter, k=2.0)
     writer.write(Op.ADD, to, to, quarter)
 
 
-def _write_power(writer: _Writer, to: int, a: int, power: float) -> None:
-    """A whole power, or half of one, as products, roots and a quotient."""
+def _write_power(writer: _TapeWriter, to: int, a: int, power: float) -> None:
+    """Write a whole power, or half of one, as products, a root and a quotient."""
     twice = 2 * power
     if not (twice.is_integer() and 0 < abs(power) <= _LARGEST_POWER):
         raise UncoveredError(f"the power {power:g}")
@@ -289,7 +313,7 @@ def _write_power(writer: _Writer, to: int, a: int, power: float) -> None:
             writer.write(Op.SQUARE, base, base)
     if power < 0:
         unit = writer.temporary()
-        writer.hold(unit, 1.0)
+        writer.set_constant(unit, 1.0)
         writer.write(Op.DIV, to, unit, result)
     else:
         writer.write(Op.SCALE, to, result, k=1.0)

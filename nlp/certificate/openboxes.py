@@ -1,4 +1,4 @@
-"""Boxes that wait to be examined, those with the largest bounds first."""
+"""Open boxes of a search, those with the largest bounds first."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
     from ...models import FloatArray
 
-#: With more boxes than this the newest are taken first, whatever their bounds: the search then goes to the bottom
-#: before it goes on, and needs no more memory.
+#: With more open boxes than this the search is depth-first, so that it needs no more memory.
 _MANY = 2_000_000
 
 
@@ -24,8 +23,8 @@ class Boxes:
 
     Attributes:
         lower, upper: (n, B) ends.
-        bound: (B,) upper bound of what is maximised.
-        place: (B,) numbers that tell the boxes apart.
+        bound: (B,) upper bound of the value that is maximised.
+        place: (B,) number of the box's node in the tree of the search, the root's being 0.
     """
 
     lower: FloatArray
@@ -35,16 +34,16 @@ class Boxes:
 
     @property
     def count(self) -> int:
-        """How many they are."""
+        """Number of boxes."""
         return int(self.bound.size)
 
-    def chosen(self, which: NDArray[np.intp]) -> Boxes:
-        """Those of some indices."""
+    def select(self, which: NDArray[np.intp]) -> Boxes:
+        """Return the boxes at some indices."""
         return Boxes(self.lower[:, which], self.upper[:, which], self.bound[which], self.place[which])
 
 
-def joined(parts: list[Boxes]) -> Boxes:
-    """All boxes of several lists of them, at least one."""
+def concatenate(parts: list[Boxes]) -> Boxes:
+    """Return all boxes of several parts, at least one."""
     if len(parts) == 1:
         return parts[0]
     return Boxes(
@@ -57,10 +56,10 @@ def joined(parts: list[Boxes]) -> Boxes:
 
 @dataclass
 class OpenBoxes:
-    """Chunks of boxes, ordered by their largest bound; of equal ones the newest comes first.
+    """Chunks of open boxes, ordered by their largest bound; of equal ones the newest comes first.
 
-    So boxes without a finite bound are followed to the bottom before any others: whether they are only wide, or hold a
-    point without a value, shows soon.
+    Boxes without a finite bound are thus bisected before any others, depth-first. The search soon finds whether they
+    are merely wide, or hold a point without a value.
     """
 
     _heap: list[tuple[float, int, Boxes]] = field(default_factory=list)
@@ -75,7 +74,10 @@ class OpenBoxes:
             heapq.heappush(self._heap, (-float(boxes.bound.max()), self._newest, boxes))
 
     def pop(self, most: int) -> Boxes:
-        """Take about the most promising boxes, at most so many; there must be one."""
+        """Remove and return boxes with the largest bounds, at most so many; there must be one.
+
+        Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
+        """
         taken: list[Boxes] = []
         room = most
         while self._heap and room:
@@ -83,13 +85,14 @@ class OpenBoxes:
             self.count -= boxes.count
             if boxes.count > room:
                 order = np.argsort(-boxes.bound, kind="stable")
-                self.push(boxes.chosen(order[room:]))
-                boxes = boxes.chosen(order[:room])
+                self.push(boxes.select(order[room:]))
+                boxes = boxes.select(order[:room])
             taken.append(boxes)
             room -= boxes.count
-        return joined(taken)
+        return concatenate(taken)
 
     def _next(self) -> Boxes:
+        """Remove and return the chunk with the largest bound, or the newest one where there are many boxes."""
         if self.count <= _MANY:
             return heapq.heappop(self._heap)[2]
         newest = min(range(len(self._heap)), key=lambda i: self._heap[i][1])
@@ -100,5 +103,5 @@ class OpenBoxes:
 
     @property
     def bound(self) -> float:
-        """Largest bound of all; -inf when there are none."""
+        """Largest bound of all boxes; -inf without a box."""
         return -self._heap[0][0] if self._heap else -np.inf

@@ -1,18 +1,19 @@
-"""A proof on paper: the tree of boxes that a search went through, with the reason why each leaf was closed.
+"""Proofs as JSON: the tree of boxes of a search, with the reason for closing each leaf.
 
-A proof is a JSON object. It holds the case as text and how its program is stated, the value that was proved, and the
-tree in preorder, as bytes (compressed, in base64). With the box of the program's bounds as the root, each node is
+A proof holds the case as text, the statement of its program, the proven bound, and the tree in preorder, as bytes
+(compressed, in base64). The root is the box of the program's bounds. The nodes are
 
-    half i             cut variable i in the middle, 0.5 lower + 0.5 upper: the lower half's tree, then the upper's
-    above i v, below i v    cut it at v: the part above (below) v is a leaf with the reason that follows; then the rest
-    face i, face' i    a monotone variable: only the box's upper (lower) face, which must lie on the root's, is left
-    bounded            nothing feasible in the box has a value above the bound
-    infeasible k       row k holds nowhere in the box
+    half i             bisection of variable i at 0.5 lower + 0.5 upper: the lower half's tree, then the upper half's
+    above i v, below i v    cut of variable i at v: the part above (below) v is a leaf, whose reason follows; then the
+                       tree of the other part
+    face i, face' i    variable i is monotone: the tree of the box's upper (lower) face, which must lie on the root's
+    bounded            no feasible point of the box has a value above the bound
+    infeasible k       condition k holds nowhere in the box
     monotone i         no maximum lies in the box, because every function rises along variable i
 
-so that the boxes cover the root by construction, and a tree that does not end where it should is no proof. What the
-reasons mean, and why they are enough, is in ``docs/certificate.md``;
-:mod:`screwsynth.nlp.certificate.proofcheck` checks them.
+The boxes therefore cover the root by construction, and a tree with too few or too many bytes is no proof. Expressions
+are counted from 0, the functions first and then the conditions. ``docs/certificate.md`` explains the reasons and why
+they suffice; :mod:`screwsynth.nlp.certificate.proofcheck` checks them.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ _VERSION = 1
 
 
 class Node(enum.IntEnum):
-    """Kinds of node; the bytes that follow are those of the names in this module's docstring."""
+    """Kinds of node, as in this module's docstring: the first byte, which their indices and numbers follow."""
 
     HALF = 1
     ABOVE = 2
@@ -49,18 +50,18 @@ class Node(enum.IntEnum):
 
 
 class ProofError(InputError):
-    """A proof is not one, or does not belong to the case."""
+    """A text that is no proof, or a proof that does not hold for the case."""
 
 
 @dataclass(frozen=True)
 class Statement:
-    """Which program of a case a proof is about.
+    """The program of a case that a proof is about.
 
     Attributes:
         kind: one task by itself, or the combined program of several.
         task: index of the task.
-        minimise: whether the task's sense was set to a minimum, to prove that F is above a value.
-        weights, best, ceiling: what the combined program was stated with.
+        minimise: whether the task's sense is set to a minimum, to prove that F is above a value.
+        weights, best, ceiling: numbers of the combined program.
     """
 
     kind: Literal["task", "weighted-sum", "worst-case"] = "task"
@@ -73,15 +74,15 @@ class Statement:
 
 @dataclass(frozen=True)
 class Proof:
-    """A proof as it is written and read.
+    """A proof.
 
     Attributes:
         case: the case file's text.
         name: the case's name.
-        statement: which of its programs.
+        statement: the program of the case that it is about.
         graph: fingerprint of the program's expressions and bounds.
-        bound: no feasible point of the root has a value above it, in the terms of what is maximised (minus F for a
-            minimum); None: there is no feasible point.
+        bound: upper bound of the maximised value (minus F for a minimum) over the feasible part of the root; None
+            where there is no feasible point.
         tree: the nodes' bytes.
     """
 
@@ -93,7 +94,7 @@ class Proof:
     tree: bytes
 
     def as_text(self) -> str:
-        """The JSON text."""
+        """Return the JSON text."""
         packed = zlib.compress(self.tree, 9)
         content = {
             "format": _FORMAT,
@@ -110,10 +111,14 @@ class Proof:
 
 
 def read_proof(text: str, source: str) -> Proof:
-    """A proof from its JSON text.
+    """Read a proof from its JSON text.
+
+    Args:
+        text: the JSON text.
+        source: its name, for messages.
 
     Raises:
-        ProofError: it is none, or was damaged.
+        ProofError: the text is no proof, or is damaged.
     """
     try:
         content: dict[str, Any] = json.loads(text)
@@ -133,7 +138,7 @@ def read_proof(text: str, source: str) -> Proof:
 
 
 def fingerprint(nlp: Nlp) -> str:
-    """SHA-256 of the program's expressions, as CasADi lists their operations, with its arguments and bounds."""
+    """Return SHA-256 of a program's expressions, as CasADi lists their operations, and of its arguments and bounds."""
     program = nlp.program
     function = ca.Function("graph", [program.x, program.p], [ca.densify(program.objective), ca.densify(program.g)])
     digest = hashlib.sha256()

@@ -1,13 +1,13 @@
-"""Taking down a search as a proof: see :mod:`screwsynth.nlp.certificate.proof` for what is written."""
+"""Record of a search as the tree of a proof: see :mod:`screwsynth.nlp.certificate.proof` for the nodes."""
 
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .bounding import Examined, Verdict
+from .examination import COLLAPSED, Examination, Verdict
 from .openboxes import Boxes
 from .proof import Node, ProofError
 
@@ -17,31 +17,46 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 
 
+class _NodeRecord(NamedTuple):
+    """Bytes of a node, and the nodes of its children, the next one in preorder last."""
+
+    text: bytes
+    following: list[int]
+
+
 class ProofWriter:
-    """Takes down a search; :class:`screwsynth.nlp.branchandbound.Recorder`.
+    """The tree of a search, recorded block by block.
 
     Args:
-        functions: how many functions the least of which is maximised.
+        functions: number of functions, the least of which is maximised.
     """
 
     def __init__(self, functions: int) -> None:
         self._functions = functions
-        self._nodes: dict[int, tuple[bytes, list[int]]] = {}
+        self._nodes: dict[int, _NodeRecord] = {}
 
-    def record(self, boxes: Boxes, found: Examined, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
-        """A block of examined boxes: the bytes of each, up to where its children's follow."""
+    def record(self, boxes: Boxes, found: Examination, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
+        """Record a block of examined boxes.
+
+        Args:
+            boxes: the boxes before their examination.
+            found: its results.
+            cut: (B,) place of the bisection of variable ``found.split``; NaN where a box is not bisected.
+            first_child: (B,) node of the lower half, the upper half's being the next; without a bisection, node of the
+                part of the box that is left; -1 for a leaf.
+        """
         for k, place in enumerate(boxes.place.tolist()):
             child, is_cut = int(first_child[k]), bool(np.isfinite(cut[k]))
             if found.verdict[k] == Verdict.OPEN and child < 0:
                 continue
             following = [] if child < 0 else [child + 1, child] if is_cut else [child]
-            self._nodes[place] = (self._written(found, k, is_cut, boxes.upper[:, k]), following)
+            self._nodes[place] = _NodeRecord(self._node_bytes(found, k, is_cut, boxes.upper[:, k]), following)
 
     def tree(self) -> bytes:
-        """The whole tree.
+        """Return the whole tree.
 
         Raises:
-            ProofError: a box was not closed.
+            ProofError: a box is not closed.
         """
         parts: list[bytes] = []
         waiting = [0]
@@ -54,8 +69,8 @@ class ProofWriter:
             waiting += following
         return b"".join(parts)
 
-    def _written(self, found: Examined, k: int, is_cut: bool, upper: FloatArray) -> bytes:
-        """The bytes of one box, up to where its children's follow. Each contraction closes what it takes off."""
+    def _node_bytes(self, found: Examination, k: int, is_cut: bool, upper: FloatArray) -> bytes:
+        """Return the bytes of box number ``k`` up to those of its children; a contraction closes the part cut off."""
         verdict, reason = int(found.verdict[k]), int(found.reason[k])
         if verdict == Verdict.BOUNDED:
             return bytes([Node.BOUNDED])
@@ -64,25 +79,29 @@ class ProofWriter:
         if verdict == Verdict.MONOTONE:
             return bytes([Node.MONOTONE, reason])
         only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
-        parts = [part for i in only for part in self._moved(found, k, i, float(upper[i]))]
+        parts = [part for i in only for part in self._contraction_bytes(found, k, i, float(upper[i]))]
         if is_cut:
             parts.append(bytes([Node.HALF, int(found.split[k])]))
         return b"".join(parts)
 
-    def _moved(self, found: Examined, k: int, i: int, upper: float) -> list[bytes]:
-        """What became of the ends of one variable."""
+    def _contraction_bytes(self, found: Examination, k: int, i: int, upper: float) -> list[bytes]:
+        """Return the nodes of the contraction of box number ``k`` along variable ``i``."""
         below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
-        if -1 in (below, above):
-            return [bytes([Node.FACE_UPPER if below == -1 else Node.FACE_LOWER, i])]
+        if COLLAPSED in (below, above):
+            return [bytes([Node.FACE_UPPER if below == COLLAPSED else Node.FACE_LOWER, i])]
         parts = []
         if below >= 0:
-            parts.append(bytes([Node.BELOW, i]) + struct.pack("<d", float(found.lower[i, k])) + self._leaf(below))
+            parts.append(
+                bytes([Node.BELOW, i]) + struct.pack("<d", float(found.lower[i, k])) + self._reason_bytes(below)
+            )
             if found.lower[i, k] > upper:
                 return parts
         if above >= 0:
-            parts.append(bytes([Node.ABOVE, i]) + struct.pack("<d", float(found.upper[i, k])) + self._leaf(above))
+            parts.append(
+                bytes([Node.ABOVE, i]) + struct.pack("<d", float(found.upper[i, k])) + self._reason_bytes(above)
+            )
         return parts
 
-    def _leaf(self, why: int) -> bytes:
-        """The reason of a cut, by the number of the expression that decided it."""
+    def _reason_bytes(self, why: int) -> bytes:
+        """Return the reason for cutting a part off, from the number of the expression that excludes it."""
         return bytes([Node.BOUNDED]) if why < self._functions else bytes([Node.INFEASIBLE, why])

@@ -1,4 +1,4 @@
-"""Upper bounds of sums from the interval slopes of their gradients, for who checks a proof."""
+"""Upper bounds of sums from the interval slopes of their gradients, for the check of a proof."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .slopes import Slope
 if TYPE_CHECKING:
     from ...models import FloatArray
 
-#: What a sum of a few hundred rounded terms may be off by, in parts of their sizes.
+#: Error of a sum of a few hundred rounded terms, in parts of their sizes.
 _SUMS = 1e-13
 
 
@@ -23,9 +23,16 @@ def quadratic_bound(
     lower: FloatArray,
     upper: FloatArray,
 ) -> FloatArray:
-    """Upper bound over boxes of a weighted sum of expressions, from the slopes of its gradient.
+    """Return an upper bound (N,) over boxes of a weighted sum of expressions, from the slopes of its gradient.
 
-    ``L(c + h) in L(c) + g h + 1/2 h'S h``, with ``g`` and ``S`` in intervals.
+    ``L(c + h) in L(c) + g h + 1/2 h'S h``, with intervals for ``g`` and ``S``.
+
+    Args:
+        weights: (R, N).
+        expressions: R slopes.
+        gradients: n slopes of each expression's derivatives.
+        lower: (n, N) lower ends of the boxes.
+        upper: (n, N) upper ends of the boxes.
     """
     n, N = lower.shape
     r = 0.5 * (upper - lower) * (1 + 1e-14) + np.abs(lower) * 1e-15
@@ -53,16 +60,16 @@ def quadratic_bound(
     across = np.maximum(np.abs(slope_low), np.abs(slope_high)) * r
     mean = total + across.sum(axis=0) * (1 + _SUMS) + _SUMS * np.abs(total)
     margin = _SUMS * np.maximum(np.abs(slope_low), np.abs(slope_high))
-    # Where the sum rises along a variable all over the box, it is largest on that face.
+    # Where the sum rises along a variable on the whole box, it is largest on that face.
     s = np.where(slope_low - margin > 0, 1.0, np.where(slope_high + margin < 0, -1.0, 0.0))
     return np.asarray(np.fmin(mean, fixed + _largest(b, H, s)))
 
 
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
-    """Upper bound of ``b e + 1/2 e'He`` for e in [-1, 1]^n, e_i = s_i where that is not 0.
+    """Return an upper bound (N,) of ``b e + 1/2 e'He`` for e in [-1, 1]^n, with ``e_i = s_i`` where ``s_i`` is not 0.
 
-    Free variables one by one, with what couples them taken absolutely; or by a tangent plane to the concave part that
-    Gershgorin's circles leave, whichever is less.
+    It is the lesser of two: the sum over free variables one by one, with absolute values of the terms that couple them;
+    and that from a tangent plane to a concave part, which Gershgorin's circles give.
     """
     Hs = np.einsum("ijb,jb->ib", H, s)
     base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)

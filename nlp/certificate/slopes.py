@@ -1,13 +1,13 @@
-"""Interval slope arithmetic for who checks a proof: simple, slow, and with nothing of the search's own arithmetic.
+"""Interval slope arithmetic for the check of a proof: simple, slow, and independent of the search's own arithmetic.
 
-Over boxes with centre ``c``, every value is a triple of intervals (R. Krawczyk and A. Neumaier, *Interval slopes for
+Over boxes with centre ``c``, every value has three intervals (R. Krawczyk and A. Neumaier, *Interval slopes for
 rational functions and associated centered forms*, SIAM J. Numer. Anal. 22 (1985)):
 
     v(x) in V,     v(c) in C,     v(x) - v(c) in sum_i S_i (x_i - c_i)      for every x of the box,
 
 and ``V`` is intersected with ``C + sum_i S_i [-r_i, r_i]`` at every operation. Every result of the processor's
-arithmetic is moved outwards by one floating-point number; library functions by more. A value that may be undefined is
-NaN from then on, and NaN proves nothing.
+arithmetic moves outwards by one floating-point number, and those of library functions by more. A value that may be
+undefined is NaN, and so is every value computed from it; NaN proves nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Ends = tuple[FloatArray, FloatArray]
 
-#: What a library's sine, cosine, exponential, logarithm and arc tangent may be off by, in parts of their size or of 1.
+#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, in parts of their size or of 1.
 _LIBRARY = 4e-15
 
 
@@ -64,7 +64,7 @@ def _sqrt(x: Ends) -> Ends:
 
 
 def _rising(function: Callable[[FloatArray], FloatArray]) -> Callable[[Ends], Ends]:
-    """The interval of an increasing library function."""
+    """Return the interval version of an increasing library function."""
 
     def ends(x: Ends) -> Ends:
         lo, hi = function(x[0]), function(x[1])
@@ -82,7 +82,7 @@ def _log(x: Ends) -> Ends:
 
 
 def _wave(x: Ends, function: Callable[[FloatArray], FloatArray]) -> Ends:
-    """Sine or cosine, by their Lipschitz constant of 1 about the middle, and by their second derivative."""
+    """Return the range of sine or cosine, by the Lipschitz constant of 1 about the middle and the second derivative."""
     middle = 0.5 * (x[0] + x[1])
     radius = np.nextafter(np.maximum(x[1] - middle, middle - x[0]), np.inf)
     value = function(middle)
@@ -93,7 +93,13 @@ def _wave(x: Ends, function: Callable[[FloatArray], FloatArray]) -> Ends:
 
 @dataclass(frozen=True, eq=False)
 class Slope:
-    """A value over N boxes: range, value at the centre, and slopes (n, N); each a pair of ends."""
+    """A value over N boxes, each attribute a pair of ends.
+
+    Attributes:
+        V: (N,) range.
+        C: (N,) value at the centre.
+        S: (n, N) slopes.
+    """
 
     V: Ends
     C: Ends
@@ -101,13 +107,13 @@ class Slope:
 
 
 class SlopeArithmetic:
-    """A function of one vector over N boxes.
+    """Slopes of a function of one vector.
 
     Args:
-        function: of ``SX``, one dense input (n, 1), dense outputs.
+        function: made of ``SX``, with one dense input (n, 1) and dense outputs.
 
     Raises:
-        UncoveredError: it holds an operation without a rule.
+        UncoveredError: the function holds an operation without a rule.
     """
 
     def __init__(self, function: ca.Function) -> None:
@@ -128,7 +134,7 @@ class SlopeArithmetic:
         self._offset = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])])
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> list[Slope]:
-        """The outputs' elements over boxes (n, N)."""
+        """Return slopes of the outputs' elements over boxes with ends (n, N)."""
         centre = np.clip(0.5 * (lower + upper), lower, upper)
         boxes = _Boxes(lower, upper, centre, np.nextafter(np.maximum(upper - centre, centre - lower), np.inf))
         work: list[Slope | None] = [None] * self._function.sz_w()
@@ -149,7 +155,13 @@ class SlopeArithmetic:
 
 @dataclass(frozen=True, eq=False)
 class _Boxes:
-    """The boxes, and the operations on values over them."""
+    """N boxes, and the operations on values over them.
+
+    Attributes:
+        lower, upper: (n, N) ends.
+        centre: (n, N).
+        radius: (n, N) distance of the farther end from the centre, rounded up.
+    """
 
     lower: FloatArray
     upper: FloatArray
@@ -165,44 +177,44 @@ class _Boxes:
         flat, none = np.full(self.lower.shape[1], value), np.zeros_like(self.lower)
         return Slope((flat, flat), (flat, flat), (none, none))
 
-    def made(self, V: Ends, C: Ends, S: Ends) -> Slope:
-        """Intersect the range with the centred form."""
+    def slope(self, V: Ends, C: Ends, S: Ends) -> Slope:
+        """Return a value, its range intersected with the centred form."""
         reach = np.maximum(np.abs(S[0]), np.abs(S[1])) * self.radius
         spread = reach.sum(axis=0) * (1 + 1e-14)
         low, high = _out(C[0] - spread, C[1] + spread)
         return Slope((np.fmax(V[0], low), np.fmin(V[1], high)), C, S)
 
     def add(self, u: Slope, v: Slope) -> Slope:
-        return self.made(_add(u.V, v.V), _add(u.C, v.C), _add(u.S, v.S))
+        return self.slope(_add(u.V, v.V), _add(u.C, v.C), _add(u.S, v.S))
 
     def sub(self, u: Slope, v: Slope) -> Slope:
-        return self.made(_sub(u.V, v.V), _sub(u.C, v.C), _sub(u.S, v.S))
+        return self.slope(_sub(u.V, v.V), _sub(u.C, v.C), _sub(u.S, v.S))
 
     def mul(self, u: Slope, v: Slope) -> Slope:
-        """``uv - u(c)v(c) = (u - u(c)) v + u(c) (v - v(c))``."""
-        return self.made(_mul(u.V, v.V), _mul(u.C, v.C), _add(_mul(u.S, v.V), _mul(u.C, v.S)))
+        """Return the product: ``uv - u(c)v(c) = (u - u(c)) v + u(c) (v - v(c))``."""
+        return self.slope(_mul(u.V, v.V), _mul(u.C, v.C), _add(_mul(u.S, v.V), _mul(u.C, v.S)))
 
     def div(self, u: Slope, v: Slope) -> Slope:
-        """``u/v - u(c)/v(c) = ((u - u(c)) - u(c)/v(c) (v - v(c))) / v``."""
+        """Return the quotient: ``u/v - u(c)/v(c) = ((u - u(c)) - u(c)/v(c) (v - v(c))) / v``."""
         inverse, ratio = _inverse(v.V), _mul(u.C, _inverse(v.C))
-        return self.made(_mul(u.V, inverse), ratio, _mul(_sub(u.S, _mul(ratio, v.S)), inverse))
+        return self.slope(_mul(u.V, inverse), ratio, _mul(_sub(u.S, _mul(ratio, v.S)), inverse))
 
     def scale(self, u: Slope, by: float) -> Slope:
         factor = (np.array(by), np.array(by))
         return Slope(_mul(u.V, factor), _mul(u.C, factor), _mul(u.S, factor))
 
     def square(self, u: Slope) -> Slope:
-        return self.made(_square(u.V), _square(u.C), _mul(_add(u.V, u.C), u.S))
+        return self.slope(_square(u.V), _square(u.C), _mul(_add(u.V, u.C), u.S))
 
     def sqrt(self, u: Slope) -> Slope:
-        """The difference of two roots is that of the numbers over the sum of the roots."""
+        """Return the root; a difference of roots is that of the numbers over the sum of the roots."""
         V, C = _sqrt(u.V), _sqrt(u.C)
-        return self.made(V, C, _mul(u.S, _inverse(_add(V, C))))
+        return self.slope(V, C, _mul(u.S, _inverse(_add(V, C))))
 
     def smooth(self, u: Slope, function: Callable[[Ends], Ends], derivative: Callable[[Ends], Ends]) -> Slope:
-        """By the mean value theorem: the slope of f(u) is f' somewhere on the range, times that of u."""
+        """Return f(u), by the mean value theorem: its slope is f' somewhere on the range, times the slope of u."""
         hull = np.minimum(u.V[0], u.C[0]), np.maximum(u.V[1], u.C[1])
-        return self.made(function(u.V), function(u.C), _mul(derivative(hull), u.S))
+        return self.slope(function(u.V), function(u.C), _mul(derivative(hull), u.S))
 
     def one(self) -> Slope:
         return self.constant(1.0)
@@ -211,7 +223,7 @@ class _Boxes:
         return self.smooth(u, _ATAN, lambda x: _inverse(_add(_square(x), (np.array(1.0), np.array(1.0)))))
 
     def power(self, u: Slope, exponent: Slope) -> Slope:
-        """A constant whole or half power."""
+        """Return a constant whole or half power."""
         power = float(exponent.V[0][0])
         if not (np.array_equal(*exponent.V) and (2 * power).is_integer() and 0 < abs(power) <= 64):
             raise UncoveredError("a power that is not constant, or not whole or half")
@@ -222,8 +234,8 @@ class _Boxes:
                 result = base if result is None else self.mul(result, base)
             left >>= 1
             base = self.square(base) if left else base
-        made = self.one() if result is None else result
-        return made if power > 0 else self.div(self.one(), made)
+        positive = self.one() if result is None else result
+        return positive if power > 0 else self.div(self.one(), positive)
 
     def asin(self, u: Slope) -> Slope:
         return self.atan(self.div(u, self.sqrt(self.sub(self.one(), self.square(u)))))
@@ -232,7 +244,7 @@ class _Boxes:
         return self.sub(self.scale(self.atan(self.one()), 2.0), self.asin(u))
 
     def atan2(self, y: Slope, x: Slope) -> Slope:
-        """Off the negative x-axis ``2 atan(y / (sqrt(x^2 + y^2) + x))``."""
+        """Return the angle off the negative x-axis, ``2 atan(y / (sqrt(x^2 + y^2) + x))``."""
         return self.scale(self.atan(self.div(y, self.add(self.hypot(y, x), x))), 2.0)
 
     def hypot(self, y: Slope, x: Slope) -> Slope:

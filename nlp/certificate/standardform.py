@@ -1,10 +1,10 @@
-"""A program in the form that a search of the whole box reads: maximise the least of some functions, under rows.
+"""Standard form of a program for the search of its whole box: maximise the least of some functions under conditions.
 
     maximise  min_j phi_j(x)   over  lower <= x <= upper,   h_k(x) <= 0 or h_k(x) = 0
 
-A minimum becomes a maximum of ``-F``. The worst case of several tasks, which the program states by a variable ``level``
-and one constraint for each task, is taken back to what it means: the least of the tasks' own functions. The program's
-arguments are put in as the doubles that they are, so what is proved is about this graph.
+A minimum becomes a maximum of ``-F``. The worst case of several tasks is an epigraph in the program: a variable
+``level`` with one constraint for each task. Here it is the least of the tasks' own functions again, without that
+variable. The program's arguments are put in as doubles, and a proof is about the graph with these constants.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -35,13 +36,13 @@ class StandardForm:
     """A maximisation over a box.
 
     Attributes:
-        nlp: where it comes from.
+        nlp: the program that it states.
         x: (n,) symbols.
-        lower, upper: (n,) the box.
-        functions: the least of them is maximised.
-        rows: conditions.
-        sign: what takes a value of the program's objective to the one that is maximised: -1 for a minimum.
-        has_level: whether the program's last variable is the level of a worst case, which is no variable here.
+        lower, upper: (n,) ends of the box.
+        functions: ``phi_j``, the least of which is maximised.
+        conditions: ``h_k``; numbered after the functions where both are counted.
+        sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
+        has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
     """
 
     nlp: Nlp
@@ -49,9 +50,9 @@ class StandardForm:
     lower: FloatArray
     upper: FloatArray
     functions: tuple[SX, ...]
-    rows: tuple[Condition, ...]
+    conditions: tuple[Condition, ...]
     sign: float
-    has_level: bool
+    has_epigraph: bool
 
     @property
     def n(self) -> int:
@@ -63,14 +64,19 @@ class StandardForm:
         """Names of the variables."""
         return tuple(variable.name for variable in self.nlp.program.variables[: self.n])
 
+    @property
+    def is_equation(self) -> tuple[bool, ...]:
+        """Whether each of the R expressions must be 0; false for functions."""
+        return (*(False for _ in self.functions), *(condition.is_equation for condition in self.conditions))
+
     @cached_property
     def expressions(self) -> SX:
-        """(R, 1) functions, then rows."""
-        return ca.densify(ca.vertcat(*self.functions, *[row.expression for row in self.rows]))
+        """(R, 1) functions, then conditions."""
+        return ca.densify(ca.vertcat(*self.functions, *[condition.expression for condition in self.conditions]))
 
     @cached_property
     def jacobian(self) -> SX:
-        """(R, n) derivatives, dense, with structural zeros filled in."""
+        """(R, n) derivatives, dense: structural zeros are written out."""
         return ca.densify(ca.jacobian(self.expressions, self.x))
 
     @cached_property
@@ -79,25 +85,26 @@ class StandardForm:
         pattern = ca.jacobian(self.expressions, self.x).sparsity()
         return [[bool(pattern.has_nz(r, i)) for i in range(self.n)] for r in range(self.expressions.numel())]
 
-    def level_of(self, x: FloatArray) -> float:
-        """The value that is maximised at a point (n,), as computed."""
-        values = np.array(self._compiled(x)).ravel()
-        return float(np.min(values[: len(self.functions)]))
-
-    def violation_of(self, x: FloatArray) -> float:
-        """Largest violation of a row at a point (n,), as computed; ``inf`` where one has no value."""
-        rows = np.array(self._compiled(x)).ravel()[len(self.functions) :]
-        sizes = [abs(v) if row.is_equation else v for v, row in zip(rows, self.rows, strict=True)]
-        worst = max(sizes, default=0.0)
-        return float(worst) if np.isfinite(worst) else float("inf")
+    def value_at(self, x: FloatArray) -> float:
+        """Return the value that is maximised at a point (n,), as computed in doubles."""
+        return float(np.min(np.array(self._functions_at(x))))
 
     @cached_property
-    def _compiled(self) -> ca.Function:
-        return ca.Function("point", [self.x], [self.expressions])
+    def _functions_at(self) -> ca.Function:
+        return ca.Function("functions", [self.x], [ca.densify(ca.vertcat(*self.functions))])
+
+
+class _BoundedExpression(NamedTuple):
+    """A constraint with numbers in the place of the program's arguments."""
+
+    name: str
+    expression: SX
+    lower: float
+    upper: float
 
 
 def standard_form(nlp: Nlp) -> StandardForm:
-    """The standard form of a program with at least one variable."""
+    """Return the standard form of a program with at least one variable."""
     program = nlp.program
     x = SX.sym("x", nlp.n)
     F, g = program.values.call([x, SX(ca.DM(nlp.arguments))])
@@ -105,13 +112,16 @@ def standard_form(nlp: Nlp) -> StandardForm:
     count = nlp.n if epigraph is None else epigraph.level
     functions: list[SX] = [-nlp.sign * F]
     lower, upper = nlp.g_lower.tolist(), nlp.g_upper.tolist()
-    constraints = [(constraint.name, g[k], lower[k], upper[k]) for k, constraint in enumerate(program.constraints)]
+    constraints = [
+        _BoundedExpression(constraint.name, g[k], lower[k], upper[k])
+        for k, constraint in enumerate(program.constraints)
+    ]
     if epigraph is not None:
         pairs = list(zip(constraints, program.constraints, strict=True))
         level = x[epigraph.level]
         functions = [
-            _own_function(expression, level, nlp.sign)
-            for (_, expression, _, _), constraint in pairs
+            _function_of_epigraph(each.expression, level, nlp.sign)
+            for each, constraint in pairs
             if constraint in epigraph.constraints
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
@@ -121,28 +131,29 @@ def standard_form(nlp: Nlp) -> StandardForm:
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        rows=tuple(_rows(constraints)),
+        conditions=tuple(_conditions(constraints)),
         sign=-nlp.sign,
-        has_level=epigraph is not None,
+        has_epigraph=epigraph is not None,
     )
 
 
-def _own_function(expression: SX, level: SX, sign: float) -> SX:
-    """The function whose bound a level is, from a constraint ``expression >= 0`` that is linear in the level."""
+def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
+    """Return the function that bounds the level in a constraint ``expression >= 0``, which is linear in the level."""
     slope = ca.jacobian(expression, level)
     without = ca.substitute(expression, level, 0)
     # Maximum: level <= -without / slope, slope < 0. Minimum: level >= -without / slope, slope > 0; negated.
     return -without / slope if sign < 0 else without / slope
 
 
-def _rows(constraints: Sequence[tuple[str, SX, float, float]]) -> list[Condition]:
-    rows = []
+def _conditions(constraints: Sequence[_BoundedExpression]) -> list[Condition]:
+    """Return an equation for equal bounds, else an inequality for each finite bound."""
+    conditions = []
     for name, expression, low, high in constraints:
         if low == high:
-            rows.append(Condition(name, expression - low, is_equation=True))
+            conditions.append(Condition(name, expression - low, is_equation=True))
             continue
         if np.isfinite(high):
-            rows.append(Condition(name, expression - high, is_equation=False))
+            conditions.append(Condition(name, expression - high, is_equation=False))
         if np.isfinite(low):
-            rows.append(Condition(name, low - expression, is_equation=False))
-    return rows
+            conditions.append(Condition(name, low - expression, is_equation=False))
+    return conditions

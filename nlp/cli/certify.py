@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
-from .progress import certify_with_progress
 
 
 def certify(
@@ -30,6 +29,7 @@ def certify(
     from ..output.files import read_text, write_text
     from ..results.certified import certified_of
     from ..solver.certified import CertifyOptions, OptionError, proof_of
+    from .progress import certify_with_progress
 
     try:
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
@@ -39,7 +39,7 @@ def certify(
         for target in (json_file, proof):
             check_target(target)
         certified = certify_with_progress(
-            loaded, gap=gap, above=above, time=time, jobs=jobs, starts=starts, with_proof=proof is not None
+            loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
         )
     except OptionError as error:
         raise InputError(f"--{error}") from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..results.jsondata import Data
+    from ..results.jsondata import JsonObject
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -42,18 +41,20 @@ def check_picture(target: str | None) -> None:
         InputError: its ending is no picture's, Matplotlib is not installed, or the file cannot be written.
     """
     if target is not None:
-        from ..output.pictures.extras import check_picture as check
+        from ..output.pictures.requirements import check_picture as check
 
         check(target)
         check_target(target)
 
 
-def write_json(target: str, result: Data) -> None:
+def write_json(target: str, result: JsonObject) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
         InputError: it cannot be written.
     """
+    import json
+
     from ..output.files import write_text
     from ..results.jsondata import json_data
 

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from .options import CaseName, Jobs, Seed, Starts, check_target
-from .progress import solve_with_progress
 
 
 def report(
@@ -24,7 +23,8 @@ def report(
     """Solve a case and write a page about it: one file that opens without a network."""
     from ..case.reader import find_case, load_case
     from ..output.files import read_text, write_text
-    from ..output.pictures.extras import check_library
+    from ..output.pictures.requirements import check_library
+    from .progress import solve_with_progress
 
     loaded = load_case(case)
     text = read_text(str(find_case(case)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
@@ -12,6 +11,8 @@ def schema(
     result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
 ) -> None:
     """Print the JSON Schema of case files, with which editors complete and check."""
+    import json
+
     if result:
         from ..results.schema import result_schema
 

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_picture, check_target, console, write_json
-from .progress import solve_with_progress
 
 
 def solve(
@@ -28,6 +27,7 @@ def solve(
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
     from ..results.result import result_of
+    from .progress import solve_with_progress
 
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))

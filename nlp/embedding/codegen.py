@@ -1,8 +1,8 @@
-"""C for embedding: the objective of a case as a folder of C99 that needs nothing of ours at run time.
+"""C for embedding: the objective and the solver of a case as a folder of C99 that needs no library of Python's.
 
-CasADi generates the functions; around them stand a header with every number's name, unit, bounds and default, readable
-wrappers, a test against values from Python, timings, and build files, all from the templates in ``nlp/c``. The same
-case and versions give the same bytes.
+CasADi generates the functions. The templates in ``nlp/embedding/c`` add a header with every number's name, unit, bounds
+and default, readable wrappers, the solver, a test against values from Python, timings, and build files. The same case
+and versions give the same bytes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -25,11 +26,11 @@ from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from ..solver.multistart import Status, solve_program
-from .ctext import comment, identifier, integers, matrix, numbers, texts
-from .staged import Staged, stage
+from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .stages import StagedFunctions, stage_functions
 
 _TEMPLATES = Path(__file__).parent / "c"
-#: Ending of each of the files that the prefix names, and its template.
+#: Endings of the files whose names begin with the case's prefix, and their templates.
 _PARTS = {
     ".h": "api.h",
     ".c": "api.c",
@@ -38,21 +39,21 @@ _PARTS = {
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
 }
-#: Starting points that the solver comes with.
+#: Number of starting points in the solver's table.
 _SEEDS = 16
-#: Limits of one search: iterations, and lengths of a step that are tried in one.
+#: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
 _ITERATIONS = 100
 _TRIALS = 30
-#: Points of the self-test, and the seed that they are drawn with.
+#: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
 _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 
 
 def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
-    """The files of a case's C folder.
+    """Generate the files of a case's C folder.
 
-    The task whose twist is the default is the case's first; the twist is a run-time argument like everything fixed.
+    The twist is a run-time argument, as is everything fixed; its default is that of the case's first task.
 
     Args:
         case: the case.
@@ -63,26 +64,27 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
 
     Raises:
         CaseError: the case contradicts itself, or has several poses.
-        InputError: its functions have no finite value anywhere.
+        InputError: the case's functions have no finite value at any point that is tried.
     """
     if case.pose_count > 1:
         raise CaseError("pose", "gives several poses; C is generated for one", case.pose_count, case.source)
     nlp = formulate(case)
-    staged = stage(nlp.program, f"{identifier(case.name)}_CASADI")
-    names = _names(nlp, staged)
-    files = {f"{names['id']}{ending}": _filled(f"{part}.in", names) for ending, part in _PARTS.items()}
+    staged = stage_functions(nlp.program, f"{identifier(case.name)}_CASADI")
+    names = _substitutions(nlp, staged)
+    files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in _PARTS.items()}
     for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
-        files[name] = _filled(f"{name}.in", names)
+        files[name] = _fill_template(f"{name}.in", names)
     casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
     return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
 
 
-def _filled(template: str, names: dict[str, str]) -> str:
+def _fill_template(template: str, names: dict[str, str]) -> str:
+    """Return a template's text with its placeholders replaced."""
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
-    """C and header by ending; the name stands in front of what CasADi names itself."""
+    """Generate C and header, by ending; CasADi's own names in them begin with the given one."""
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int"})
     for function in functions:
         generator.add(function)
@@ -92,8 +94,8 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
         return {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
 
 
-def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
-    """What stands in the templates' places."""
+def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
+    """Return the texts for the templates' placeholders."""
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
     size = len(prefix) + len("_CASADI_")
@@ -103,16 +105,16 @@ def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
     work = max(1, *(function.sz_w() for function in functions))
-    # What sqp.c takes for itself; solver.c doesn't compile where this is too little.
+    # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
     solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,
         "ID": prefix.upper(),
-        "title": comment(case.title or case.name),
+        "title": comment_text(case.title or case.name),
         "version": version("screwsynth"),
         "casadi": ca.CasadiMeta.version(),
-        "length": comment(case.units.length),
+        "length": comment_text(case.units.length),
         "n": str(n),
         "np": str(len(program.arguments)),
         "m": str(len(program.model.wrenches)),
@@ -131,7 +133,7 @@ def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
         "seeds": "/* Where the solver searches from, in half ranges from the middle of the bounds. */\n"
-        + matrix(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
+        + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix),
         "count": str(points),
         "has_optimum": str(int(solution.status is Status.OPTIMAL)),
@@ -143,8 +145,15 @@ def _names(nlp: Nlp, staged: Staged) -> dict[str, str]:
     }
 
 
+class _References(NamedTuple):
+    """Number of the self-test's points, and C tables of the points and of the values there."""
+
+    points: int
+    tables: str
+
+
 def _tables(nlp: Nlp, prefix: str) -> str:
-    """Names, units, bounds and defaults as constant tables, each ended by a zero so that none is empty."""
+    """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
     units = {Dimension.LENGTH: case.units.length, Dimension.ANGLE: "rad", Dimension.NUMBER: ""}
     lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
@@ -152,34 +161,39 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
         "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
-        texts(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
-        texts(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
-        integers(f"{prefix}_variable_kinds", N, [kinds.index(each.dimension) for each in program.variables]),
-        numbers(f"{prefix}_variable_lower", N, nlp.lower),
-        numbers(f"{prefix}_variable_upper", N, nlp.upper),
-        numbers(f"{prefix}_variable_starts", N, nlp.start),
+        string_table(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
+        string_table(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
+        integer_table(f"{prefix}_variable_kinds", N, [kinds.index(each.dimension) for each in program.variables]),
+        number_table(f"{prefix}_variable_lower", N, nlp.lower),
+        number_table(f"{prefix}_variable_upper", N, nlp.upper),
+        number_table(f"{prefix}_variable_starts", N, nlp.start),
         "/* Fixed numbers: names, units, and the case's values. */",
-        texts(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
-        texts(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
-        numbers(f"{prefix}_parameter_defaults", P, nlp.arguments),
+        string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
+        string_table(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
+        number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
         "/* Rows of the Jacobian: the limb of each, and whether it applies a force or a couple. */",
-        texts(f"{prefix}_row_limbs", M, [row.limb for row in program.model.wrenches]),
-        texts(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.wrenches]),
+        string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.wrenches]),
+        string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.wrenches]),
         "/* Constraints: names and bounds; 1e300 is none. */",
-        texts(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
-        numbers(f"{prefix}_constraint_lower", C, lower),
-        numbers(f"{prefix}_constraint_upper", C, upper),
+        string_table(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
+        number_table(f"{prefix}_constraint_lower", C, lower),
+        number_table(f"{prefix}_constraint_upper", C, upper),
         "/* Tasks: names, and twists of six numbers each. */",
-        texts(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
-        numbers(f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])),
+        string_table(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
+        number_table(
+            f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])
+        ),
     ]
     return "\n".join(blocks) + "\n"
 
 
-def _references(nlp: Nlp) -> tuple[int, str]:
-    """Number of points of the self-test, and the C tables of its points and values.
+def _references(nlp: Nlp) -> _References:
+    """Return the self-test's points and values.
 
-    The values are those of the program itself, not of the functions that the C is made of.
+    The values are those of the program itself, and so independent of the functions from which the C is generated.
+
+    Raises:
+        InputError: no point that is tried has finite values.
     """
     kernels, p = nlp.program.kernels, nlp.arguments
     rows: list[dict[str, FloatArray]] = []
@@ -198,5 +212,5 @@ def _references(nlp: Nlp) -> tuple[int, str]:
     tables = []
     for name, first in rows[0].items():
         table = name if name == "points" else f"reference_{name}"
-        tables.append(matrix(f"{table}[{len(rows)}][{first.size + 1}]", [row[name].ravel() for row in rows]))
-    return len(rows), "\n".join(tables)
+        tables.append(matrix_table(f"{table}[{len(rows)}][{first.size + 1}]", [row[name].ravel() for row in rows]))
+    return _References(len(rows), "\n".join(tables))

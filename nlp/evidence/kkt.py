@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,21 +114,29 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     )
 
 
-def multipliers(at: Linearisation, active: Sequence[int]) -> tuple[FloatArray, float]:
-    """Return the multipliers that make a point as nearly stationary as possible, and the residual of stationarity.
+class Multipliers(NamedTuple):
+    """Multipliers of the sides at a point.
+
+    Attributes:
+        mu: (k,) not negative on inequalities and zero on inactive sides.
+        residual: largest component of ``grad phi + sum mu a``, which is zero where ``-grad phi`` lies in the cone of
+            the outward normals; ``inf`` where the gradient is not finite.
+    """
+
+    mu: FloatArray
+    residual: float
+
+
+def multipliers(at: Linearisation, active: Sequence[int]) -> Multipliers:
+    """Return the multipliers that make a point as nearly stationary as possible.
 
     Args:
         at: the program at the point.
         active: indices of the sides whose multipliers may differ from zero.
-
-    Returns:
-        (k,) multipliers, not negative on inequalities and zero on inactive sides, and the largest component of
-        ``grad phi + sum mu a``, which is zero where ``-grad phi`` lies in the cone of the outward normals; ``inf``
-        where the gradient is not finite.
     """
     mu = np.zeros(len(at.sides))
     if not np.isfinite(at.gradient).all():
-        return mu, float("inf")
+        return Multipliers(mu, float("inf"))
     if active:
         columns = [(j, 1.0) for j in active]
         columns += [(j, -1.0) for j in active if at.sides[j].bound == "equal"]
@@ -135,7 +144,7 @@ def multipliers(at: Linearisation, active: Sequence[int]) -> tuple[FloatArray, f
         for value, (j, sign) in zip(nonnegative_least_squares(A, -at.gradient), columns, strict=True):
             mu[j] += sign * value
     left = at.gradient + at.normals.T @ mu
-    return mu, float(np.max(np.abs(left), initial=0.0))
+    return Multipliers(mu, float(np.max(np.abs(left), initial=0.0)))
 
 
 def constraint_weights(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArray:

@@ -95,9 +95,9 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
 
 def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     """Return the margins in the limits that hold whatever is chosen: they cost nothing."""
-    if not nlp.met:
+    if not nlp.constant_limits:
         return []
-    constraints = [item.constraint for item in nlp.met]
+    constraints = [item.constraint for item in nlp.constant_limits]
     expressions = ca.vertcat(*[constraint.expression for constraint in constraints])
     function = ca.Function("constant", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
     measured = _measured(nlp, x, constraints, function(x, nlp.arguments).full().ravel())
@@ -112,7 +112,7 @@ def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
             active=False,
             cost=0.0 if optimal else None,
         )
-        for item, value in zip(nlp.met, measured, strict=True)
+        for item, value in zip(nlp.constant_limits, measured, strict=True)
         for bound, key, limit in _sides(item)
     ]
 

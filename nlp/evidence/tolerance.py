@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -42,6 +43,18 @@ class ToleranceLoss:
     loss_there: float
     joints: tuple[tuple[str, str], ...]
     gradients: FloatArray
+
+
+class ToleranceEvaluation(NamedTuple):
+    """F with errors of the joint centres.
+
+    Attributes:
+        F: over the poses.
+        gradients: (k, 3) each, by the errors: one, or one for each of the worst poses.
+    """
+
+    F: float
+    gradients: tuple[FloatArray, ...]
 
 
 class BuiltRobot:
@@ -80,8 +93,8 @@ class BuiltRobot:
         at = whole.call([*(ca.DM(value) for value in values), e])[0]
         return ca.Function("built", [e], [at, ca.gradient(at, e)])
 
-    def evaluate(self, errors: FloatArray) -> tuple[float, list[FloatArray]]:
-        """Return F over the poses, and its gradients (k, 3): one, or one for each of the worst poses.
+    def evaluate(self, errors: FloatArray) -> ToleranceEvaluation:
+        """Return F over the poses, and its gradients.
 
         Args:
             errors: (k, 3) errors of the joint centres, length, each in the frame of its joint.
@@ -92,12 +105,10 @@ class BuiltRobot:
         case = self._nlp.case
         if case.over_poses is OverPoses.WORST and len(values) > 1:
             level = worst_value(values, self._nlp.sense)
-            return level, [
-                gradient
-                for value, gradient in zip(values, gradients, strict=True)
-                if abs(value - level) <= _SAME_VALUE * abs(level)
-            ]
-        return total_over_poses(values, case.over_poses), [total_over_poses(gradients, case.over_poses)]
+            near = [abs(value - level) <= _SAME_VALUE * abs(level) for value in values]
+            return ToleranceEvaluation(level, tuple(each for each, kept in zip(gradients, near, strict=True) if kept))
+        whole = total_over_poses(gradients, case.over_poses)
+        return ToleranceEvaluation(total_over_poses(values, case.over_poses), (whole,))
 
 
 def tolerance_loss(nlp: Nlp, x: FloatArray, tolerance: float) -> ToleranceLoss:

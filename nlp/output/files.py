@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, and read with one sentence for what goes wrong."""
+"""Files: written whole or not at all, and read with one sentence for each fault."""
 
 from __future__ import annotations
 
@@ -14,26 +14,19 @@ from ..errors import InputError
 def write_text(target: str, text: str) -> None:
     """Write a text to a file, or to standard output for ``-``.
 
-    The file appears under its name only when it is complete; a pipe or device is written to, not replaced.
-
     Raises:
         InputError: it cannot be written.
     """
     if target == "-":
         sys.stdout.write(text)
-        return
-    try:
-        path = Path(target)
-        if path.exists() and not path.is_file():
-            path.write_text(text, encoding="utf-8")
-        else:
-            _replace(path.resolve(), text.encode("utf-8"))
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
+    else:
+        write_bytes(target, text.encode("utf-8"))
 
 
 def write_bytes(target: str, content: bytes) -> None:
-    """Write bytes to a file, which appears under its name only when it is complete; ``-`` is a file's name here.
+    """Write bytes to a file; ``-`` is a file's name here.
+
+    The file appears under its name only when it is complete; a pipe or device is written to, not replaced.
 
     Raises:
         InputError: it cannot be written.
@@ -45,23 +38,7 @@ def write_bytes(target: str, content: bytes) -> None:
         else:
             _replace(path.resolve(), content)
     except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Put a complete file in the place of what is there."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        # A temporary file is for its owner only; the result gets what any new file gets.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        raise _cannot_be_written(target, error) from None
 
 
 def write_folder(target: str, files: Mapping[str, str]) -> None:
@@ -81,11 +58,11 @@ def write_folder(target: str, files: Mapping[str, str]) -> None:
             for name in files:
                 (Path(waiting) / name).replace(folder / name)
     except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
+        raise _cannot_be_written(target, error) from None
 
 
 def check_target(target: str) -> None:
-    """See before the work begins whether its result can be written.
+    """Refuse a file that cannot be written, before the work begins.
 
     Raises:
         InputError: the folder is missing or closed, or the target is a folder.
@@ -101,16 +78,8 @@ def check_target(target: str) -> None:
         raise InputError(f"{target or 'an empty name'}: cannot be written: {fault}")
 
 
-def _fault(path: Path) -> str:
-    if path.is_dir():
-        return "it is a folder"
-    if not path.parent.is_dir():
-        return f"{path.parent} is no folder"
-    return "" if os.access(path.parent, os.W_OK) else f"no permission in {path.parent}"
-
-
 def read_text(source: str) -> str:
-    """The text of a file.
+    """Read the text of a file.
 
     Raises:
         InputError: it cannot be read.
@@ -122,3 +91,32 @@ def read_text(source: str) -> str:
     except (OSError, ValueError) as error:
         fault = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise InputError(f"{source}: cannot be read: {fault}") from None
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Put a complete file in the place of an older one, or of none."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        # A temporary file is for its owner only; the result gets the permissions of any new file.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _cannot_be_written(target: str, error: OSError) -> InputError:
+    return InputError(f"{target}: cannot be written: {error.strerror or error}")
+
+
+def _fault(path: Path) -> str:
+    """Return why a file cannot be written, or nothing."""
+    if path.is_dir():
+        return "it is a folder"
+    if not path.parent.is_dir():
+        return f"{path.parent} is no folder"
+    return "" if os.access(path.parent, os.W_OK) else f"no permission in {path.parent}"

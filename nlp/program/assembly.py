@@ -60,7 +60,7 @@ def assemble(
         start=frozen_vector([bound.first for bound in table.bounds]),
         g_lower=frozen_vector([item.lower for item in bounded]),
         g_upper=frozen_vector([item.upper for item in bounded]),
-        met=layout.met,
+        constant_limits=layout.constant_limits,
     )
     _check_limbs(nlp)
     return nlp

@@ -70,7 +70,7 @@ class Layout:
         places: typed places of these numbers.
         robots: the robot at each pose.
         constraints: constraints that depend on a variable, and limits that do not hold.
-        met: limits that depend on no variable and hold.
+        constant_limits: limits that depend on no variable and hold.
     """
 
     case: Case
@@ -78,7 +78,7 @@ class Layout:
     places: Places
     robots: tuple[RobotInstance, ...]
     constraints: tuple[BoundedConstraint, ...]
-    met: tuple[BoundedConstraint, ...] = ()
+    constant_limits: tuple[BoundedConstraint, ...] = ()
 
 
 class _StatedPoseSymbols(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 
 #: Golden section: its multiples modulo 1 are spread evenly over the unit interval.
 _GOLDEN = 0.6180339887498949
+
+
+class Evaluation(NamedTuple):
+    """Objective and constraints (c,) at a point."""
+
+    F: float
+    g: FloatArray
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,8 @@ class Nlp:
         start: (n,) first starting point.
         g_lower, g_upper: (c,) lower and upper sides of the constraints: infinite where there is none, equal for an
             equation.
-        met: limits of the case that do not depend on ``x`` and hold, and so are not constraints of the program.
+        constant_limits: limits of the case that depend on no variable and hold, so that they are no constraints of the
+            program.
         size: positive size of the objective, where the objective does not consist of the robot's F.
     """
 
@@ -85,7 +93,7 @@ class Nlp:
     start: FloatArray
     g_lower: FloatArray
     g_upper: FloatArray
-    met: tuple[BoundedConstraint, ...] = ()
+    constant_limits: tuple[BoundedConstraint, ...] = ()
     size: float | None = None
 
     @property
@@ -135,10 +143,10 @@ class Nlp:
             equal=np.array([side.bound == "equal" for side in sides], dtype=bool),
         )
 
-    def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """Return the objective and the constraints (c,) at a point (n,)."""
+    def evaluate(self, x: FloatArray) -> Evaluation:
+        """Return the objective and the constraints at a point (n,)."""
         F, g = self.program.kernels.values(x, self.arguments)
-        return float(F[0, 0]), g.ravel()
+        return Evaluation(float(F[0, 0]), g.ravel())
 
     @cached_property
     def objective_scale(self) -> float:

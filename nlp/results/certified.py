@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from ..case.task import Sense
 from .data import CertificateData
 from .evidence import certificate_data, incumbent_data
-from .jsondata import Data, Inline
+from .jsondata import Inline, JsonObject
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..solver.certified import Certified
 
 
-class CertifiedTaskData(Data):
+class CertifiedTaskData(JsonObject):
     """A task by itself and its certificate.
 
     Attributes:
@@ -30,7 +30,7 @@ class CertifiedTaskData(Data):
     point: Mapping[str, float] | None
 
 
-class CertifiedResult(Data):
+class CertifiedResult(JsonObject):
     """Result of certifying a case.
 
     Attributes:

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from .jsondata import Data, Vector
+from .jsondata import JsonObject, Vector
 from .parts import SCHEMA
 from .regression import CaseCheck, ExpectedCheck, PublishedCheck
 
 
-class ExpectedData(Data):
+class ExpectedData(JsonObject):
     """A computed number beside the one that the case expects.
 
     Attributes:
@@ -25,7 +25,7 @@ class ExpectedData(Data):
     passed: bool
 
 
-class PublishedData(Data):
+class PublishedData(JsonObject):
     """A published number beside the computed one.
 
     Attributes:
@@ -55,7 +55,7 @@ class PublishedData(Data):
     passed: bool
 
 
-class CaseCheckData(Data):
+class CaseCheckData(JsonObject):
     """Checks of one case.
 
     Attributes:
@@ -75,7 +75,7 @@ class CaseCheckData(Data):
     published: tuple[PublishedData, ...]
 
 
-class ChecksResult(Data):
+class ChecksResult(JsonObject):
     """Result of checking cases.
 
     Attributes:

@@ -10,7 +10,7 @@ from ..case.task import Method, Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
 from ..solver.multistart import Status
-from .jsondata import Absent, Data, Inline, Size, Vector
+from .jsondata import Absent, Inline, JsonObject, Size, Vector
 from .parts import (
     Bound,
     HeadData,
@@ -25,7 +25,7 @@ from .parts import (
 )
 
 
-class ReachedData(Data):
+class ReachedData(JsonObject):
     """The best point of a solve that failed.
 
     Attributes:
@@ -37,7 +37,7 @@ class ReachedData(Data):
     violated: tuple[ViolationData, ...]
 
 
-class ActiveData(Data):
+class ActiveData(JsonObject):
     """A bound or limit that the point lies on.
 
     Attributes:
@@ -53,7 +53,7 @@ class ActiveData(Data):
     multiplier: float
 
 
-class OptimalityData(Data):
+class OptimalityData(JsonObject):
     """Evidence of optimality, from the program and the point alone.
 
     Attributes:
@@ -77,7 +77,7 @@ class OptimalityData(Data):
     flat_directions: tuple[Mapping[str, float], ...]
 
 
-class OptimumData(Data):
+class OptimumData(JsonObject):
     """A distinct optimum.
 
     Attributes:
@@ -91,7 +91,7 @@ class OptimumData(Data):
     spread: float
 
 
-class StartsData(Data):
+class StartsData(JsonObject):
     """Outcome of the starts.
 
     Attributes:
@@ -107,7 +107,7 @@ class StartsData(Data):
     optima: tuple[OptimumData, ...]
 
 
-class CertificateData(Data):
+class CertificateData(JsonObject):
     """A proven bound of the global optimum.
 
     Attributes:
@@ -137,7 +137,7 @@ class CertificateData(Data):
     history: tuple[Annotated[Vector, Size(3)], ...]
 
 
-class SolveResult(Data):
+class SolveResult(JsonObject):
     """Result of solving one task.
 
     Attributes:
@@ -179,7 +179,7 @@ class SolveResult(Data):
     seconds: float
 
 
-class OutcomeData(Data):
+class OutcomeData(JsonObject):
     """A task at the combined point.
 
     Attributes:
@@ -207,7 +207,7 @@ class OutcomeData(Data):
     rates: Vector | None
 
 
-class CombinedPointData(Data):
+class CombinedPointData(JsonObject):
     """The robot that several tasks were combined to.
 
     Attributes:
@@ -221,7 +221,7 @@ class CombinedPointData(Data):
     limits: Absent[tuple[LimitData, ...]]
 
 
-class CombinedData(Data):
+class CombinedData(JsonObject):
     """Several tasks brought together.
 
     Attributes:
@@ -254,7 +254,7 @@ class CombinedData(Data):
         return self.reached if self.made is None else self.made
 
 
-class CombinedResult(Data):
+class CombinedResult(JsonObject):
     """Result of solving several tasks.
 
     Attributes:

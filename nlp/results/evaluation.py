@@ -7,12 +7,12 @@ from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from .design import limits_data, margins_data
-from .jsondata import Data, Inline, Vector, vector
+from .jsondata import Inline, JsonObject, Vector, vector
 from .parts import HeadData, LimitData, MarginData, MotionData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, motion_data, objective, robot_data, task_data, versions, violations
 
 
-class EvaluatedTaskData(Data):
+class EvaluatedTaskData(JsonObject):
     """A task at the point.
 
     Attributes:
@@ -28,7 +28,7 @@ class EvaluatedTaskData(Data):
     task_is_free: bool
 
 
-class PrincipalMotionData(Data):
+class PrincipalMotionData(JsonObject):
     """A motion at which F is stationary.
 
     Attributes:
@@ -40,7 +40,7 @@ class PrincipalMotionData(Data):
     motion: Inline[MotionData]
 
 
-class PrincipalMotionsData(Data):
+class PrincipalMotionsData(JsonObject):
     """Motions at which F is stationary, each three by ascending F.
 
     Attributes:
@@ -52,7 +52,7 @@ class PrincipalMotionsData(Data):
     translations: tuple[PrincipalMotionData, ...]
 
 
-class EvaluationResult(Data):
+class EvaluationResult(JsonObject):
     """Result of evaluating a case at one point.
 
     Attributes:

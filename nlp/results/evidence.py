@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from ..certificate.certificate import Certificate
 from ..evidence.optimality import Evidence
@@ -36,7 +37,7 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
     )
 
 
-def _flat(nlp: Nlp, direction: Mapping[str, float]) -> dict[str, float]:
+def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
     """Return a flat direction in the case's units, its largest rate 1."""
     rates = {
         variable.name: nlp.case.units.shown(direction[variable.name], variable.dimension)
@@ -44,7 +45,7 @@ def _flat(nlp: Nlp, direction: Mapping[str, float]) -> dict[str, float]:
         if variable.name in direction
     }
     largest = max(rates.values(), key=abs)
-    return {name: rate / largest for name, rate in rates.items()}
+    return MappingProxyType({name: rate / largest for name, rate in rates.items()})
 
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:
@@ -66,10 +67,12 @@ def certificate_data(certificate: Certificate | None) -> CertificateData | None:
     )
 
 
-def incumbent_data(certificate: Certificate | None) -> dict[str, float] | None:
+def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:
     """Return the best point known by the names of the program's variables, in the case's units."""
     if certificate is None or certificate.x is None:
         return None
     nlp = certificate.nlp
     variables = zip(nlp.program.variables, certificate.x, strict=True)
-    return {each.name: nlp.case.units.shown(float(value), each.dimension) for each, value in variables}
+    return MappingProxyType(
+        {each.name: nlp.case.units.shown(float(value), each.dimension) for each, value in variables}
+    )

@@ -1,8 +1,8 @@
 """Frozen values that JSON writes as objects: their base class, the marks of their fields, and the conversion.
 
-A subclass of :class:`Data` declares its fields as a dataclass does, and type checkers treat it as one. It is none,
-because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a short command a
-thirtieth slower.
+A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type checkers treat it as one. It is
+none, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a short
+command a thirtieth slower.
 """
 
 import enum
@@ -43,7 +43,7 @@ Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 
 
 @dataclass_transform(eq_default=False, frozen_default=True, kw_only_default=True)
-class Data:
+class JsonObject:
     """A frozen value with named fields, which JSON writes in the order of their declaration.
 
     Attributes:
@@ -79,7 +79,7 @@ def _mark(kind: object) -> Mark | None:
     return next((mark for mark in marks if isinstance(mark, Mark)), None)
 
 
-def json_data(value: Data) -> dict[str, JsonValue]:
+def json_data(value: JsonObject) -> dict[str, JsonValue]:
     """Return a value as JSON's own types.
 
     Raises:
@@ -88,11 +88,11 @@ def json_data(value: Data) -> dict[str, JsonValue]:
     found: dict[str, JsonValue] = {}
     for name, mark in value.marks.items():
         part = getattr(value, name)
-        if part is None and mark is not None:
-            continue
-        if mark is Mark.INLINE:
+        if mark is None:
+            found[name] = _plain(part)
+        elif part is not None and mark is Mark.INLINE:
             found |= json_data(part)
-        else:
+        elif part is not None:
             found[name] = _plain(part)
     return found
 
@@ -100,7 +100,7 @@ def json_data(value: Data) -> dict[str, JsonValue]:
 def _plain(value: object) -> JsonValue:
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    if isinstance(value, Data):
+    if isinstance(value, JsonObject):
         return json_data(value)
     if isinstance(value, tuple | list):
         return [_plain(each) for each in value]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from ..case.pose import OverPoses
 from ..case.task import Sense
-from .jsondata import Absent, Data, Inline, Size, Vector, Vector3, Vector6
+from .jsondata import Absent, Inline, JsonObject, Size, Vector, Vector3, Vector6
 
 #: Version of the format.
 SCHEMA = 1
@@ -21,7 +21,7 @@ RotationMatrix: TypeAlias = Annotated[tuple[Vector3, ...], Size(3)]
 Jacobian: TypeAlias = tuple[Vector6, ...]
 
 
-class UnitsData(Data):
+class UnitsData(JsonObject):
     """Units of the case.
 
     Attributes:
@@ -33,7 +33,7 @@ class UnitsData(Data):
     angle: Literal["deg", "rad"]
 
 
-class HeadData(Data):
+class HeadData(JsonObject):
     """The case that a result is about.
 
     Attributes:
@@ -51,7 +51,7 @@ class HeadData(Data):
     units: UnitsData
 
 
-class VersionsData(Data):
+class VersionsData(JsonObject):
     """Versions of the programs that the numbers depend on."""
 
     screwsynth: str
@@ -60,7 +60,7 @@ class VersionsData(Data):
     python: str
 
 
-class PoseData(Data):
+class PoseData(JsonObject):
     """A pose of the platform.
 
     Attributes:
@@ -76,7 +76,7 @@ class PoseData(Data):
     rotation_matrix: RotationMatrix
 
 
-class MotionData(Data):
+class MotionData(JsonObject):
     """An instantaneous motion of the platform.
 
     Attributes:
@@ -92,7 +92,7 @@ class MotionData(Data):
     pitch: float | Literal["inf"]
 
 
-class TaskData(Data):
+class TaskData(JsonObject):
     """A task of the case.
 
     Attributes:
@@ -106,7 +106,7 @@ class TaskData(Data):
     motion: Inline[MotionData]
 
 
-class PoseStateData(Data):
+class PoseStateData(JsonObject):
     """The robot at one of several poses.
 
     Attributes:
@@ -130,7 +130,7 @@ class PoseStateData(Data):
     quantities: Mapping[str, ByOwner]
 
 
-class PosesData(Data):
+class PosesData(JsonObject):
     """The robot at every pose of a case with several.
 
     Attributes:
@@ -144,7 +144,7 @@ class PosesData(Data):
     poses: tuple[PoseStateData, ...]
 
 
-class RobotData(Data):
+class RobotData(JsonObject):
     """The robot at a point; with several poses, at the first.
 
     Attributes:
@@ -180,7 +180,7 @@ class RobotData(Data):
     several: Inline[PosesData | None]
 
 
-class ViolationData(Data):
+class ViolationData(JsonObject):
     """A bound or constraint that a point lies outside of.
 
     Attributes:
@@ -196,7 +196,7 @@ class ViolationData(Data):
     limit: float
 
 
-class MarginData(Data):
+class MarginData(JsonObject):
     """Margin of a point in a limit at one leg, joint or pose.
 
     Attributes:
@@ -222,7 +222,7 @@ class MarginData(Data):
     cost: float | None
 
 
-class LimitData(Data):
+class LimitData(JsonObject):
     """A limiting number of the case, over all legs, joints and poses.
 
     Attributes:
@@ -246,7 +246,7 @@ class LimitData(Data):
     cost: float | None
 
 
-class RelaxationData(Data):
+class RelaxationData(JsonObject):
     """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
 
     Attributes:
@@ -262,7 +262,7 @@ class RelaxationData(Data):
     unit: str
 
 
-class SensitivityData(Data):
+class SensitivityData(JsonObject):
     """Sensitivity of the optimal F to a fixed number.
 
     Attributes:
@@ -278,7 +278,7 @@ class SensitivityData(Data):
     derivative: float
 
 
-class JointGradientData(Data):
+class JointGradientData(JsonObject):
     """Derivatives of F by the error of a joint centre.
 
     Attributes:
@@ -292,7 +292,7 @@ class JointGradientData(Data):
     gradient: Vector3
 
 
-class ToleranceData(Data):
+class ToleranceData(JsonObject):
     """Loss of F by inexact joint centres.
 
     Attributes:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, axis_from_screw
+from ...models import Dimension, FloatArray, Quantity, axis_from_screw
 from ..case.case import Case
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
@@ -144,25 +146,29 @@ def motion_data(twist: ArrayLike) -> MotionData:
     )
 
 
-def parameters_data(case: Case, state: RobotState) -> dict[str, float | Vector]:
+def parameters_data(case: Case, state: RobotState) -> Mapping[str, float | Vector]:
     """Return the robot's parameters by name, in the case's units: several numbers for a point or direction."""
     shown: dict[str, float | Vector] = {}
     for parameter in case.model.parameters:
         values = [case.units.shown(float(value), parameter.dimension) for value in state.parameters[parameter.name]]
         shown[parameter.name] = values[0] if len(values) == 1 else tuple(values)
-    return shown
+    return MappingProxyType(shown)
 
 
-def _quantities(case: Case, state: RobotState) -> dict[str, ByOwner]:
+def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:
     """Return the model's measures that are finite, by name and owner, in the case's units."""
-    return {
-        item.name: {
-            owner: case.units.shown(float(value), item.dimension)
-            for owner, value in zip(item.owners, state.quantities[item.name], strict=True)
+    return MappingProxyType(
+        {
+            item.name: _by_owner(case, item, state.quantities[item.name])
+            for item in case.model.quantities
+            if np.isfinite(state.quantities[item.name]).all()
         }
-        for item in case.model.quantities
-        if np.isfinite(state.quantities[item.name]).all()
-    }
+    )
+
+
+def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
+    pairs = zip(quantity.owners, values, strict=True)
+    return MappingProxyType({owner: case.units.shown(float(value), quantity.dimension) for owner, value in pairs})
 
 
 def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:

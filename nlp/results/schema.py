@@ -13,10 +13,10 @@ from .certified import CertifiedResult
 from .checks import ChecksResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
-from .jsondata import Data, JsonValue, Mark, Size
+from .jsondata import JsonObject, JsonValue, Mark, Size
 
 #: Every kind of result.
-RESULTS: tuple[type[Data], ...] = (SolveResult, CombinedResult, EvaluationResult, CertifiedResult, ChecksResult)
+RESULTS: tuple[type[JsonObject], ...] = (SolveResult, CombinedResult, EvaluationResult, CertifiedResult, ChecksResult)
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _SCALARS: dict[object, str] = {bool: "boolean", int: "integer", float: "number", str: "string", NoneType: "null"}
@@ -47,7 +47,7 @@ def _schema(kind: object, definitions: Schema) -> Schema:
         return {"type": _SCALARS[kind]}
     if kind is object:
         return {}
-    if isinstance(kind, type) and issubclass(kind, Data):
+    if isinstance(kind, type) and issubclass(kind, JsonObject):
         return _reference(kind, definitions)
     if isinstance(kind, type) and issubclass(kind, enum.Enum):
         return {"enum": [member.value for member in kind]}
@@ -72,7 +72,7 @@ def _compound(kind: object, definitions: Schema) -> Schema:
     raise TypeError(f"JSON has no type for {kind!r}")
 
 
-def _reference(kind: type[Data], definitions: Schema) -> Schema:
+def _reference(kind: type[JsonObject], definitions: Schema) -> Schema:
     name = kind.__name__
     if name not in definitions:
         fields = _fields(kind, definitions)
@@ -105,7 +105,7 @@ class _Fields(NamedTuple):
     together: dict[str, list[str]]
 
 
-def _fields(kind: type[Data], definitions: Schema) -> _Fields:
+def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
     for name, annotation in kind.__annotations__.items():
         mark = kind.marks[name]
@@ -122,7 +122,7 @@ def _fields(kind: type[Data], definitions: Schema) -> _Fields:
 def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> None:
     """Add the fields of an inline part; where it may be absent, they are there all together or not at all."""
     kind = _present(annotation)
-    if not (isinstance(kind, type) and issubclass(kind, Data)):
+    if not (isinstance(kind, type) and issubclass(kind, JsonObject)):
         raise TypeError(f"only an object can stand inline, which {kind!r} is not")
     part = _fields(kind, definitions)
     fields.properties.update(part.properties)
@@ -144,7 +144,7 @@ def _present(annotation: object) -> object:
     return kinds[0] if len(kinds) == 1 else Union[tuple(kinds)]  # noqa: UP007 - the types are known at run time only
 
 
-def _descriptions(kind: type[Data]) -> dict[str, str]:
+def _descriptions(kind: type[JsonObject]) -> dict[str, str]:
     """Return the descriptions of a type's fields by name, from the attributes in its docstring."""
     text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2]
     found = re.findall(r"^    (\w+): (.*(?:\n        .*)*)", text, flags=re.MULTILINE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from types import MappingProxyType
 
 from ..certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
@@ -50,13 +51,10 @@ def task_result(solution: ProgramSolution, task: int = 0, certificate: Certifica
 def starts_data(solution: ProgramSolution) -> StartsData:
     """Return how the starts of a solve ended, and the distinct optima."""
     ended = Counter(start.status for start in solution.starts)
+    reasons = [status for status in StartStatus if status is not StartStatus.CONVERGED and ended[status]]
     return StartsData(
         run=len(solution.starts),
         converged=ended[StartStatus.CONVERGED],
-        failed={
-            status.value: ended[status]
-            for status in StartStatus
-            if status is not StartStatus.CONVERGED and ended[status]
-        },
+        failed=MappingProxyType({status.value: ended[status] for status in reasons}),
         optima=tuple(OptimumData(F=found.F, count=found.count, spread=found.spread) for found in solution.optima),
     )

@@ -34,7 +34,7 @@ class CertifyOptions:
     Attributes:
         gap: part of the incumbent that the bound may be off by.
         above: prove that F is above this value instead.
-        time: seconds for each program.
+        time_limit: seconds for each program.
         jobs: threads.
 
     Raises:
@@ -43,14 +43,14 @@ class CertifyOptions:
 
     gap: float = GAP
     above: float | None = None
-    time: float | None = None
+    time_limit: float | None = None
     jobs: int | None = None
 
     def __post_init__(self) -> None:
         if not 1e-10 <= self.gap < 1:
             raise OptionError(f"gap {self.gap:g}: must be at least 1e-10 and below 1")
-        if self.time is not None and not self.time > 0:
-            raise OptionError(f"time {self.time:g}: must be positive")
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise OptionError(f"time {self.time_limit:g}: must be positive")
         if self.above is not None and not abs(self.above) < float("inf"):
             raise OptionError(f"above {self.above:g}: must be finite")
 
@@ -90,7 +90,7 @@ def certify(
     *,
     gap: float = GAP,
     above: float | None = None,
-    time: float | None = None,
+    time_limit: float | None = None,
     jobs: int | None = None,
     starts: int | None = None,
     seed: int | None = None,
@@ -103,7 +103,7 @@ def certify(
         found: a case, which is solved first, or its solution.
         gap: part of the incumbent that the bound may be off by.
         above: prove, instead, that F of a case's only task is above this value on the whole box.
-        time: seconds for each program, after which the search stops with what it has.
+        time_limit: seconds for each program, after which the search stops with what it has.
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
@@ -114,7 +114,7 @@ def certify(
         OptionError: an option is outside of its range, or has no meaning for the case.
         UncoveredError: the case's expressions hold an operation without a rule.
     """
-    options = CertifyOptions(gap, above, time, jobs)
+    options = CertifyOptions(gap, above, time_limit, jobs)
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
     several = len(case.tasks) > 1
@@ -136,7 +136,7 @@ def certify(
             claimed=claimed,
             gap=options.gap,
             above=options.above,
-            time_limit=options.time,
+            time_limit=options.time_limit,
             jobs=options.jobs,
             progress=None if progress is None else progress(name),
             recorder=recorder,

@@ -68,6 +68,10 @@ class Combination:
 class Solution:
     """The answer to a case.
 
+    For a case with one task, ``F``, ``nlp``, ``starts``, ``optima`` and ``relaxation`` are those of its program. For
+    several tasks, ``F`` raises an error, and the others are those of the combined program; an average has none, and
+    they raise an error.
+
     Attributes:
         case: the case.
         status: how the solve ended.
@@ -120,7 +124,7 @@ class Solution:
 
     @property
     def nlp(self) -> Nlp:
-        """The program that decided; see :meth:`_decisive` for the errors of this and the following properties."""
+        """The program that decided."""
         return self._decisive().nlp
 
     @property

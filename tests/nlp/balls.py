@@ -3,7 +3,7 @@
 import flint
 import numpy as np
 
-from screwsynth.nlp.certificate.enclosure import Forms
+from screwsynth.nlp.certificate.enclosure import Enclosures
 from screwsynth.nlp.certificate.instructions import Op, Tape
 
 
@@ -42,7 +42,7 @@ def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - 
 
 
 def violations(
-    tape: Tape, forms: Forms, box: int, centre: np.ndarray, radius: np.ndarray, point: np.ndarray
+    tape: Tape, forms: Enclosures, box: int, centre: np.ndarray, radius: np.ndarray, point: np.ndarray
 ) -> tuple[int, int]:
     """How many results lie surely outside of their interval, or of their form at a point of box number ``box``.
 

@@ -15,10 +15,11 @@ from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.certificate import bounding, quadratic
-from screwsynth.nlp.certificate.bounding import Examined, NumpyEngine, Verdict, search_tape
+from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.engines import engine_for, kernel
+from screwsynth.nlp.certificate.examination import Examination, Verdict
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
@@ -178,12 +179,12 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     assert sound.status is CertificateStatus.PROVED
     assert sound.bound >= solution.F * (1 - 1e-12)
 
-    whole = NumpyEngine._monotone
+    whole = NumpyEngine._collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(NumpyEngine, "_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
     inside = 0.5 * solution.x
     wrong = certify_program(solution.nlp, inside, engine="numpy", gap=1e-9)
     assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
@@ -192,7 +193,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
 @pytest.mark.slow
 def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the test above: no incumbent is given, so a rule that drops the optimum cannot hide behind it."""
-    whole = NumpyEngine._monotone
+    whole = NumpyEngine._collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
@@ -206,7 +207,7 @@ def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeyp
         return wrong
 
     assert caught() == 0
-    monkeypatch.setattr(NumpyEngine, "_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
     assert caught() >= 1
 
 
@@ -304,7 +305,7 @@ def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -
     solution = solve(load_case("paper-4.1-helical"), starts=4)
     examine, calls = NumpyEngine.examine, []
 
-    def interrupted(self: NumpyEngine, *arguments: object) -> Examined:
+    def interrupted(self: NumpyEngine, *arguments: object) -> Examination:
         calls.append(1)
         if len(calls) == 9:
             raise KeyboardInterrupt
@@ -332,8 +333,8 @@ def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() ->
     case = replace(base, tasks=[base.tasks[0], other])
     nlp = formulate_worst(case, [1.0, 1.0], [400.0, 400.0], 400.0)
     form = standard_form(nlp)
-    assert form.has_level
-    assert (len(form.functions), form.n, len(form.rows)) == (2, nlp.n - 1, 0)
+    assert form.has_epigraph
+    assert (len(form.functions), form.n, len(form.conditions)) == (2, nlp.n - 1, 0)
     found = certify_program(nlp, gap=1e-3)
     assert found.status is CertificateStatus.PROVED
     rng = np.random.default_rng(0)
@@ -385,9 +386,9 @@ def test_the_tape_is_the_function(monkeypatch: pytest.MonkeyPatch) -> None:
     del monkeypatch
     form = standard_form(formulate(load_case("paper-4.3")))
     x = 0.5 * (form.lower + form.upper)
-    engine: Callable[..., Examined] = engine_for(form).examine
+    engine: Callable[..., Examination] = engine_for(form).examine
     found = engine(x[:, None], x[:, None], math.inf)
-    assert found.bound[0] == pytest.approx(form.level_of(x), rel=1e-11)
+    assert found.bound[0] == pytest.approx(form.value_at(x), rel=1e-11)
     assert len(search_tape(form)) > 100
 
 

@@ -11,9 +11,9 @@ import pytest
 from screwsynth.models import Body, model_names
 from screwsynth.nlp import Solution, load_case, shipped_cases, solve
 from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
-from screwsynth.nlp.output.pictures.gallery import drawings_of
-from screwsynth.nlp.output.pictures.scene import Drawing, drawing_of_model
+from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
 
 Run = Callable[..., tuple[int, str, str]]
@@ -73,7 +73,7 @@ def test_the_platform_moves_along_the_twist_as_the_exponential_says(name: str) -
     robot = drawing(name)
     assert robot.motion is not None
     for t in (-0.2, 1e-3, 0.3):
-        moved = robot.linkage.moved(robot.posture, robot.motion.twist, t)
+        moved = robot.linkage.posture_after(robot.posture, robot.motion.twist, t)
         assert moved is not None
         E = exponential(robot.motion.twist, t)
         assert np.max(np.abs(moved.rotation - E[:3, :3] @ robot.posture.rotation)) <= 1e-12
@@ -88,11 +88,12 @@ def test_velocities_are_those_of_the_moving_corners() -> None:
     robot = drawing("paper-4.1-helical")
     assert robot.motion is not None
     h = 1e-6
-    ahead, behind = (robot.linkage.moved(robot.posture, robot.motion.twist, t) for t in (h, -h))
+    ahead, behind = (robot.linkage.posture_after(robot.posture, robot.motion.twist, t) for t in (h, -h))
     assert ahead is not None
     assert behind is not None
     slope = (ahead.points - behind.points)[list(robot.corners)] / (2 * h)
-    assert np.max(np.abs(slope - robot.velocities)) <= 1e-6 * np.max(np.abs(robot.velocities))
+    velocities = robot.velocities_at(robot.posture)
+    assert np.max(np.abs(slope - velocities)) <= 1e-6 * np.max(np.abs(velocities))
 
 
 def test_rates_are_those_of_the_leg_lengths() -> None:
@@ -101,7 +102,7 @@ def test_rates_are_those_of_the_leg_lengths() -> None:
     h, rates = 1e-6, robot.limb_rates()
 
     def lengths(t: float) -> np.ndarray:
-        moved = robot.linkage.moved(robot.posture, robot.motion.twist, t)  # type: ignore[union-attr]
+        moved = robot.linkage.posture_after(robot.posture, robot.motion.twist, t)  # type: ignore[union-attr]
         assert moved is not None
         return np.array([np.linalg.norm(moved.points[b] - moved.points[a]) for a, b, link in robot.links if link.limb])
 

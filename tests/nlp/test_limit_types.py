@@ -83,7 +83,7 @@ from pathlib import Path
 
 import screwsynth.nlp
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, result_of, solve
+from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
 from screwsynth.nlp.case.schema import Document
 from screwsynth.nlp.case.starter import starter_case
@@ -122,7 +122,7 @@ print(
             "constraints": [each.name for each in nlp.program.constraints],
             "optimal": solution.status is Status.OPTIMAL,
             "height": float(solution.state.position[2]),
-            "limits": result_of(solution)["limits"],
+            "limits": json_data(result_of(solution))["limits"],
             "slope": (moved.F - solution.F) / 0.01,
             "relaxed": [[row.key, row.needed] for row in contradicting.relaxation],
             "schema": Document.model_json_schema()["$defs"]["LimitsTable"]["properties"]["platform_height"],

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -16,8 +17,8 @@ from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, read_proof
 from screwsynth.nlp.certificate.proofcheck import check_proof
-from screwsynth.nlp.certificate.prooftree import TreeReader, unfolded
-from screwsynth.nlp.certificate.standardform import standard_form
+from screwsynth.nlp.certificate.prooftree import TreeReader, read_claims
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 Run = Callable[..., tuple[int, str, str]]
@@ -62,20 +63,26 @@ def test_a_proof_holds_and_survives_writing_and_reading(proof: Proof) -> None:
 
 def test_a_proof_with_rows_holds(ball: Proof) -> None:
     nlp = program_of(ball_case(), ball.statement)
-    claims = unfolded(ball.tree, standard_form(nlp))
+    claims = read_claims(ball.tree, standard_form(nlp))
     assert {claim.kind for claim in claims} >= {Node.BOUNDED, Node.INFEASIBLE}
     check_proof(ball, nlp)
+
+
+def is_feasible(form: StandardForm, point: np.ndarray) -> bool:
+    """Whether every condition holds at a point, as computed; one without a value does not."""
+    values = np.array(ca.Function("values", [form.x], [form.expressions])(point)).ravel()[len(form.functions) :]
+    sizes = [abs(value) if each.is_equation else value for value, each in zip(values, form.conditions, strict=True)]
+    return all(size <= 0 for size in sizes)
 
 
 class Places(TreeReader):
     """Notes where in the tree each closing reason stands, and how long it is."""
 
-    def _leaf(self, kind: int, lower: np.ndarray, upper: np.ndarray) -> None:
+    def _add_leaf(self, kind: int, lower: np.ndarray, upper: np.ndarray) -> None:
         start = self.at - 1
-        super()._leaf(kind, lower, upper)
+        super()._add_leaf(kind, lower, upper)
         middle = 0.5 * (lower + upper)
-        feasible = self._form.violation_of(middle) <= 0
-        self.places = [*getattr(self, "places", []), (start, self.at - start, feasible)]
+        self.places = [*getattr(self, "places", []), (start, self.at - start, is_feasible(self._form, middle))]
 
 
 def nodes(proof: Proof, case: Case) -> list[tuple[int, int, bool]]:
@@ -84,7 +91,7 @@ def nodes(proof: Proof, case: Case) -> list[tuple[int, int, bool]]:
     reader = Places(proof.tree, form)
     waiting = [(np.array(form.lower), np.array(form.upper))]
     while waiting:
-        waiting += reader.node(*waiting.pop())
+        waiting += reader.read_node(*waiting.pop())
     assert reader.at == len(proof.tree)
     return reader.places
 
@@ -253,6 +260,17 @@ def test_above_on_the_command_line(cli: Run) -> None:
     assert code == 1
     assert "not above 300" in out
     assert load_case(NAME).tasks[0].sense.value == "max"
+
+
+def test_the_contract_names_every_module_of_the_search() -> None:
+    """Who checks a proof may import what both sides share, and nothing else of the room."""
+    settings = Path(__file__).parents[2] / "pyproject.toml"
+    contracts = tomllib.loads(settings.read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    room = "screwsynth.nlp.certificate"
+    (contract,) = [each for each in contracts if each.get("source_modules") == [f"{room}.proofcheck"]]
+    modules = {path.stem for path in (settings.parent / "nlp" / "certificate").glob("*.py")} - {"__init__"}
+    check = {"standardform", "proof", "prooftree", "slopes", "slopebounds", "proofcheck"}
+    assert set(contract["forbidden_modules"]) == {f"{room}.{module}" for module in modules - check}
 
 
 @pytest.mark.parametrize("method", ["weighted-sum", "worst-case"])

@@ -34,9 +34,9 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Task, formulate, load_case, result_of, solve
+from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
-from screwsynth.nlp.output.report.frames import RATES
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
 from screwsynth.nlp.output.report.webpage import page_of
@@ -470,11 +470,13 @@ def test_contrast() -> None:
 
 def test_colours_are_those_of_picture_files() -> None:
     painting = pytest.importorskip("screwsynth.nlp.output.pictures.painting")
-    assert painting.RATES == RATES
+    colours = pytest.importorskip("matplotlib.colors")
+    drawn = painting.rate_colour_map().resampled(len(RATE_COLOURS))
+    assert [colours.to_hex(drawn(k)) for k in range(len(RATE_COLOURS))] == list(RATE_COLOURS)
 
 
 def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("screwsynth.nlp.output.pictures.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("screwsynth.nlp.output.pictures.requirements.find_spec", lambda _: None)
     code, out, err = cli("report", "paper-4.2", "--out", str(tmp_path / "page.html"))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1

@@ -19,7 +19,7 @@ from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
-from screwsynth.nlp.results.jsondata import Absent, Data, Inline
+from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
 from screwsynth.nlp.results.regression import check_case
 from screwsynth.nlp.results.schema import RESULTS, result_schema
 from screwsynth.nlp.results.summary import case_summary
@@ -172,7 +172,7 @@ def test_a_robot_is_there_as_a_whole_or_not_at_all(schema: Json) -> None:
         assert not validator(schema, "SolveResult").is_valid({**json.loads(json.dumps(without)), key: whole[key]})
 
 
-class Inner(Data):
+class Inner(JsonObject):
     """An inner part.
 
     Attributes:
@@ -182,7 +182,7 @@ class Inner(Data):
     b: float
 
 
-class Outer(Data):
+class Outer(JsonObject):
     """A value with every kind of field."""
 
     a: int
@@ -229,10 +229,10 @@ def test_values_are_frozen_and_whole() -> None:
     with pytest.raises(TypeError, match="object"):
         json_data(outer(absent=object()))
     with pytest.raises(TypeError, match="run time"):
-        type("Text", (Data,), {"__annotations__": {"a": "int"}})
+        type("Text", (JsonObject,), {"__annotations__": {"a": "int"}})
     assert "status=<Status.OPTIMAL" in repr(value)
     for module in (parts, data):
-        kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, Data)]
+        kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, JsonObject)]
         assert len(kinds) > 5
         assert not any(getattr(kind, "__hash__", None) is None for kind in kinds)
 

@@ -11,19 +11,29 @@ from screwsynth.nlp import (
     Case,
     CaseError,
     EvaluationError,
+    Evidence,
     Free,
+    Nlp,
     Rotation,
     Search,
+    SolverResult,
     StartStatus,
     Status,
+    StopReason,
     Task,
+    certify,
+    examine,
     formulate,
     json_data,
     load_case,
     result_of,
     solve,
 )
+from screwsynth.nlp.program import formulation
+from screwsynth.nlp.program.layout import Layout, lay_out
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.solver import multistart
+from screwsynth.nlp.solver.interface import LocalSearch
 
 
 def random_case(seed: int, sense: str) -> Case:
@@ -189,3 +199,49 @@ def test_an_infeasible_case_names_what_cannot_hold() -> None:
     assert result["F"] is None
     assert [side["name"] for side in result["reached"]["violated"]] == ["|u1_1|"]
     assert result["reached"]["violated"][0]["value"] == pytest.approx(math.sqrt(1.62), abs=1e-6)
+
+
+def idle(nlp: Nlp, search: Search, points: np.ndarray, count: int) -> list[LocalSearch]:
+    """A solver that stays where it starts and says that it succeeded."""
+    assert len(points) == search.starts
+    zeros = np.zeros(nlp.n), np.zeros(len(nlp.program.constraints))
+    return [lambda x: SolverResult(x, *zeros, StopReason.SUCCEEDED, 0)] * count
+
+
+def test_a_solver_is_not_believed() -> None:
+    solution = solve(replace(random_case(1, "max"), rotation=Rotation()), starts=8, solver=idle)
+    for start in solution.starts:
+        at = examine(solution.nlp, start.x)
+        assert (start.status is StartStatus.CONVERGED) == at.kind.is_optimum
+    assert any(start.status is StartStatus.STALLED for start in solution.starts)
+    assert solution.status is Status.NOT_CONVERGED
+
+
+def test_the_winner_is_examined_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[bytes] = []
+
+    def counted(nlp: Nlp, x: np.ndarray) -> Evidence:
+        seen.append(np.asarray(x).tobytes())
+        return examine(nlp, x)
+
+    monkeypatch.setattr(multistart, "examine", counted)
+    solution = solve(load_case("paper-4.1-helical"), starts=6)
+    assert solution.evidence is solution.optima[0].evidence
+    assert len(seen) == len(set(seen)) == len(solution.optima)
+
+
+def test_a_case_is_formulated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = load_case("paper-4.1-helical")
+    counts: list[str] = []
+
+    def counted(*arguments: object) -> Layout:
+        counts.append("formulated")
+        return lay_out(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(formulation, "lay_out", counted)
+    solution = solve(case, starts=4)
+    assert len(counts) == 1
+    certify(solution, gap=1e-2)
+    assert len(counts) == 1
+    certify(case, gap=1e-2, starts=4)
+    assert len(counts) == 2

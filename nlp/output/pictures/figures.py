@@ -1,4 +1,4 @@
-"""Pictures of robots as files: png, svg and pdf, the same bytes for the same robot and versions."""
+"""Picture files of robots: png, svg and pdf, the same bytes for the same robot and versions."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import io
 import textwrap
 import warnings
 from collections.abc import Sequence
-from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from ...units import rate_unit
-from .painting import INK, MUTED, RATES, Panel
-from .scene import Drawing
+from .canvas import INK, MUTED, RED
+from .drawing import Drawing
+from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
-#: Everything that would make two files of one picture differ, or depend on the user's own settings.
+#: Without these, two files of one picture would differ, or depend on the user's own settings.
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "screwsynth",
     "svg.fonttype": "path",
@@ -35,17 +35,17 @@ _METADATA: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "screwsynth"},
     ".pdf": {"CreationDate": None, "Creator": "screwsynth", "Producer": None},
 }
-#: Size of a panel, and of what stands above, below and beside it, in inches.
+#: Width and height of a panel, and room for the heading, the legend and the colour bar, in inches.
 _WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
 
 
 def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = None) -> bytes:
-    """The content of a picture file.
+    """Return the content of a picture file.
 
     Args:
         drawings: one robot, or the same robot with several tasks, which stand side by side.
         ending: ``.png``, ``.svg`` or ``.pdf``.
-        view: from where; the clearest for the first drawing when left out.
+        view: the projection; the clearest for the first drawing when left out.
     """
     content = io.BytesIO()
     with mpl.rc_context({**mpl.rcParamsDefault, **_SETTINGS}), warnings.catch_warnings():
@@ -56,13 +56,8 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
     return content.getvalue()
 
 
-def ending_of(target: str) -> str:
-    """Ending of a file's name, in small letters."""
-    return PurePath(target).suffix.lower()
-
-
 def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figure:
-    """The picture as a Matplotlib figure; arguments as for :func:`picture`.
+    """Return the picture as a Matplotlib figure; arguments as for :func:`picture`.
 
     Every artist that shows a part of the robot carries its name as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
@@ -80,44 +75,56 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
         panel = Panel(axes, view, drawing)
         panel.paint()
         if drawing.rows:
-            _colour_bar(figure, (left + _WIDTH + 0.1) / width, 0.22, 0.16 / width, 0.5, drawing, panel.largest)
+            _add_colour_bar(figure, (left + _WIDTH + 0.1) / width, 0.22, 0.16 / width, 0.5, drawing, panel.largest)
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
-        _legend(figure, (left + 0.25) / width, 0.02, panel)
-        top = 1 - 0.3 / height
-        for text, size, colour, bold in _heading(drawing):
-            lines = textwrap.wrap(text, int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
-            figure.text(
-                (left + 0.25) / width,
-                top,
-                "\n".join(lines),
-                fontsize=size,
-                color=colour,
-                fontweight="bold" if bold else "normal",
-                va="top",
-                parse_math=False,
-            )
-            top -= (1.35 * size / 72 * len(lines)) / height
+        _add_legend(figure, (left + 0.25) / width, 0.02, panel)
+        _write_heading(figure, (left + 0.25) / width, height, drawing)
     return figure
 
 
-def _heading(drawing: Drawing) -> list[tuple[str, float, str, bool]]:
+class _HeadingLine(NamedTuple):
+    """A line above a panel; its size is in points."""
+
+    text: str
+    size: float
+    colour: str
+    bold: bool
+
+
+def _heading(drawing: Drawing) -> list[_HeadingLine]:
+    """Return the lines above a panel: the case or the robot, and the result."""
     title = drawing.model.name if drawing.case is None else drawing.case.title or drawing.case.name
-    rows = [(title, 12.0, INK, True)]
+    lines = [_HeadingLine(title, 12.0, INK, bold=True)]
     if drawing.headline:
-        rows.append((drawing.headline, 10.0, MUTED if drawing.is_answer else "#a3250f", not drawing.is_answer))
-    return rows
+        colour = MUTED if drawing.is_answer else RED
+        lines.append(_HeadingLine(drawing.headline, 10.0, colour, bold=not drawing.is_answer))
+    return lines
 
 
-def rate_colours() -> LinearSegmentedColormap:
-    """Blue for what shortens, grey for what stays, orange for what lengthens: told apart with any colour blindness."""
-    return LinearSegmentedColormap.from_list("rates", RATES)
+def _write_heading(figure: Figure, left: float, height: float, drawing: Drawing) -> None:
+    """Write the heading above a panel; ``left`` is in parts of the figure's width, ``height`` its height in inches."""
+    top = 1 - 0.3 / height
+    for text, size, colour, bold in _heading(drawing):
+        lines = textwrap.wrap(text, int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
+        figure.text(
+            left,
+            top,
+            "\n".join(lines),
+            fontsize=size,
+            color=colour,
+            fontweight="bold" if bold else "normal",
+            va="top",
+            parse_math=False,
+        )
+        top -= (1.35 * size / 72 * len(lines)) / height
 
 
-def _colour_bar(
+def _add_colour_bar(
     figure: Figure, left: float, bottom: float, width: float, height: float, drawing: Drawing, largest: float
 ) -> None:
+    """Draw the scale of the rates with a mark for each limb; place and size are in parts of the figure."""
     axes = figure.add_axes((left, bottom, width, height))
-    scale = ScalarMappable(Normalize(-largest, largest), rate_colours())
+    scale = ScalarMappable(Normalize(-largest, largest), rate_colour_map())
     bar = figure.colorbar(scale, cax=axes)
     unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
     bar.set_label(f"rate of each limb, {unit}", color=INK, fontsize=9, parse_math=False)
@@ -127,7 +134,8 @@ def _colour_bar(
     bar.ax.hlines(rates, 0, 1, color=INK, linewidth=1.0, gid="rates")
 
 
-def _legend(figure: Figure, left: float, bottom: float, panel: Panel) -> None:
+def _add_legend(figure: Figure, left: float, bottom: float, panel: Panel) -> None:
+    """Write a panel's legend; the place is in parts of the figure."""
     entries = panel.legend
     if entries:
         figure.legend(

@@ -1,4 +1,4 @@
-"""Placing words in a picture so that they cover neither each other nor what they name."""
+"""Places for words in a picture where they cover neither each other nor the lines."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from matplotlib.text import Text
 
 from ....models import FloatArray
 
-#: Distances, in points, and number of directions in which a place for a word is looked for.
+#: Distances, in points, and number of directions of the places that are tried for a word.
 _DISTANCES = (7.0, 12.0, 18.0, 26.0, 36.0)
 _DIRECTIONS = 16
 #: Room around a word, in pixels.
 _ROOM = 2.0
-#: What covering another word, a point to be kept free, or distance costs.
+#: Costs of covering another word, of covering a point that is kept free, and of a point of distance.
 _OVERLAP, _COVERED, _FAR = 50.0, 4.0, 0.12
-#: What lies outside of the axes costs as much as an overlap.
+#: A word beyond the axes is cut off, which is worse than an overlap.
 _OUTSIDE = 60.0
 
 
@@ -30,13 +30,13 @@ class Label:
     """A word beside a place.
 
     Attributes:
-        text: what it says; never read as mathematics.
+        text: the word; never read as mathematics.
         at: (2,) the place, in data coordinates.
-        away: (2,) the direction that it should rather go to; zero for none.
+        away: (2,) the preferred direction from the place; zero for none.
         color: of the letters.
         size: of the letters, points.
         bold: whether they are bold.
-        name: by which the artist is found.
+        name: ``gid`` of the artist.
     """
 
     text: str
@@ -49,7 +49,7 @@ class Label:
 
 
 def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], keep_free: FloatArray) -> list[Text]:
-    """Put words beside their places, one after the other, each where it covers least.
+    """Put words beside their places, one after the other, each where its cost is least.
 
     Args:
         axes: with its final limits and place.
@@ -106,6 +106,14 @@ def _cost(
     dots: FloatArray,
     inside: tuple[float, float, float, float],
 ) -> float:
+    """Return the cost of a word's box, in pixels: left, bottom, right, top.
+
+    Args:
+        box: of the word.
+        taken: boxes of the words already placed.
+        dots: (k, 2) points that words should not cover.
+        inside: box of the axes.
+    """
     cost = 0.0
     for other in taken:
         wide = min(box[2], other[2]) - max(box[0], other[0])

@@ -1,4 +1,4 @@
-"""Pictures of solutions and robots as files."""
+"""Picture files of solutions and robots."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from ....models import Model
 from ...solver.solution import Solution
 from ..files import check_target, write_bytes
-from .extras import check_picture
-from .gallery import drawings_of
-from .scene import drawing_of_model
+from .drawing import drawing_of_model
+from .requirements import check_picture, ending_of
+from .solutions import drawings_of
 
 
 def plot(found: Solution | Model, file: str | Path) -> None:
@@ -26,7 +26,7 @@ def plot(found: Solution | Model, file: str | Path) -> None:
     target = str(file)
     check_picture(target)
     check_target(target)
-    from .figures import ending_of, picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
+    from .figures import picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
 
     drawings = [drawing_of_model(found)] if isinstance(found, Model) else drawings_of(found)
     write_bytes(target, picture(drawings, ending_of(target)))

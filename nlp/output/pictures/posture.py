@@ -1,4 +1,4 @@
-"""The robot's drawing in numbers: where everything is at one pose, and after the platform has moved along a twist."""
+"""The robot's drawing as numbers, at one pose and after a motion of the platform along a twist."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from casadi import SX
 from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian
 from ...program.kernel import Kernel, tuple_of
 
-#: Newton's steps on the loops after a small motion, and the residual that ends them: what rounding leaves.
+#: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
 _STEPS = 20
 _ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """Where everything of the drawing is, in the order of the model's scene; world coordinates, length.
+    """Numbers of a drawing at one pose, in the order of the model's scene; world coordinates, the case's length unit.
 
     Attributes:
         rotation: (3, 3) ``R``.
@@ -44,12 +44,12 @@ class Posture:
 
 
 class Linkage:
-    """A robot with its dimensions, whose platform can be put anywhere.
+    """A robot with its dimensions, for any pose of its platform.
 
     Args:
         model: the robot.
         parameters: components of all parameters in the model's order; radians for angles.
-        characteristic_length: what one unit couple counts for beside unit forces, length.
+        characteristic_length: factor of the rows of couples, which makes them comparable to those of forces; length.
     """
 
     def __init__(self, model: Model, parameters: FloatArray, characteristic_length: float = 1.0) -> None:
@@ -66,8 +66,8 @@ class Linkage:
         slopes = ca.jacobian(closure, own.unknowns)
         self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 
-    def at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
-        """The drawing with the platform at a pose.
+    def posture_at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
+        """Return the drawing at a pose.
 
         Args:
             rotation: (3, 3) ``R``.
@@ -94,13 +94,13 @@ class Linkage:
             quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
         )
 
-    def moved(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
-        """The drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
+    def posture_after(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
+        """Return the drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
 
-        Internal unknowns follow by Newton's method on the loops, so the step should be small where there are some.
+        Newton's method on the loops gives the internal unknowns, so a robot that has some needs small motions.
 
         Returns:
-            None where the loops do not close, or a limb has zero length there.
+            The posture; None where the loops do not close there, or a limb has zero length.
         """
         turn, shift = displacement(twist, t)
         rotation, position = turn @ start.rotation, turn @ start.position + shift
@@ -110,9 +110,9 @@ class Linkage:
             if not np.isfinite(residual).all() or np.max(np.abs(residual)) <= _ROUNDING:
                 break
             unknowns = unknowns - np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
-        moved = self.at(rotation, position, unknowns)
+        reached = self.posture_at(rotation, position, unknowns)
         if len(unknowns):
             residual, _ = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
             if not np.max(np.abs(residual)) <= np.sqrt(_ROUNDING):
                 return None
-        return moved if np.isfinite(moved.jacobian).all() else None
+        return reached if np.isfinite(reached.jacobian).all() else None

@@ -1,4 +1,4 @@
-"""Looking at a robot: a parallel projection, which keeps proportions, and what lies before what."""
+"""Parallel projection of a robot, which keeps proportions, and the order in which lines cover each other."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....models import FloatArray
-from .scene import Drawing
+from .drawing import Drawing
 
-#: Directions that are tried for a view, in degrees.
+#: Azimuths that are tried for a view, and its elevation, in degrees.
 _AZIMUTHS = range(-170, 190, 10)
 _ELEVATION = 18.0
-#: Two lines that cross on paper within this part of their lengths of an end are joined, not crossing.
+#: Two lines that cross on paper nearer to an end than this part of their lengths are joined there, and do not cross.
 _JOINED = 0.02
 
 
@@ -23,8 +23,8 @@ class View:
     """A parallel projection along a direction, z upwards on paper.
 
     Attributes:
-        azimuth: of the eye about z, from x towards y, degrees.
-        elevation: of the eye above the plane of x and y, degrees.
+        azimuth: angle of the eye about z, from x towards y, degrees.
+        elevation: angle of the eye above the plane of x and y, degrees.
     """
 
     azimuth: float
@@ -43,21 +43,21 @@ class View:
         )
 
     def project(self, points: FloatArray) -> FloatArray:
-        """(..., 2) place on paper of points (..., 3), in the points' own unit."""
+        """Return the places on paper (..., 2) of points (..., 3), in the points' own unit."""
         return np.asarray(points @ self.axes[:2].T)
 
     def depth(self, points: FloatArray) -> FloatArray:
-        """How far points (..., 3) are towards the eye."""
+        """Return how near points (..., 3) are to the eye: their coordinate towards it."""
         return np.asarray(points @ self.axes[2])
 
 
 def clearest_view(drawing: Drawing) -> View:
-    """The direction from which limbs stand apart on paper and the task's axis is seen at its length."""
+    """Return the view in which limbs stand farthest apart on paper and the task's axis is least foreshortened."""
     return max((View(float(azimuth)) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
 
 
 def _clearness(view: View, drawing: Drawing) -> float:
-    """Least and mean distance on paper between the middles of limbs, and how much of the axis is seen."""
+    """Return a score: least and mean distance on paper between points of limbs, and the visible part of the axis."""
     points = drawing.posture.points
     middles = [
         view.project(points[start] + part * (points[end] - points[start]))
@@ -74,11 +74,11 @@ def _clearness(view: View, drawing: Drawing) -> float:
 
 
 def painting_order(view: View, lines: Sequence[FloatArray]) -> list[int]:
-    """The order in which straight lines, (2, 3) each, are painted: the nearer of two that cross covers the other."""
+    """Return the order in which to paint straight lines, (2, 3) each: the nearer of two that cross comes later."""
     depths = [float(np.mean(view.depth(line))) for line in lines]
     order = sorted(range(len(lines)), key=lambda i: depths[i])
     for _ in lines:
-        # A line that must come before one already placed is moved ahead of it; as many rounds as there are lines do.
+        # A line that must come before an earlier one moves ahead of it; as many rounds as there are lines are enough.
         for place, i in enumerate(order):
             later = [k for k in order[:place] if _covers(view, lines[k], lines[i])]
             if later:
@@ -91,7 +91,7 @@ def painting_order(view: View, lines: Sequence[FloatArray]) -> list[int]:
 
 
 def _covers(view: View, one: FloatArray, other: FloatArray) -> bool:
-    """Whether two lines cross on paper, and the first is nearer to the eye there."""
+    """Return whether two lines, (2, 3) each, cross on paper and the first is nearer to the eye there."""
     (a, b), (c, d) = view.project(one), view.project(other)
     matrix = np.column_stack([b - a, c - d])
     if abs(np.linalg.det(matrix)) <= 1e-12 * float(np.abs(matrix).max()) ** 2:

@@ -1,4 +1,4 @@
-"""Small line charts as SVG within a page: they need no script, scale with the page, and print."""
+"""Small charts as SVG within a page: they need no script, scale with the page, and print."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from .markup import Markup, joined, tag
 
-#: Size of a chart in its own units, and what its axes take.
+#: Size of a chart in its own units, and the margins for its axes.
 _WIDTH, _HEIGHT = 320.0, 190.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 12.0, 10.0, 38.0
 
@@ -18,8 +18,8 @@ class Curve:
     """A line of a chart.
 
     Attributes:
-        x, y: its points; it is broken where ``y`` is not finite.
-        kind: the class that the page's style gives it.
+        x, y: coordinates of its points; the line has a gap where ``y`` is not finite.
+        kind: its class in the page's style.
         steps: whether it stays level up to each point.
     """
 
@@ -31,7 +31,13 @@ class Curve:
 
 @dataclass(frozen=True)
 class Spot:
-    """A marked point of a chart."""
+    """A marked point of a chart.
+
+    Attributes:
+        x, y: its coordinates.
+        kind: its class in the page's style.
+        words: its text for a pointer and for screen readers.
+    """
 
     x: float
     y: float
@@ -47,20 +53,20 @@ def line_chart(
     labels: tuple[str, str],
     bounds: Sequence[float] = (),
 ) -> Markup:
-    """Lines over one axis.
+    """Return a chart of lines over one axis, or a sentence where no point of theirs has a value.
 
     Args:
         curves: at least one.
         spots: marked points.
-        words: what it shows, in a sentence: its text alternative.
+        words: the chart's text alternative, a sentence.
         labels: of the horizontal and the vertical axis.
-        bounds: values on the horizontal axis marked by a line each.
+        bounds: values on the horizontal axis that get a vertical line each.
     """
     xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
     ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
     if not ys:
         return tag("p", f"{words} Nothing to draw: F has no value here.")
-    scale = _Scale(_widened(min(xs), max(xs), 0.03), _widened(min(ys), max(ys), 0.08))
+    scale = _Scale(_range_with_room(min(xs), max(xs), 0.03), _range_with_room(min(ys), max(ys), 0.08))
     parts: list[object] = [*_axes(scale, labels)]
     parts += [tag("path", d=f"M{scale.x(x):.1f} {_TOP:g}V{_HEIGHT - _BOTTOM:g}", class_="bound") for x in bounds]
     parts += [tag("path", d=_path(scale, curve), class_=curve.kind) for curve in curves]
@@ -71,9 +77,15 @@ def line_chart(
 
 
 def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tuple[str, str]) -> Markup:
-    """How often each value was found, as a stem each."""
+    """Return a chart of counts, one stem for each value.
+
+    Args:
+        values: pairs of value and count, the best first.
+        words: the chart's text alternative, a sentence.
+        labels: of the horizontal and the vertical axis.
+    """
     ys = [value for value, _ in values]
-    scale = _Scale(_widened(min(ys), max(ys), 0.12), (0.0, 1.12 * max(count for _, count in values)))
+    scale = _Scale(_range_with_room(min(ys), max(ys), 0.12), (0.0, 1.12 * max(count for _, count in values)))
     parts: list[object] = [*_axes(scale, labels)]
     for k, (value, count) in enumerate(values):
         x, y = scale.x(value), scale.y(count)
@@ -86,7 +98,11 @@ def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tupl
 
 @dataclass(frozen=True)
 class _Scale:
-    """From values to places in a chart."""
+    """Scales of a chart, from values to its own units.
+
+    Attributes:
+        across, up: range of values on the horizontal and on the vertical axis.
+    """
 
     across: tuple[float, float]
     up: tuple[float, float]
@@ -107,6 +123,7 @@ def _svg(parts: Sequence[object], words: str) -> Markup:
 
 
 def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
+    """Return the axes with ticks and labels."""
     floor, right = _HEIGHT - _BOTTOM, _WIDTH - _RIGHT
     parts = []
     for value in _ticks(*scale.across, 5):
@@ -126,22 +143,23 @@ def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
 
 
 def _path(scale: _Scale, curve: Curve) -> str:
+    """Return the path data of a curve, a new piece after each gap."""
     parts: list[str] = []
-    pen_up, last = True, 0.0
+    is_new, last = True, 0.0
     for x, y in zip(curve.x, curve.y, strict=True):
         if not math.isfinite(y):
-            pen_up = True
+            is_new = True
             continue
         at = f"{scale.x(x):.1f} {scale.y(y):.1f}"
-        level = f"L{scale.x(x):.1f} {scale.y(last):.1f}" if curve.steps and not pen_up else ""
-        parts.append(f"M{at}" if pen_up else f"{level}L{at}")
-        pen_up, last = False, y
+        level = f"L{scale.x(x):.1f} {scale.y(last):.1f}" if curve.steps and not is_new else ""
+        parts.append(f"M{at}" if is_new else f"{level}L{at}")
+        is_new, last = False, y
     return "".join(parts) or "M0 0"
 
 
-def _widened(low: float, high: float, part: float) -> tuple[float, float]:
-    """A range with room at its ends; one of no width gets some."""
-    # Differences that doubles barely hold would show as noise over the whole height.
+def _range_with_room(low: float, high: float, part: float) -> tuple[float, float]:
+    """Return a range with room at its ends, in parts of its width; a range without width gets one first."""
+    # Differences near rounding error would show as noise over the whole height.
     width = high - low
     if width <= 1e-6 * max(abs(low), abs(high)):
         width = 0.1 * max(abs(low), abs(high)) or 1.0
@@ -150,7 +168,7 @@ def _widened(low: float, high: float, part: float) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float, about: int) -> list[float]:
-    """Round values within a range."""
+    """Return round values within a range, about so many."""
     step = 10.0 ** math.floor(math.log10((high - low) / about))
     step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (factor * step) <= about)
     first = math.ceil(low / step - 1e-9)

@@ -1,43 +1,135 @@
-"""A drawing as data for a page that turns it: the robot at postures along its task's motion, each with its rates."""
+"""Data of the page's 3-D view: the robot at postures along its task's motion, each with its rates."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
-from ....models import Body, Dimension, FloatArray, Model
+from ....models import Dimension, FloatArray
 from ...units import Units, rate_unit
+from ..pictures.drawing import Drawing, Motion
 from ..pictures.posture import Posture
-from ..pictures.scene import Drawing, Motion
+from ..pictures.style import RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
 
-#: Postures on each side of the one drawn.
+#: Postures on each side of the one found.
 _SIDE = 20
-#: The farthest turn, and the farthest way of a platform corner in parts of the robot's size.
+#: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
-#: Part of the terms of a rate that rounding may leave of it.
+#: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
-#: Of the eye at first, degrees.
+#: Elevation of the eye at first, degrees.
 _ELEVATION = 26.0
-#: From shortening to lengthening: the colours of picture files.
-RATES = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
 
 
-def view_data(drawing: Drawing, rates: FloatArray) -> dict[str, Any]:
-    """Everything that the 3-D view shows, in the case's units, as JSON.
+class PointData(TypedDict):
+    """A named point of the robot and the body that it moves with."""
+
+    name: str
+    body: str
+
+
+class LinkData(TypedDict):
+    """A line between two points, by their indices."""
+
+    ends: list[int]
+    limb: str | None
+    body: str
+
+
+class RowData(TypedDict):
+    """A row of the Jacobian, and the index of the point that joins its limb to the platform."""
+
+    limb: str
+    kind: str
+    at: int | None
+
+
+class MotionData(TypedDict):
+    """A twist with the lines that show it; see :class:`~screwsynth.nlp.output.pictures.drawing.Motion`."""
+
+    words: str
+    twist: list[float]
+    translation: bool
+    line: list[list[float]]
+    path: list[list[float]]
+
+
+class FrameData(TypedDict):
+    """The robot at one posture.
+
+    ``t`` is the time along the motion, ``lengths`` has the limb's length for each row, and a rate below ``noise`` is
+    rounding error.
+    """
+
+    t: float
+    words: str
+    points: list[list[float]]
+    position: list[float]
+    rotation: list[list[float]]
+    directions: list[list[list[float]]]
+    jacobian: list[list[float]]
+    rates: list[float]
+    F: float
+    noise: float
+    lengths: list[float]
+    velocities: list[list[float]]
+
+
+class ViewData(TypedDict):
+    """Everything that the 3-D view shows, in the case's units.
+
+    ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture found.
+    """
+
+    name: str
+    headline: str
+    is_answer: bool
+    unit: str
+    rate_unit: str
+    size: float
+    points: list[PointData]
+    links: list[LinkData]
+    plates: dict[str, list[int]]
+    corners: list[int]
+    rows: list[RowData]
+    directions: list[str]
+    motion: MotionData | None
+    free: list[MotionData]
+    reference: list[list[float]] | None
+    colours: list[str]
+    eye: list[float]
+    zero: int
+    frames: list[FrameData]
+
+
+class _TimedPosture(NamedTuple):
+    """A posture after a time along the motion."""
+
+    t: float
+    posture: Posture
+
+
+class _Travel(NamedTuple):
+    """Postures in order of time, and the index of the one at ``t = 0``."""
+
+    postures: list[_TimedPosture]
+    zero: int
+
+
+def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
+    """Return the data of the 3-D view.
 
     Args:
         drawing: the robot and its motion.
-        rates: (m,) work rates there, as the result has them, to the last bit.
-
-    ``frames`` has one entry for each posture, in order of ``t``; the one at ``zero`` is the drawing itself.
+        rates: (m,) work rates at its posture as the result has them, so that page and result agree to the last bit.
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
-    postures, zero = along(drawing)
+    postures, zero = _travel(drawing)
     return {
         "name": "" if motion is None else motion.name,
         "headline": drawing.headline,
@@ -50,60 +142,60 @@ def view_data(drawing: Drawing, rates: FloatArray) -> dict[str, Any]:
         "plates": {body.value: list(loop) for body, loop in drawing.plates},
         "corners": list(drawing.corners),
         "rows": [
-            {"limb": row.limb, "kind": row.kind.value, "at": _attachment(drawing, row.limb)} for row in drawing.rows
+            {"limb": row.limb, "kind": row.kind.value, "at": drawing.attachment(row.limb)} for row in drawing.rows
         ],
         "directions": [item.name for item in model.scene.directions],
-        "motion": None if motion is None else _motion(motion, units),
-        "free": [_motion(each, units) for each in drawing.free],
+        "motion": None if motion is None else _motion_data(motion, units),
+        "free": [_motion_data(each, units) for each in drawing.free],
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
-        "colours": list(RATES),
+        "colours": list(RATE_COLOURS),
         "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
         "zero": zero,
         "frames": [
-            _frame(drawing, t, posture, rates if k == zero else drawing.rates_at(posture), units)
+            _frame_data(drawing, t, posture, rates if k == zero else drawing.rates_at(posture), units)
             for k, (t, posture) in enumerate(postures)
         ],
     }
 
 
-def along(drawing: Drawing) -> tuple[list[tuple[float, Posture]], int]:
-    """Postures along the motion of a drawing as ``(t, posture)`` in order of ``t``, and the place of ``t = 0``.
+def _travel(drawing: Drawing) -> _Travel:
+    """Return postures along the motion of a drawing.
 
-    It ends earlier where the robot cannot be put together, and has one posture only without a motion.
+    There are fewer where the robot cannot be put together farther on, and only the drawing's own without a motion.
     """
     if drawing.motion is None:
-        return [(0.0, drawing.posture)], 0
-    step = _farthest(drawing) / _SIDE
-    sides: list[list[tuple[float, Posture]]] = []
+        return _Travel([_TimedPosture(0.0, drawing.posture)], 0)
+    step = _largest_time(drawing) / _SIDE
+    sides: list[list[_TimedPosture]] = []
     for sign in (-1, 1):
-        side: list[tuple[float, Posture]] = []
+        side: list[_TimedPosture] = []
         last: Posture | None = drawing.posture
         for k in range(1, _SIDE + 1):
-            # Where loops must close, the nearest posture is the best start; else nothing adds up from the first.
+            # The nearest posture is the best start for closing loops; without loops, no error adds up from the first.
             closes = bool(drawing.model.unknowns)
             start, t = (last, sign * step) if closes else (drawing.posture, sign * step * k)
-            last = None if start is None else drawing.linkage.moved(start, drawing.motion.twist, t)
+            last = None if start is None else drawing.linkage.posture_after(start, drawing.motion.twist, t)
             if last is None:
                 break
-            side.append((sign * step * k, last))
+            side.append(_TimedPosture(sign * step * k, last))
         sides.append(side)
     back, forth = sides
-    return [*reversed(back), (0.0, drawing.posture), *forth], len(back)
+    return _Travel([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
 
 
-def _farthest(drawing: Drawing) -> float:
-    """Largest ``t``: as far as the turn and the way of the corners stay moderate."""
+def _largest_time(drawing: Drawing) -> float:
+    """Return the largest ``t``: until the rotation or the way of a corner reaches its limit."""
     twist = np.zeros(6) if drawing.motion is None else drawing.motion.twist
     turn = float(np.linalg.norm(twist[:3]))
-    way = float(
-        np.max(np.linalg.norm(drawing.velocities, axis=1), initial=float(np.linalg.norm(twist[3:]) * (not turn)))
-    )
+    velocities = drawing.velocities_at(drawing.posture)
+    way = float(np.max(np.linalg.norm(velocities, axis=1), initial=float(np.linalg.norm(twist[3:]) * (not turn))))
     limits = [_TURN / turn] if turn else []
     limits += [_WAY * drawing.size / way] if way else []
     return min(limits, default=1.0)
 
 
-def _frame(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, units: Units) -> dict[str, Any]:
+def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, units: Units) -> FrameData:
+    """Return the data of one posture with its rates (m,)."""
     return {
         "t": t,
         "words": _words(drawing, t, units),
@@ -116,12 +208,12 @@ def _frame(drawing: Drawing, t: float, posture: Posture, rates: FloatArray, unit
         "F": float(rates @ rates),
         "noise": _noise(drawing, posture),
         "lengths": _lengths(drawing, posture),
-        "velocities": _velocities(drawing, posture.points).tolist(),
+        "velocities": drawing.velocities_at(posture).tolist(),
     }
 
 
 def _noise(drawing: Drawing, posture: Posture) -> float:
-    """A rate below this is rounding error: the terms that a rate adds up are so much larger."""
+    """Return the size of a rate below which it is rounding error of the terms that it sums."""
     if drawing.motion is None:
         return 0.0
     terms = np.abs(posture.jacobian) @ np.abs(np.concatenate([drawing.motion.twist[3:], drawing.motion.twist[:3]]))
@@ -129,59 +221,35 @@ def _noise(drawing: Drawing, posture: Posture) -> float:
 
 
 def _words(drawing: Drawing, t: float, units: Units) -> str:
-    """How far the platform has gone, for people."""
+    """Return the platform's displacement in words."""
     if drawing.motion is None or t == 0:
         return "at the pose found" if drawing.is_answer else "at the pose reached"
     omega, v = drawing.motion.twist[:3], drawing.motion.twist[3:]
     turn = float(np.linalg.norm(omega)) * t
     pitch = drawing.motion.pitch
     if math.isinf(pitch):
-        return f"moved {_signed(float(np.linalg.norm(v)) * t)} {units.length} along the axis"
-    turned = f"turned {_signed(units.shown(turn, Dimension.ANGLE))} {units.angle} about the axis"
+        return f"moved {signed_text(float(np.linalg.norm(v)) * t)} {units.length} along the axis"
+    turned = f"turned {signed_text(units.shown(turn, Dimension.ANGLE))} {units.angle} about the axis"
     if abs(pitch * turn) < 1e-9 * drawing.size:
         return turned
-    return f"{turned}, moved {_signed(pitch * turn)} {units.length} along it"
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.3g}".replace("-", "\N{MINUS SIGN}")
-
-
-def _velocities(drawing: Drawing, points: FloatArray) -> FloatArray:
-    if drawing.motion is None:
-        return np.zeros((0, 3))
-    omega, v = drawing.motion.twist[:3], drawing.motion.twist[3:]
-    return np.asarray(v + np.cross(omega, points[list(drawing.corners)]))
+    return f"{turned}, moved {signed_text(pitch * turn)} {units.length} along it"
 
 
 def _lengths(drawing: Drawing, posture: Posture) -> list[float]:
-    """Length of the limb of each row: as the robot measures it, or else that of its lines."""
-    measured: dict[str, float] = {}
+    """Return the length of each row's limb: the robot's own measure of it, or else the length of the limb's lines."""
+    lengths: dict[str, float] = {}
     for start, end, link in drawing.links:
         if link.limb is not None:
             part = float(np.linalg.norm(posture.points[end] - posture.points[start]))
-            measured[link.limb] = measured.get(link.limb, 0.0) + part
+            lengths[link.limb] = lengths.get(link.limb, 0.0) + part
     for item, values in zip(drawing.model.quantities, posture.quantities, strict=True):
         if item.name == "leg_length":
-            measured |= dict(zip(item.owners, map(float, values), strict=True))
-    return [measured.get(limb, 0.0) for limb in _limbs(drawing.model)]
+            lengths |= dict(zip(item.owners, map(float, values), strict=True))
+    return [lengths.get(row.limb, 0.0) for row in drawing.model.wrenches]
 
 
-def _limbs(model: Model) -> list[str]:
-    return [row.limb for row in model.wrenches]
-
-
-def _attachment(drawing: Drawing, limb: str) -> int | None:
-    """Index of the point where a limb meets the platform."""
-    for start, end, link in drawing.links:
-        if link.limb == limb:
-            for index in (end, start):
-                if drawing.model.scene.points[index].body is Body.PLATFORM:
-                    return index
-    return None
-
-
-def _motion(motion: Motion, units: Units) -> dict[str, Any]:
+def _motion_data(motion: Motion, units: Units) -> MotionData:
+    """Return the data of a twist with its words."""
     if math.isinf(motion.pitch):
         words = f"{motion.name}: translation"
     elif abs(motion.pitch) < 1e-9:

@@ -6,7 +6,7 @@ from ...results.regression import CaseCheck
 from ...results.result import result_of
 from ...solver.certified import Certified
 from ...solver.solution import Solution
-from ..pictures.extras import check_library
+from ..pictures.requirements import check_library
 from .report import report_of
 from .webpage import page_of
 

@@ -20,8 +20,8 @@ from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution
-from ..pictures.scene import drawing_of
-from .frames import view_data
+from ..pictures.drawing import drawing_of
+from .frames import ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
 #: So many maps of two variables are made in all: seven free variables have 21 pairs.
@@ -47,7 +47,7 @@ class Part:
     nlp: Nlp
     x: FloatArray
     solution: ProgramSolution
-    view: dict[str, Any] | None
+    view: ViewData | None
     slices: tuple[Slice, ...]
     planes: tuple[Plane, ...]
     pairs: int

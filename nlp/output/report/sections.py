@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from ...case.case import Case
 from ...case.pose import sizes_of_turn
@@ -27,8 +26,9 @@ from ...results.wording import (
     singularity_lines,
     tolerance_line,
 )
+from ..pictures.style import RATE_COLOURS
 from .exploration import around, optima
-from .frames import RATES
+from .frames import ViewData
 from .judgement import certificates, evidence_section, published
 from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Report
@@ -154,8 +154,8 @@ def _robot(report: Report) -> Markup:
     return joined([*content, tag("noscript", tag("p", note))])
 
 
-def _legend(view: dict[str, Any]) -> Markup:
-    gradient = f"background:linear-gradient(90deg,{','.join(RATES)})"
+def _legend(view: ViewData) -> Markup:
+    gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
     words = [
         "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
@@ -170,7 +170,7 @@ def _legend(view: dict[str, Any]) -> Markup:
     return joined([bar, *words])
 
 
-def _rates(view: dict[str, Any]) -> Markup:
+def _rates(view: ViewData) -> Markup:
     """Return the rates of every row at the drawn posture; the script keeps the table in step with the platform."""
     frame = view["frames"][view["zero"]]
     # Where the task's motion is resisted by nothing, what is left is rounding.

@@ -1,4 +1,4 @@
-"""F along lines and planes through a point of a program: what it does beside the optimum, without any solve.
+"""F along lines and planes through a point of a program, by evaluation alone.
 
 A component of a free unit vector cannot move alone: the vector's other components are scaled to keep its length.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,11 +17,11 @@ from ...evidence.kkt import FEASIBLE
 from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
 
-#: Points along a line, and along each side of a plane: odd, so that the middle is one.
+#: Points along a line, and along each side of a plane: odd, so that the middle of the range is among them.
 _LINE, _PLANE = 121, 41
-#: A component of a unit vector whose others are smaller than this has no direction to move in.
+#: Where the other components of a unit vector are smaller than this, no scale of them keeps its length.
 _POLE = 1e-9
-#: How far outside of a limit counts as inside, in parts of the limit's size: what rounding and a solve leave.
+#: Violation of a limit, in parts of the limit's size, that rounding and the end of a solve may leave.
 _WITHIN = max(FEASIBLE, 1e-9)
 
 
@@ -32,7 +33,7 @@ class Slice:
         variable: index in the program.
         values: (k,) of the variable, in the program's units.
         F: (k,) objective; nan where the robot is not defined.
-        inside: (k,) whether every limit is kept.
+        inside: (k,) 1 where every constraint holds, else 0.
     """
 
     variable: int
@@ -50,7 +51,7 @@ class Plane:
         first: (k,) values of the first variable.
         second: (m,) values of the second.
         F: (m, k) objective; nan where the robot is not defined.
-        inside: (m, k) whether every limit is kept.
+        inside: (m, k) 1 where every constraint holds, else 0.
     """
 
     variables: tuple[int, int]
@@ -61,23 +62,23 @@ class Plane:
 
 
 def slices_of(nlp: Nlp, x: FloatArray) -> list[Slice]:
-    """F through a point (n,) along every variable, from bound to bound."""
+    """Return F through a point (n,) along every variable, from bound to bound."""
     found = []
     for k in _movable(nlp):
         values = _range(nlp, k, _LINE, x)
-        F, inside = _values(nlp, _moved(nlp, x, [k], values[None, :]))
+        F, inside = _values(nlp, _points_with(nlp, x, [k], values[None, :]))
         arrays = [frozen_array(each, (len(values),)) for each in (values, F, inside)]
         found.append(Slice(k, *arrays))
     return found
 
 
 def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
-    """F through a point (n,) over pairs of variables, the first ``most`` pairs."""
+    """Return F through a point (n,) over pairs of variables, at most the first ``most`` pairs."""
     found = []
     for i, j in list(combinations(_movable(nlp), 2))[:most]:
         first, second = _range(nlp, i, _PLANE, x), _range(nlp, j, _PLANE, x)
         across, up = np.meshgrid(first, second)
-        F, inside = _values(nlp, _moved(nlp, x, [i, j], np.vstack([across.ravel(), up.ravel()])))
+        F, inside = _values(nlp, _points_with(nlp, x, [i, j], np.vstack([across.ravel(), up.ravel()])))
         shape = (len(second), len(first))
         found.append(
             Plane(
@@ -92,34 +93,44 @@ def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
 
 
 def has_loops(nlp: Nlp) -> bool:
-    """Whether the robot has loops that close only after a solve, so that one variable cannot move alone."""
+    """Return whether the robot has loops: they close at a solution only, so that no variable can move alone."""
     return bool(nlp.program.model.unknowns)
 
 
 def _movable(nlp: Nlp) -> list[int]:
-    """Indices of the variables but the worst pose's level, which follows from the others."""
+    """Return indices of the variables but the epigraph variable, which follows from the others."""
     epigraph = nlp.program.places.epigraph
     return [k for k in range(nlp.n) if epigraph is None or k != epigraph.level]
 
 
 def _range(nlp: Nlp, k: int, count: int, x: FloatArray) -> FloatArray:
-    """Values from bound to bound, the point's own among them."""
+    """Return values of a variable from bound to bound, the point's own among them."""
     lower, upper = nlp.lower[k], nlp.upper[k]
     if any(k in direction for direction in nlp.program.places.directions):
         lower, upper = max(lower, -1.0), min(upper, 1.0)
     return np.unique(np.append(np.linspace(lower, upper, count), np.clip(x[k], lower, upper)))
 
 
-def _moved(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) -> FloatArray:
-    """(n, k) points with some variables replaced, unit vectors kept at unit length; nan where that cannot be."""
+def _points_with(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) -> FloatArray:
+    """Return points (n, k) that differ from a point (n,) in some variables, with unit vectors scaled to unit length.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        changed: indices of the variables.
+        values: (len(changed), k) of these variables.
+
+    Returns:
+        The points; nan where no scale of the other components makes a unit vector.
+    """
     points = np.repeat(x[:, None], values.shape[1], axis=1)
     points[list(changed)] = values
     for direction in nlp.program.places.directions:
-        moved = [k for k in direction if k in changed]
+        own = [k for k in direction if k in changed]
         rest = [k for k in direction if k not in changed]
-        if not moved:
+        if not own:
             continue
-        left = 1.0 - np.sum(points[moved] ** 2, axis=0)
+        left = 1.0 - np.sum(points[own] ** 2, axis=0)
         left[np.abs(left) < _POLE] = 0.0
         length = np.linalg.norm(x[rest])
         if length < _POLE:
@@ -130,19 +141,24 @@ def _moved(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) 
     return points
 
 
-def _values(nlp: Nlp, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """F (k,) at points (n, k), and whether every limit is kept there (k,)."""
+class _Values(NamedTuple):
+    """F (k,), nan where it has no value, and 1 where every constraint holds, else 0, (k,)."""
+
+    F: FloatArray
+    inside: FloatArray
+
+
+def _values(nlp: Nlp, points: FloatArray) -> _Values:
+    """Return F and the constraints' state at points (n, k)."""
     epigraph = nlp.program.places.epigraph
     if epigraph is not None and len(nlp.program.robots) > 1:
         points[epigraph.level] = exact_levels(nlp, points)
     F, g = (each.full() for each in nlp.program.values(points, nlp.arguments))
-    size = np.maximum(1.0, np.maximum(np.abs(_finite(nlp.g_lower)), np.abs(_finite(nlp.g_upper))))
+    # An infinite bound is none, and has no size.
+    bounds = np.nan_to_num(np.abs([nlp.g_lower, nlp.g_upper]), nan=0.0, posinf=0.0)
+    size = np.max(bounds, axis=0, initial=1.0)
     with np.errstate(invalid="ignore"):
         low = g >= (nlp.g_lower - _WITHIN * size)[:, None]
         high = g <= (nlp.g_upper + _WITHIN * size)[:, None]
     values = np.where(np.isfinite(F[0]), F[0], np.nan)
-    return values, np.asarray(np.all(low & high, axis=0) & np.isfinite(values), dtype=np.float64)
-
-
-def _finite(values: FloatArray) -> FloatArray:
-    return np.asarray(np.where(np.isfinite(values), values, 0.0))
+    return _Values(values, np.asarray(np.all(low & high, axis=0) & np.isfinite(values), dtype=np.float64))

@@ -1,15 +1,23 @@
-"""What a picture of a robot shows, in numbers and in true proportion, whatever the robot is and whoever paints it."""
+"""A robot with its task as numbers in true proportion, for any robot and any way to paint it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....models import Body, FloatArray, Link, Model, WrenchKind, axis_from_screw, frozen_array
-from ....models import reciprocal_product as product
+from ....models import (
+    Body,
+    FloatArray,
+    Link,
+    Model,
+    WrenchKind,
+    axis_from_screw,
+    frozen_array,
+    reciprocal_product,
+)
 from ...case.case import Case
 from ...errors import EvaluationError
 from ...evidence.kkt import close_equations
@@ -18,25 +26,32 @@ from ...program.nlp import Nlp
 from ...solver.multistart import state_or_none
 from .posture import Linkage, Posture
 
-#: A path around the axis: at most so many turns, over at most this part of the axis, at this part of the robot's size.
+#: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
 _TURNS = 3.0
 _ALONG = 0.4
 _RADIUS = 0.11
-#: A pitch below this part of the path's radius is drawn as none: a circle, not quite closed, shows the sense.
+#: A pitch below this part of the path's radius shows as a circle; its gap shows the sense of the rotation.
 _NO_PITCH = 0.01
 _OPEN_CIRCLE = math.radians(320)
 _STEP = math.radians(6)
-#: How far the axis goes beyond the robot, in parts of the robot's size.
+#: Length of the axis beyond the robot at each end, in parts of the robot's size.
 _BEYOND = 0.22
-#: A start is another one than the robot when a point of it moved by more than this part of the robot's size.
-_MOVED = 1e-3
+#: Distance of a point, in parts of the robot's size, beyond which the start is another posture than the one shown.
+_OTHER_POSTURE = 1e-3
 #: Points nearer to each other than this part of the robot's size are one corner.
 _SAME_CORNER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class LimbRate:
-    """A row of the Jacobian as the picture shows it: whose it is, its work rate, and its part of F (nan if F is 0)."""
+    """A row of the Jacobian as a picture shows it.
+
+    Attributes:
+        limb: name of the limb that applies the wrench.
+        kind: a force, or a couple.
+        rate: work rate ``L_i ^ chi``.
+        share: part of F, ``rate^2 / F``; nan where F is 0.
+    """
 
     limb: str
     kind: WrenchKind
@@ -46,7 +61,7 @@ class LimbRate:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A twist as a picture shows it.
+    """A twist as a picture shows it, in world coordinates.
 
     Attributes:
         name: a few words.
@@ -68,23 +83,23 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A robot to be drawn.
+    """A robot at one posture, with its task where it has one; world coordinates, lengths in the case's unit.
 
     Attributes:
-        case: where names and units come from; None for a robot without a case.
+        case: the source of names and units; None for a robot without a case.
         model: the robot.
-        linkage: puts the platform elsewhere.
-        posture: where everything is.
+        linkage: gives other postures of the same robot.
+        posture: the posture shown.
         links: straight lines, as indices of two points.
         plates: outlines of base and platform, as indices of points.
         corners: indices of the platform's points that show its velocity, each place once.
         rows: work rates; empty without a motion.
         motion: the task.
-        free: motions that nothing resists.
-        reference: the start, when it is another posture.
+        free: motions that no limb resists.
+        reference: posture at the start; None where it is the one shown.
         size: half of the diagonal of the robot's bounding box, length.
-        headline: what was found, one line.
-        is_answer: whether this is what was asked for, and not merely what was reached.
+        headline: the result in one line.
+        is_answer: whether the solve answers the case, rather than ending at some point.
     """
 
     case: Case | None
@@ -102,62 +117,63 @@ class Drawing:
     headline: str = ""
     is_answer: bool = True
 
-    @property
-    def velocities(self) -> FloatArray:
-        """(k, 3) velocity of each corner, ``v + omega x r``; empty without a motion."""
+    def velocities_at(self, posture: Posture) -> FloatArray:
+        """Return the velocity (k, 3) of each corner at a posture, ``v + omega x r``; empty without a motion."""
         if self.motion is None:
             return np.zeros((0, 3))
         omega, v = self.motion.twist[:3], self.motion.twist[3:]
-        return np.asarray(v + np.cross(omega, self.posture.points[list(self.corners)]))
+        return np.asarray(v + np.cross(omega, posture.points[list(self.corners)]))
+
+    def rates_at(self, posture: Posture) -> FloatArray:
+        """Return the work rates (m,) of the task at a posture; empty without a motion."""
+        return reciprocal_product(posture.jacobian, self.motion.twist) if self.motion is not None else np.zeros(0)
 
     def limb_rates(self) -> dict[str, float]:
-        """Rate by which each limb is coloured: that of its force, or of its couple where it has no force."""
+        """Return the rate that colours each limb: of its force, or of its couple where it applies no force."""
         rates: dict[str, float] = {}
         for row in sorted(self.rows, key=lambda row: row.kind is WrenchKind.FORCE):
             rates[row.limb] = row.rate
         return rates
 
-    def attachment(self, limb: str) -> FloatArray | None:
-        """(3,) point where a limb meets the platform, or None where its lines do not show that."""
+    def attachment(self, limb: str) -> int | None:
+        """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
         for start, end, link in self.links:
             if link.limb == limb:
                 for index in (end, start):
                     if self.model.scene.points[index].body is Body.PLATFORM:
-                        return np.asarray(self.posture.points[index])
+                        return index
         return None
-
-    def rates_at(self, posture: Posture) -> FloatArray:
-        """(m,) work rates of the task with the platform elsewhere."""
-        return product(posture.jacobian, self.motion.twist) if self.motion is not None else np.zeros(0)
 
 
 def drawing_of_model(model: Model) -> Drawing:
-    """A robot with its parameters at typical values and its platform at home, without a task.
+    """Return a robot at its parameters' typical values and its platform's home position, without a task.
 
     Raises:
-        EvaluationError: its equations have no finite value there.
+        EvaluationError: the robot's expressions have no finite value there.
     """
     parameters = np.array([value for item in model.parameters for value in item.typical])
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
     linkage = Linkage(model, parameters)
-    home = linkage.moved(linkage.at(np.eye(3), np.array(model.home), middles), np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
+    guess = linkage.posture_at(np.eye(3), np.array(model.home), middles)
+    # A motion of zero length closes the loops.
+    home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
     if home is None or not np.isfinite(home.points).all():
         raise EvaluationError(f"{model.name}: the robot cannot be put together at its typical values")
-    return _drawing(None, model, linkage, home)
+    return _drawing_without_task(None, model, linkage, home)
 
 
 def drawing_of(
     nlp: Nlp, x: FloatArray, state: RobotState | None, task: int = 0, *, headline: str = "", is_answer: bool = True
 ) -> Drawing:
-    """The robot at a point of a program, with one of its case's tasks.
+    """Return the robot at a point of a program, with one of its case's tasks.
 
     Args:
         nlp: the program of a case.
         x: (n,) the point.
-        state: the robot there.
+        state: the robot there; None where it does not exist.
         task: index of the task in the case.
-        headline: what was found, one line.
-        is_answer: whether it is what was asked for.
+        headline: the result in one line.
+        is_answer: whether the solve answers the case.
 
     Raises:
         EvaluationError: the robot does not exist at the point.
@@ -168,37 +184,30 @@ def drawing_of(
     linkage, posture = _posture(nlp, x, state)
     chosen = case.tasks[task]
     twist = frozen_array(chosen.twist, (6,))
-    rates = product(posture.jacobian, twist)
+    rates = reciprocal_product(posture.jacobian, twist)
     total = 0.0 if state.is_zero else float(rates @ rates)
     shares = rates**2 / total if total else np.full(len(rates), math.nan)
-    drawn = _drawing(case, model, linkage, posture)
-    return Drawing(
-        case=case,
-        model=model,
-        linkage=linkage,
-        posture=posture,
-        links=drawn.links,
-        plates=drawn.plates,
-        corners=drawn.corners,
+    drawing = _drawing_without_task(case, model, linkage, posture)
+    return replace(
+        drawing,
         rows=tuple(
             LimbRate(row.limb, row.kind, float(rate), float(share))
             for row, rate, share in zip(model.wrenches, rates, shares, strict=True)
         ),
-        motion=motion_of_twist(twist, drawn, chosen.name),
-        free=tuple(motion_of_twist(each, drawn, "free motion") for each in state.free_twists),
-        reference=_reference(nlp, posture, drawn.size),
-        size=drawn.size,
+        motion=_motion_of_twist(twist, drawing, chosen.name),
+        free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
+        reference=_reference(nlp, posture, drawing.size),
         headline=headline,
         is_answer=is_answer,
     )
 
 
-def motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
-    """A twist laid out beside a robot: its axis as long as the robot, and a path of its pitch."""
+def _motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
+    """Return a twist (6,) as lines beside a robot: an axis as long as the robot, and a path of the twist's pitch."""
     screw = axis_from_screw(twist)
     s, size = screw.axis, drawing.size
     if math.isinf(screw.pitch):
-        # A translation has no place of its own: it is drawn at the platform.
+        # A translation has a direction but no line: the platform is a place to show it.
         ends = drawing.posture.position + np.outer([0.0, 0.8 * size], s)
         return Motion(name, frozen_array(twist, (6,)), s, math.inf, frozen_array(ends, (2, 3)), np.zeros((0, 3)))
     reach = (drawing.posture.points - screw.point) @ s
@@ -221,15 +230,16 @@ def motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
 
 
 def _posture(nlp: Nlp, x: FloatArray, state: RobotState) -> tuple[Linkage, Posture]:
+    """Return the linkage and the posture of a program's robot at a point (n,), at its first pose."""
     model = nlp.program.model
     parameters = np.array([value for item in model.parameters for value in state.parameters[item.name]])
     unknowns = x[list(nlp.program.places.unknowns[0])]
     linkage = Linkage(model, parameters, nlp.case.characteristic_length)
-    return linkage, linkage.at(state.rotation, state.position, unknowns)
+    return linkage, linkage.posture_at(state.rotation, state.position, unknowns)
 
 
 def _reference(nlp: Nlp, posture: Posture, size: float) -> Posture | None:
-    """The start, where it is another posture than the one drawn."""
+    """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
     if nlp.n == 0:
         return None
     x = close_equations(nlp, nlp.start)
@@ -237,12 +247,12 @@ def _reference(nlp: Nlp, posture: Posture, size: float) -> Posture | None:
     if state is None:
         return None
     start = _posture(nlp, x, state)[1]
-    moved = np.max(np.abs(start.points - posture.points), initial=0.0) > _MOVED * size
-    return start if moved and np.isfinite(start.points).all() else None
+    is_other = np.max(np.abs(start.points - posture.points), initial=0.0) > _OTHER_POSTURE * size
+    return start if is_other and np.isfinite(start.points).all() else None
 
 
-def _drawing(case: Case | None, model: Model, linkage: Linkage, posture: Posture) -> Drawing:
-    """What is drawn of a robot without a task."""
+def _drawing_without_task(case: Case | None, model: Model, linkage: Linkage, posture: Posture) -> Drawing:
+    """Return a robot's lines, outlines, corners and size at a posture."""
     names = [point.name for point in model.scene.points]
     links = tuple((names.index(link.start), names.index(link.end), link) for link in model.scene.links)
     plates = tuple((body, loop) for body in (Body.BASE, Body.PLATFORM) if (loop := _loop(links, body)))
@@ -259,7 +269,7 @@ def _drawing(case: Case | None, model: Model, linkage: Linkage, posture: Posture
 
 
 def _loop(links: Sequence[tuple[int, int, Link]], body: Body) -> tuple[int, ...]:
-    """Indices of the points around a body's outline, or none where its lines do not close to one loop."""
+    """Return indices of the points around a body's outline; none where the body's lines are not one closed loop."""
     following = {start: end for start, end, link in links if link.body is body}
     if len(following) < 3:
         return ()

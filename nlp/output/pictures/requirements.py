@@ -1,4 +1,4 @@
-"""Libraries that only pictures need: whether they are there is found out before the work begins."""
+"""Conditions for pictures and pages, checked before the computation begins: kinds of files, installed libraries."""
 
 from __future__ import annotations
 
@@ -11,22 +11,31 @@ from ...errors import InputError
 PICTURES = (".png", ".svg", ".pdf")
 
 
+def ending_of(target: str) -> str:
+    """Return the ending of a file's name, in small letters."""
+    return PurePath(target).suffix.lower()
+
+
 def check_picture(target: str) -> None:
-    """See that a picture can be drawn and that its name says which kind it is.
+    """Check that the name of a picture says its kind, and that Matplotlib is installed.
 
     Raises:
         InputError: the ending is another one, or Matplotlib is not installed.
     """
-    if PurePath(target).suffix.lower() not in PICTURES:
+    if ending_of(target) not in PICTURES:
         raise InputError(f"{target}: cannot be drawn: a picture's name ends in .png, .svg or .pdf")
     check_library("matplotlib", "pictures")
 
 
 def check_library(name: str, purpose: str) -> None:
-    """See that a library of the extra ``plots`` is installed.
+    """Check that a library of the extra ``plots`` is installed.
+
+    Args:
+        name: of the library.
+        purpose: the outputs that need it, a plural for the message.
 
     Raises:
-        InputError: it is not.
+        InputError: the library is not installed.
     """
     if find_spec(name) is None:
         raise InputError(f"{purpose} need {name}, which is not installed: pip install 'screwsynth[plots]'")

@@ -1,38 +1,38 @@
-"""From what was found to its drawings: one of a solution, one for each task of a compromise."""
+"""Drawings of a solution: one for a single task, one for each task of a compromise."""
 
 from __future__ import annotations
 
 from ...case.task import Sense
 from ...solver.multistart import ProgramSolution, Status
 from ...solver.solution import Solution
-from .scene import Drawing, drawing_of
+from .drawing import Drawing, drawing_of
 
 
 def drawings_of(found: Solution) -> list[Drawing]:
-    """The robot with its task, or at the combined point with each of several tasks; at the first of several poses.
+    """Return the robot with its task, or at the combined point with each of several tasks; at the first of its poses.
 
     Raises:
         EvaluationError: the robot does not exist at the point reached.
     """
     if found.combination is None:
-        said = _headline(found.outcomes[0].own)
-        return [drawing_of(found.nlp, found.x, found.state, headline=said, is_answer=found.status.is_answer)]
+        headline = _headline(found.outcomes[0].own)
+        return [drawing_of(found.nlp, found.x, found.state, headline=headline, is_answer=found.status.is_answer)]
     method = found.combination.method.value
     drawings = []
     for task, outcome in enumerate(found.outcomes):
         if found.is_made:
-            said = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
+            headline = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
         else:
-            said = f"{found.status.value}: this is not what was asked for"
+            headline = f"{found.status.value}: this is not what was asked for"
         drawing = drawing_of(
-            outcome.own.nlp, found.x, outcome.state, task, headline=said, is_answer=found.status.is_answer
+            outcome.own.nlp, found.x, outcome.state, task, headline=headline, is_answer=found.status.is_answer
         )
         drawings.append(drawing)
     return drawings
 
 
 def _headline(solution: ProgramSolution) -> str:
-    """What was found, in a line."""
+    """Return the result in one line."""
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"
     value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F

@@ -1,0 +1,103 @@
+"""Lines, arrows and words on Matplotlib axes, from points in the world and a parallel projection."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+
+from ....models import FloatArray
+from .labels import Label, place_labels
+from .view import View
+
+INK, MUTED, FAINT, RED = "#17212b", "#55616c", "#b9c1c9", "#a3250f"
+#: A colour in Matplotlib's terms.
+Colour: TypeAlias = str | tuple[float, float, float, float]
+#: Room around everything drawn, in parts of the larger side.
+_MARGIN = 0.07
+
+
+class Canvas:
+    """Axes in parallel projection. Words are placed at the end, where they cover no line and no other word.
+
+    Args:
+        axes: empty.
+        view: the projection.
+        centre: (3,) point from whose place on paper words should lie away.
+    """
+
+    def __init__(self, axes: Axes, view: View, centre: FloatArray) -> None:
+        self.view = view
+        self._axes = axes
+        self._centre = view.project(centre)
+        self._labels: list[Label] = []
+        self._covered: list[FloatArray] = []
+        axes.set_axis_off()
+        axes.set_aspect("equal", adjustable="box")
+
+    def line(self, points: FloatArray, name: str, **style: Any) -> Line2D:  # noqa: ANN401 - Matplotlib's own words
+        """Draw a line through points (k, 3) and keep it free of words."""
+        flat = self.view.project(points)
+        (line,) = self._axes.plot(flat[:, 0], flat[:, 1], gid=name, **{"solid_capstyle": "round", **style})
+        self.keep_free(points)
+        return line
+
+    def polygon(self, points: FloatArray, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
+        """Draw a filled polygon with corners (k, 3); words may cover it."""
+        self._axes.add_patch(Polygon(self.view.project(points), **style))
+
+    def marker(self, point: FloatArray, name: str, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
+        """Draw a round marker at a point (3,); words may cover it."""
+        x, y = self.view.project(point)
+        self._axes.plot([x], [y], marker="o", linestyle="none", gid=name, **style)
+
+    def arrow(self, start: FloatArray, end: FloatArray, name: str, colour: Colour, width: float, zorder: float) -> None:
+        """Draw an arrow between two points (3,); towards the eye it is only its head."""
+        a, b = self.view.project(start), self.view.project(end)
+        style: dict[str, Any] = {
+            "arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"
+        }
+        style |= {"color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
+        self._axes.annotate("", tuple(b), tuple(a), arrowprops=style, zorder=zorder, gid=name, annotation_clip=False)
+        self.keep_free(np.array([start, end]))
+
+    def label(
+        self, text: str, at: FloatArray, away: FloatArray, colour: str = INK, size: float = 9.0, *, bold: bool = False
+    ) -> None:
+        """Ask for a word beside a point (3,), preferably in a direction (2,) on paper."""
+        length = float(np.linalg.norm(away))
+        self._labels.append(
+            Label(text, self.view.project(at), away / length if length else away, colour, size, bold, f"label {text}")
+        )
+
+    def outwards(self, at: FloatArray) -> FloatArray:
+        """Return the direction (2,) on paper from the centre to a point (3,)."""
+        return np.asarray(self.view.project(at) - self._centre)
+
+    def keep_free(self, points: FloatArray) -> None:
+        """Keep a line through points (k, 3) free of words, and within the limits of the axes."""
+        flat = self.view.project(points)
+        for a, b in pairwise(flat):
+            self._covered.append(a + np.linspace(0, 1, 12)[:, None] * (b - a))
+        self._covered.append(flat[-1:])
+
+    def fit_limits(self) -> None:
+        """Set the limits of the axes around everything drawn, with room for words, in the proportion of the panel."""
+        flat = np.vstack(self._covered)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        half = (high - low) / 2 + _MARGIN * float(np.max(high - low))
+        panel = self._axes.get_window_extent()
+        unit = max(half[0] / panel.width, half[1] / panel.height)
+        middle, half = (low + high) / 2, unit * np.array([panel.width, panel.height])
+        self._axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+        self._axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+
+    def write_labels(self, renderer: RendererAgg) -> None:
+        """Write the words, once the axes have their final place."""
+        self._axes.apply_aspect()
+        place_labels(self._axes, renderer, self._labels, np.vstack(self._covered))

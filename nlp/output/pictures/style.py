@@ -1,0 +1,11 @@
+"""Colours and numbers that look the same in picture files and on pages."""
+
+from __future__ import annotations
+
+#: Blue shortens, grey stays, orange lengthens: distinct with any colour blindness, and never as light as paper.
+RATE_COLOURS = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
+
+
+def signed_text(value: float) -> str:
+    """Return a number with its sign and three digits, for people."""
+    return f"{value:+.3g}".replace("-", "\N{MINUS SIGN}")
