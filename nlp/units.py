@@ -36,6 +36,15 @@ class Units:
         """
         return float(f"{math.degrees(value):.15g}") if self._is_degrees(dimension) else float(value)
 
+    def per_unit(self, derivative: float, dimension: Dimension) -> float:
+        """Return a derivative with respect to a number of a computation as that with respect to it in the case's unit.
+
+        Args:
+            derivative: per radian for an angle.
+            dimension: dimension of the number.
+        """
+        return derivative * self.to_internal(1.0, dimension)
+
     def label(self, dimension: Dimension) -> str:
         """Return the label of the unit; an empty one for a plain number."""
         return {Dimension.LENGTH: self.length, Dimension.ANGLE: self.angle, Dimension.NUMBER: ""}[dimension]

@@ -1,1 +1,1 @@
-"""A case: what is asked, as values, and from a file."""
+"""A case: a synthesis problem as values, and from a file."""

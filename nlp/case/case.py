@@ -1,7 +1,7 @@
-"""A case: a robot, what is fixed and what is free, and the motion its platform must make.
+"""A case: a robot, fixed and free numbers, and the motions that the platform must make.
 
-This is what a case file becomes, and what a program builds directly. Angles are radians here. A :class:`Case` checks
-itself once, in the words of a case file, so everything behind it can rely on it.
+A case file becomes a :class:`Case`, and a program can build one directly. Angles are radians here. A case checks itself
+once, in the words of a case file, so that every other module can rely on it.
 """
 
 from __future__ import annotations
@@ -10,21 +10,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ..errors import CaseError, nearest
 from ..units import Units
+from .checks import check_direction, check_value
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
+from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
 from .task import Method, Sense, Task
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +37,20 @@ class Case:
         rotation: orientation of the platform.
         tasks: the motions.
         units: units for people.
-        characteristic_length: what one unit couple counts for beside unit forces, length; matters only for robots with
-            constraint couples.
-        limits: what a design must keep to be built.
-        displacements: of the pose above, one for each pose that the robot takes.
-        further: other poses, with their displacements. The robot's dimensions are the same at all of them.
-        over_poses: what F is over several poses.
-        joint_centre_tolerance: how far off a joint centre may be built, length; None leaves it out.
-        search: how the solver searches.
-        method: how several tasks are brought together; the average is equation 15.
-        title, name: for people; the name is the file's.
-        expect: what a regression holds the case to.
-        published: what the literature prints.
-        source: name of the file it was read from, for messages.
+        characteristic_length: length by which unit couples are multiplied to count beside unit forces; it has an effect
+            only on robots with constraint couples.
+        limits: limits that a design must keep to be built.
+        displacements: displacements of the pose above, one for each pose that the robot takes.
+        further: other stated poses, with their displacements. The robot's dimensions are the same at all poses.
+        over_poses: combination of F over several poses.
+        joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
+        search: settings of the search.
+        method: method that combines several tasks; the average is equation 15.
+        title: one line for people.
+        name: the file's name.
+        expect: expected values, for regressions.
+        published: numbers that the literature prints.
+        source: name of the case's file, for messages.
 
     Raises:
         CaseError: a value is missing, unknown, not finite, out of its range, or crossed; the key is in the words of a
@@ -79,63 +78,63 @@ class Case:
     source: str | None = None
 
     def __post_init__(self) -> None:
-        settle = object.__setattr__
-        settle(self, "parameters", MappingProxyType(_parameters(self)))
-        settle(self, "position", _position(self, self.position, "pose"))
-        settle(self, "rotation", _rotation(self, self.rotation, "pose"))
-        settle(self, "further", _further(self))
-        settle(self, "tasks", _tasks(self))
+        store = object.__setattr__
+        store(self, "parameters", MappingProxyType(_check_parameters(self)))
+        store(self, "position", _check_position(self, self.position, "pose"))
+        store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
+        store(self, "further", _check_further_poses(self))
+        store(self, "tasks", _check_tasks(self))
         self.limits.check(self.as_limited)
         _check_tolerance(self)
         if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
     def components(self, name: str) -> tuple[Value, ...]:
-        """Values of a parameter, component by component."""
+        """Return the values of a parameter's components.
+
+        Args:
+            name: the name that the robot gives the parameter.
+        """
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
-    def component_names(self, parameter: Parameter) -> tuple[str, ...]:
-        """Names of a parameter's components in this case.
+    def parameter_name(self, name: str) -> str:
+        """Return the name of a parameter, or of one of its components, in this case; see :mod:`.names`.
 
-        A robot may call its parameters what it likes. One that has the name of a number of the pose, such as ``p_x``,
-        is written ``robot.p_x``.
+        Args:
+            name: the name that the robot gives it.
         """
-        return tuple(f"robot.{name}" if name in self._pose_names else name for name in parameter.components)
+        return parameter_name(name, len(self.poses))
 
-    @property
-    def _pose_names(self) -> frozenset[str]:
-        """Names of the poses' numbers."""
-        return frozenset(
-            f"{prefix}{part}" for prefix in self.pose_prefixes for part in (*component_names("p", 3), "angle", "axis")
-        )
+    def component_names(self, parameter: Parameter) -> tuple[str, ...]:
+        """Return the names of a parameter's components in this case."""
+        return tuple(self.parameter_name(name) for name in parameter.components)
 
     @property
     def axis(self) -> FloatArray | None:
-        """Held axis of rotation, (3,) unit, or None when it is free."""
+        """Axis of rotation that is held fixed, (3,) unit; None where the axis is free."""
         return None if self.rotation.axis is None else frozen_array(self.rotation.axis, (3,))
 
     @property
     def poses(self) -> tuple[Pose, ...]:
-        """The poses as they are stated, each with its displacements."""
+        """The stated poses, each with its displacements."""
         return (Pose(self.position, self.rotation, self.displacements), *self.further)
 
     @property
     def pose_count(self) -> int:
-        """How many poses the robot takes."""
+        """Number of poses that the robot takes."""
         return sum(len(pose.displacements) for pose in self.poses)
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
-        """What stands before the names of each stated pose's numbers: nothing for a single one."""
-        count = 1 + len(self.further)
-        return ("",) if count == 1 else tuple(f"pose{k + 1}_" for k in range(count))
+        """Prefix of the names of each stated pose's numbers; an empty one for a single pose."""
+        return pose_prefixes(len(self.poses))
 
     @property
     def scalars(self) -> Mapping[str, Dimension]:
-        """Names of the case's own numbers, which ``limits.custom`` may relate, with what they measure.
+        """Names of the case's own numbers, which ``limits.custom`` may relate, with the dimension of each.
 
-        In this order: components of the parameters; then position and, where its axis is held, angle of each pose.
+        Their order: components of the parameters; then position and, where its axis is held fixed, angle of each pose.
         """
         names = {part: item.dimension for item in self.model.parameters for part in self.component_names(item)}
         for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
@@ -146,110 +145,130 @@ class Case:
 
     @property
     def as_limited(self) -> LimitedCase:
-        """The case as far as its limits read it."""
+        """The part of the case that its limits read."""
         return LimitedCase(self.model, self.units, self.scalars)
 
 
-def _parameters(case: Case) -> dict[str, tuple[Value, ...]]:
+def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
+    """Return the components of every parameter in the model's order, a fixed direction as a unit vector.
+
+    Raises:
+        CaseError: a parameter is unknown or missing, or a value is not allowed.
+    """
     known = {parameter.name: parameter for parameter in case.model.parameters}
     for name in case.parameters:
         if name not in known:
             raise CaseError(f"robot.parameters.{name}", f"no such parameter; {nearest(name, known)}")
-    settled: dict[str, tuple[Value, ...]] = {}
+    components: dict[str, tuple[Value, ...]] = {}
     for name, parameter in known.items():
         key = f"robot.parameters.{name}"
         if name not in case.parameters:
-            raise CaseError(key, f"is missing: {parameter.description}, {_expected(parameter)}")
+            raise CaseError(key, f"is missing: {parameter.description}, {_allowed_form(parameter)}")
         given = case.parameters[name]
         values = tuple(given) if isinstance(given, Sequence) else (given,)
         if len(values) != len(parameter.typical):
-            raise CaseError(key, f"must be {_expected(parameter)}")
+            raise CaseError(key, f"must be {_allowed_form(parameter)}")
         if parameter.is_direction and not any(isinstance(value, Free) for value in values):
-            settled[name] = tuple(float(part) for part in _unit(values, key))
+            components[name] = tuple(float(part) for part in unit_vector(check_direction(values, key)))
             continue
-        settled[name] = tuple(
-            _checked(
-                value,
-                key if len(values) == 1 else f"{key}[{index}]",
-                parameter.dimension,
-                case.units,
-                (parameter.lower, parameter.upper),
-            )
-            for index, value in enumerate(values)
+        keys = [key] if len(values) == 1 else [f"{key}[{index}]" for index in range(len(values))]
+        domain = (parameter.lower, parameter.upper)
+        components[name] = tuple(
+            check_value(value, place, parameter.dimension, case.units, domain)
+            for value, place in zip(values, keys, strict=True)
         )
-    return settled
+    return components
 
 
-def _expected(parameter: Parameter) -> str:
+def _allowed_form(parameter: Parameter) -> str:
+    """Return the form of a parameter's value in a case file, for messages."""
     one = "a number or { min, max }"
     return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
 
 
-def _position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
+def _check_position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
+    """Return the position of a stated pose.
+
+    Args:
+        case: the case, for its units.
+        position: the position.
+        pose: dotted key of the pose, for messages.
+
+    Raises:
+        CaseError: there are not three numbers, or one is not allowed.
+    """
     if len(position) != 3:
         raise CaseError(f"{pose}.position", "must be a list of 3, each a number or { min, max }")
     return tuple(
-        _checked(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
+        check_value(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
         for index, value in enumerate(position)
     )
 
 
-def _further(case: Case) -> tuple[Pose, ...]:
-    keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
-    settled = [
-        Pose(_position(case, pose.position, key), _rotation(case, pose.rotation, key), tuple(pose.displacements))
-        for pose, key in zip(case.further, keys, strict=True)
-    ]
-    displacements = [case.displacements, *(pose.displacements for pose in settled)]
-    for key, own in zip(["pose", *keys], displacements, strict=True):
-        if not own:
-            raise CaseError(key, "must have at least one pose")
-    if sum(map(len, displacements)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
-        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
-    return tuple(settled)
+def _check_rotation(case: Case, given: Rotation, pose: str) -> Rotation:
+    """Return the rotation of a stated pose, an axis that is held fixed as a unit vector.
 
+    Args:
+        case: the case, for its units.
+        given: the rotation.
+        pose: dotted key of the pose, for messages.
 
-def _check_tolerance(case: Case) -> None:
-    tolerance = case.joint_centre_tolerance
-    if tolerance is not None and not (0 < tolerance <= LARGEST):
-        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
-    if tolerance is not None and (not case.model.built or case.model.unknowns):
-        raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")
-
-
-def _rotation(case: Case, given: Rotation, pose: str) -> Rotation:
+    Raises:
+        CaseError: the angle is too large, its bounds have no meaning about a free axis, or the axis is zero.
+    """
     key = f"{pose}.rotation.angle"
     if given.axis is None:
-        limit, why = MAX_FREE_ROTATION, "with the axis free"
+        largest, why = MAX_FREE_ROTATION, "with the axis free"
     else:
-        limit, why = 2 * math.pi, "with the axis held"
-    angle = _checked(given.angle, key, Dimension.ANGLE, case.units)
+        largest, why = 2 * math.pi, "with the axis held"
+    angle = check_value(given.angle, key, Dimension.ANGLE, case.units)
     ends = {f"{key}.min": angle.lower, f"{key}.max": angle.upper} if isinstance(angle, Free) else {key: angle}
     for place, end in ends.items():
-        if abs(end) > limit:
-            allowed = case.units.text(limit, Dimension.ANGLE)
+        if abs(end) > largest:
+            allowed = case.units.text(largest, Dimension.ANGLE)
             raise CaseError(place, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
     lopsided = isinstance(angle, Free) and angle.lower < 0 < angle.upper and not math.isclose(-angle.lower, angle.upper)
     if given.axis is None and isinstance(angle, Free) and lopsided:
         fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
         raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
-    axis = None if given.axis is None else _unit(given.axis, f"{pose}.rotation.axis")
+    axis = None if given.axis is None else unit_vector(check_direction(given.axis, f"{pose}.rotation.axis"))
     return Rotation(axis, angle)
 
 
-def _unit(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
-    vector: FloatArray = np.array(values, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise CaseError(key, "must be three finite numbers")
-    if not vector.any():
-        raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
-    return unit_vector(vector)
+def _check_further_poses(case: Case) -> tuple[Pose, ...]:
+    """Return the stated poses behind the first.
+
+    Raises:
+        CaseError: a number of them is not allowed, a pose has no displacement, or F is to be the worst over poses in a
+            case with several tasks.
+    """
+    keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
+    poses = tuple(
+        Pose(
+            _check_position(case, pose.position, key),
+            _check_rotation(case, pose.rotation, key),
+            tuple(pose.displacements),
+        )
+        for pose, key in zip(case.further, keys, strict=True)
+    )
+    displacements = [case.displacements, *(pose.displacements for pose in poses)]
+    for key, own in zip(["pose", *keys], displacements, strict=True):
+        if not own:
+            raise CaseError(key, "must have at least one pose")
+    if sum(map(len, displacements)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
+        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
+    return poses
 
 
-def _tasks(case: Case) -> tuple[Task, ...]:
+def _check_tasks(case: Case) -> tuple[Task, ...]:
+    """Return the tasks, their twists as arrays (6,).
+
+    Raises:
+        CaseError: there is no task, a twist or weight is not allowed, or two tasks have one name.
+    """
     if not case.tasks:
         raise CaseError("task", "is missing: a case needs at least one [[task]]")
-    settled = []
+    tasks = []
     for index, task in enumerate(case.tasks):
         key = f"task[{index}]"
         twist = np.array(task.twist, dtype=np.float64)
@@ -263,53 +282,24 @@ def _tasks(case: Case) -> tuple[Task, ...]:
             raise CaseError(f"{key}.twist", fault)
         if not (math.isfinite(task.weight) and task.weight > 0):
             raise CaseError(f"{key}.weight", "must be positive", task.weight)
-        settled.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight)))
-    names = [task.name for task in settled]
+        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight)))
+    names = [task.name for task in tasks]
     for index, name in enumerate(names):
         if name in names[:index]:
             raise CaseError(f"task[{index}].name", "is used by an earlier task", name)
-    return tuple(settled)
+    return tuple(tasks)
 
 
-def _checked(
-    value: Value,
-    key: str,
-    dimension: Dimension,
-    units: Units,
-    domain: tuple[float, float] = (-math.inf, math.inf),
-) -> Value:
-    """The value, once it is finite, not crossed and inside the domain."""
-    if not isinstance(value, Free):
-        return _number(value, key, dimension, units, domain)
-    lower = _number(value.lower, f"{key}.min", dimension, units, domain)
-    upper = _number(value.upper, f"{key}.max", dimension, units, domain)
-    if not lower < upper:
-        raise CaseError(
-            f"{key}.min",
-            f"must be below max = {units.text(upper, dimension)}; a fixed value is a number alone",
-            units.shown(lower, dimension),
-        )
-    start = None if value.start is None else _number(value.start, f"{key}.start", dimension, units, (lower, upper))
-    return Free(lower, upper, start)
+def _check_tolerance(case: Case) -> None:
+    """Refuse a tolerance that is not positive, or that has no meaning for the robot.
 
-
-def _number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise CaseError(key, "must be finite", number)
-    if abs(number) > LARGEST:
-        raise CaseError(key, f"must be at most {LARGEST:g} in size", number)
-    lower, upper = domain
-    # A bound written in degrees may differ from the same bound in radians by rounding.
-    slack = 1e-12 * max(1.0, abs(number))
-    if not lower - slack <= number <= upper + slack:
-        ends = [units.text(end, dimension) for end in domain]
-        allowed = (
-            f"at least {ends[0]}"
-            if math.isinf(upper)
-            else f"at most {ends[1]}"
-            if math.isinf(lower)
-            else f"between {ends[0]} and {ends[1]}"
-        )
-        raise CaseError(key, f"must be {allowed}", units.shown(number, dimension))
-    return min(max(number, lower), upper)
+    Raises:
+        CaseError: it is refused.
+    """
+    tolerance = case.joint_centre_tolerance
+    if tolerance is None:
+        return
+    if not 0 < tolerance <= LARGEST:
+        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
+    if not case.model.built or case.model.unknowns:
+        raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")

@@ -14,15 +14,15 @@ from .pose import HERE, along_screw, over_grid
 from .schema import AlongTable, GridTable, OffsetsTable, PoseTable
 from .task import Task
 
-#: Poses of one stated pose, beyond which a program would be too large to solve while one waits.
+#: Largest number of poses from one stated pose: a larger program takes too long to solve.
 _MOST = 200
 
 
-def displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
+def read_displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
     """Return the displacements of a stated pose, one for each pose that the robot takes.
 
     Args:
-        written: the pose's table.
+        written: the table of the pose.
         tasks: the case's tasks.
         units: the file's units.
         key: dotted key of the table, for messages.
@@ -33,11 +33,12 @@ def displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: 
     if written.along_task is not None and written.grid is not None:
         raise CaseError(f"{key}.grid", "cannot stand beside along_task; write two poses")
     if written.along_task is not None:
-        return _along(written.along_task, tasks, units, f"{key}.along_task")
-    return (HERE,) if written.grid is None else _grid(written.grid, f"{key}.grid")
+        return _read_trajectory(written.along_task, tasks, units, f"{key}.along_task")
+    return (HERE,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
 
 
-def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
+def _read_trajectory(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
+    """Return the displacements along a task's screw motion; the errors are those of :func:`read_displacements`."""
     names = [task.name for task in tasks]
     if written.task is None and len(tasks) > 1:
         raise CaseError(f"{key}.task", f"is missing: there are several tasks, {listing(names)}")
@@ -53,9 +54,11 @@ def _along(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -
     return along_screw(twist, [float(each) for each in np.linspace(first, last, written.count)])
 
 
-def _grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
+def _read_grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
+    """Return the displacements over a grid; the errors are those of :func:`read_displacements`."""
     offsets = [
-        _offsets(axis, f"{key}.{name}") for name, axis in zip("xyz", (written.x, written.y, written.z), strict=True)
+        _read_offsets(axis, f"{key}.{name}")
+        for name, axis in zip("xyz", (written.x, written.y, written.z), strict=True)
     ]
     count = math.prod(map(len, offsets))
     if count == 1:
@@ -65,7 +68,12 @@ def _grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
     return over_grid(offsets)
 
 
-def _offsets(written: OffsetsTable | None, key: str) -> list[float]:
+def _read_offsets(written: OffsetsTable | None, key: str) -> list[float]:
+    """Return the offsets along one axis, a single 0 where none are stated.
+
+    Raises:
+        CaseError: the first is not below the last.
+    """
     if written is None:
         return [0.0]
     if not written.min < written.max:

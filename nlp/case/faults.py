@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic_core import ErrorDetails
 
 from ..errors import CaseError
 
-#: What pydantic puts into the path of a fault for the branch of a union; no key of a file.
+#: Parts of a fault's path that stand for branches of a union, and are no keys of a file.
 _TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
 
 
-def _case_error(fault: ErrorDetails) -> CaseError:
+def case_error(fault: ErrorDetails) -> CaseError:
+    """Return a fault as an error with a dotted key and a sentence."""
     context = fault.get("ctx", {})
     location = [*fault["loc"], *([context["key"]] if "key" in context else [])]
     value = fault["input"]
@@ -23,7 +24,7 @@ def _case_error(fault: ErrorDetails) -> CaseError:
 
 
 def dotted_key(location: list[int | str]) -> str:
-    """``robot.parameters.x4.min`` or ``pose.position[0]`` from a path into the document."""
+    """Return a path into the document as a key, such as ``robot.parameters.x4.min`` or ``pose.position[0]``."""
 
     def parts() -> Iterator[str]:
         for part in location:
@@ -35,6 +36,7 @@ def dotted_key(location: list[int | str]) -> str:
     return "".join(parts()).lstrip(".") or "the file"
 
 
+#: Sentences for faults of a type, whatever the key.
 _KINDS = {
     "model_type": "must be a table",
     "dict_type": "must be a table",
@@ -46,9 +48,7 @@ _KINDS = {
     "finite_number": "must be finite",
     "string_too_short": "must not be empty",
 }
-
-
-#: What stands at keys whose type alone would say too little.
+#: Sentences for keys whose type alone would say too little.
 _FORMS = {
     "axis": "must be a list of 3 numbers",
     "point": "must be a list of 3 numbers",
@@ -59,8 +59,13 @@ _FORMS = {
 }
 
 
-def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
-    """What pydantic found, as the second half of a sentence whose first half is the key."""
+def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
+    """Return the second half of a sentence about a fault; its first half is the key.
+
+    Args:
+        fault: the fault.
+        context: its context, as pydantic returns it.
+    """
     key = str(fault["loc"][-1]) if fault["loc"] else ""
     match fault["type"]:
         case "unknown_key" | "reason":
@@ -70,9 +75,9 @@ def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
         case "list_type" if key in _FORMS:
             sentence = _FORMS[key]
         case "float_type":
-            sentence = _number_wanted(fault)
+            sentence = _sentence_of_number(fault)
         case "missing":
-            sentence = _missing(key, fault["input"])
+            sentence = _sentence_of_missing_key(key, fault["input"])
         case "too_short" | "too_long" as kind:
             limit = context["min_length"] if kind == "too_short" else context["max_length"]
             few = "at least " if kind == "too_short" and limit == 1 else ""
@@ -82,12 +87,14 @@ def _sentence(fault: ErrorDetails, context: dict[str, Any]) -> str:
     return sentence
 
 
-def _missing(key: str, table: object) -> str:
+def _sentence_of_missing_key(key: str, table: object) -> str:
+    """Return the sentence for a key that is missing, with the key of the table that may be meant."""
     close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
     return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
 
 
-def _number_wanted(fault: ErrorDetails) -> str:
+def _sentence_of_number(fault: ErrorDetails) -> str:
+    """Return the sentence for a value that is no number."""
     location = fault["loc"]
     if location[-1] == "pitch":
         return "must be a number, or inf without quotes"

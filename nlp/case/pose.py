@@ -1,4 +1,4 @@
-"""Poses of a case: numbers that are fixed or free, rotations, displacements. Angles are radians."""
+"""Poses of a case: fixed and free numbers, rotations, displacements. Angles are radians."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-#: With the axis free the rotation is written by a quaternion's vector part, which is smooth below half a turn only.
+#: Largest angle of a rotation about a free axis. Its variables are a quaternion's vector part, which is a smooth
+#: function of the rotation below half a turn only.
 MAX_FREE_ROTATION = math.radians(179)
-
-
-#: No number of a case may be larger, and no twist smaller than its inverse: squares and fourth powers stay finite.
+#: Largest number of a case, and the inverse of the smallest twist: squares and fourth powers stay finite.
 LARGEST = 1e30
 
 
@@ -31,7 +30,7 @@ class Free:
 
     Attributes:
         lower, upper: finite bounds, ``lower < upper``.
-        start: where the first search begins; the middle when left out.
+        start: value at the first starting point; None for the middle.
     """
 
     lower: float
@@ -40,7 +39,7 @@ class Free:
 
     @property
     def first(self) -> float:
-        """Where the first search begins."""
+        """Value at the first starting point."""
         return (self.lower + self.upper) / 2 if self.start is None else self.start
 
 
@@ -48,7 +47,13 @@ Value: TypeAlias = float | Free
 
 
 def sizes_of_turn(angle: Value) -> tuple[float, float]:
-    """Smallest and largest size, radians, of a rotation whose axis is free, where an angle's sign means nothing."""
+    """Return the smallest and the largest size, radians, of a rotation about a free axis.
+
+    The sign of the angle has no meaning about a free axis.
+
+    Args:
+        angle: the angle, radians.
+    """
     if not isinstance(angle, Free):
         return abs(angle), abs(angle)
     sizes = sorted((abs(angle.lower), abs(angle.upper)))
@@ -60,9 +65,9 @@ class Rotation:
     """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
 
     Attributes:
-        axis: (3,) held axis, any length but zero; None leaves the axis free.
-        angle: radians. With the axis free the sign of an angle means nothing: ``Free(-0.5, 0.5)`` allows every rotation
-            by at most 0.5, about any axis; its start is about z.
+        axis: (3,) axis that is held fixed, any length but zero; None leaves the axis free.
+        angle: radians. About a free axis the sign of an angle has no meaning: ``Free(-0.5, 0.5)`` allows every rotation
+            by at most 0.5 about any axis. The start of such an angle is about z.
     """
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
@@ -75,12 +80,12 @@ HERE = Displacement.by(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A pose of the platform, and the poses that follow from it.
+    """A stated pose of the platform, and the displacements that make poses of the robot from it.
 
     Attributes:
         position: origin of the platform frame in the world frame, length.
         rotation: orientation of the platform.
-        displacements: of this pose, one for each pose that the robot takes.
+        displacements: displacements of this pose, one for each pose that the robot takes.
     """
 
     position: Sequence[Value]
@@ -89,7 +94,7 @@ class Pose:
 
 
 class OverPoses(enum.Enum):
-    """What F is over several poses."""
+    """Combination of F over several poses."""
 
     SUM = "sum"
     MEAN = "mean"

@@ -1,47 +1,48 @@
-"""Case files: from TOML to a :class:`~screwsynth.nlp.case.case.Case`, the only place where degrees become radians.
+"""Reader of case files: TOML becomes a :class:`~screwsynth.nlp.case.case.Case`, and degrees become radians.
 
-A case is named by its path, or, for the ones that come with the package, by its bare name.
+A case is named by its path; a shipped case also by its bare name.
 """
 
 from __future__ import annotations
 
-import math
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import screwsynth.cases
 
-from ...models import Dimension, FloatArray, screw_from_axis
+from ...models import Dimension
 from ..errors import CaseError, InputError, nearest
 from ..units import Units
-from . import schema as document
 from .case import Case
-from .displacements import displacements
+from .displacements import read_displacements
 from .limits.limits import Limits
-from .overrides import _set
-from .pose import LARGEST, Free, OverPoses, Pose, Rotation, Value
+from .overrides import Settings, override_number
+from .pose import Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
+from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
 from .settings import Expectation, ExpectedValue, Published, Search
-from .task import Method, Sense, Task
+from .task import Method, Sense, Task, unit_twist
 
 _SHIPPED = Path(screwsynth.cases.__file__).parent
 
 
 def shipped_cases() -> tuple[str, ...]:
-    """Names of the cases that come with the package, in order."""
+    """Return the names of the cases that come with the package, in order."""
     return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
 
 
 def find_case(name: str) -> Path:
-    """File of a case given by its path or, for a shipped one, its bare name.
+    """Return the file of a case.
+
+    Args:
+        name: path of the file, or the bare name of a shipped case.
 
     Raises:
         InputError: there is no such file.
     """
     try:
-        path = _existing(name)
+        path = _file_of(name)
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     if path is None:
@@ -53,7 +54,12 @@ def find_case(name: str) -> Path:
     return path
 
 
-def _existing(name: str) -> Path | None:
+def _file_of(name: str) -> Path | None:
+    """Return the file with a path or a bare name, or None where there is none.
+
+    Raises:
+        InputError: the path is a folder's.
+    """
     path = Path(name)
     if name and path.is_dir():
         raise InputError(f"{name}: is a folder, not a case file")
@@ -62,16 +68,17 @@ def _existing(name: str) -> Path | None:
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
-def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
-    """Read a case.
+def load_case(name: str, settings: Settings | None = None) -> Case:
+    """Read a case from its file.
 
     Args:
         name: path of a TOML file, or the bare name of a shipped case.
-        settings: numbers by name that replace what the file says, in the file's units: a parameter or one of its
-            components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers.
+        settings: numbers by name that replace those of the file, in the file's units: a parameter or one of its
+            components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers. A
+            parameter with the name of a number of the pose is called ``robot.p_x`` and the like.
 
     Raises:
-        InputError: the file cannot be read or says something that is not allowed.
+        InputError: the file cannot be read, or holds a fault.
     """
     path = find_case(name)
     try:
@@ -87,50 +94,58 @@ def load_case(name: str, settings: Mapping[str, Any] | None = None) -> Case:
     return case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {})
 
 
-def case_from_tables(
-    tables: dict[str, Any], *, name: str, source: str, settings: Mapping[str, Any] | None = None
-) -> Case:
-    """The case that the tables of a parsed TOML document describe.
+def case_from_tables(tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None) -> Case:
+    """Return the case of a TOML document.
 
     Args:
-        tables: the document, as ``tomllib`` returns it.
+        tables: the document, as ``tomllib`` returns it; settings change it in place.
         name: name of the case in results.
-        source: what error messages call the document.
+        source: name of the document in messages.
         settings: as for :func:`load_case`.
 
     Raises:
-        CaseError: something in it is not allowed.
+        CaseError: the document holds a fault.
     """
     try:
-        written = document.parse_document(tables)
+        written = parse_document(tables)
         if settings:
             for key, value in settings.items():
-                _set(tables, key, value)
-            written = document.parse_document(tables)
-        return _case(written, name, source)
+                override_number(tables, key, value)
+            written = parse_document(tables)
+        return _case_of(written, name, source)
     except CaseError as error:
         raise error.within(source) from None
 
 
-def _case(written: document.Document, name: str, source: str) -> Case:
+def _case_of(written: Document, name: str, source: str) -> Case:
+    """Return the case of a document.
+
+    Args:
+        written: the document.
+        name: name of the case in results.
+        source: name of the document in messages.
+
+    Raises:
+        CaseError: the document holds a fault.
+    """
     units = Units(written.units.length, written.units.angle)
     model = build_model(written.robot.model, written.robot.options)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
-    search = written.solve
     poses = written.pose if isinstance(written.pose, list) else [written.pose]
-    tasks = _tasks(written.task)
-    steps = [displacements(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
+    tasks = [_task(task, index) for index, task in enumerate(written.task)]
+    steps = [read_displacements(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
     method, over_poses = _combination(written, sum(map(len, steps)))
     first, *further = [
         Pose([_value(part, units, Dimension.LENGTH) for part in pose.position], _rotation(pose.rotation, units), moves)
         for pose, moves in zip(poses, steps, strict=True)
     ]
+    search = written.solve
     return Case(
         model=model,
         parameters={
-            key: _parameter(key, given, units, dimensions.get(key, Dimension.NUMBER))
+            key: _parameter_value(key, given, units, dimensions.get(key, Dimension.NUMBER))
             for key, given in written.robot.parameters.items()
         },
         position=first.position,
@@ -148,47 +163,58 @@ def _case(written: document.Document, name: str, source: str) -> Case:
         title=written.title,
         name=name,
         expect=_expectation(written.expect),
-        published=tuple(
-            Published(
-                row.quantity,
-                tuple(row.value) if isinstance(row.value, list) else (row.value,),
-                row.source,
-                row.reproduced,
-                row.because,
-                row.decimals,
-                row.over,
-            )
-            for row in written.published
-        ),
+        published=tuple(_published(row) for row in written.published),
         source=source,
     )
 
 
-def _pose_keys(written: document.Document) -> list[str]:
+def _pose_keys(written: Document) -> list[str]:
+    """Return the dotted key of each stated pose."""
     return [f"pose[{k}]" for k in range(len(written.pose))] if isinstance(written.pose, list) else ["pose"]
 
 
-def _combination(written: document.Document, poses: int) -> tuple[Method, OverPoses]:
-    """How tasks and poses are brought together; what means nothing for the case is refused."""
+def _combination(written: Document, poses: int) -> tuple[Method, OverPoses]:
+    """Return how a case combines its tasks, and F over its poses.
+
+    Args:
+        written: the document.
+        poses: number of poses that the robot takes.
+
+    Raises:
+        CaseError: a key has no meaning for a case with one task, or with one pose.
+    """
     combine = written.combine
     if combine is None:
-        return Method.AVERAGE, OverPoses.SUM
+        return Case.method, Case.over_poses
     if len(written.task) == 1 and (combine.method is not None or combine.over_poses is None):
         key = "combine" if combine.over_poses is None else "combine.method"
         raise CaseError(key, "means nothing for one task; take it out, or give another [[task]]")
     if poses == 1 and combine.over_poses is not None:
         raise CaseError("combine.over_poses", "means nothing for one pose; take it out, or give another [[pose]]")
-    return Method(combine.method or "average"), OverPoses(combine.over_poses or "sum")
+    method = Case.method if combine.method is None else Method(combine.method)
+    return method, Case.over_poses if combine.over_poses is None else OverPoses(combine.over_poses)
 
 
-def _expectation(written: document.ExpectTable) -> Expectation:
+def _expectation(written: ExpectTable) -> Expectation:
+    """Return the values that a regression expects."""
     values = tuple(ExpectedValue(row.quantity, row.value, row.within) for row in written.value)
     return Expectation(written.F, written.tolerance, written.singular, values)
 
 
-def _parameter(
-    key: str, given: float | document.Range | list[float | document.Range], units: Units, dimension: Dimension
+def _parameter_value(
+    key: str, given: float | Range | list[float | Range], units: Units, dimension: Dimension
 ) -> Value | list[Value]:
+    """Return the value of a parameter, angles in radians.
+
+    Args:
+        key: name of the parameter.
+        given: the value in the file's units.
+        units: the file's units.
+        dimension: dimension of the parameter.
+
+    Raises:
+        CaseError: a single number stands in brackets.
+    """
     if not isinstance(given, list):
         return _value(given, units, dimension)
     if len(given) == 1:
@@ -196,49 +222,42 @@ def _parameter(
     return [_value(part, units, dimension) for part in given]
 
 
-def _value(written: float | document.Range, units: Units, dimension: Dimension) -> Value:
-    if not isinstance(written, document.Range):
+def _value(written: float | Range, units: Units, dimension: Dimension) -> Value:
+    """Return a fixed or free number, radians for an angle."""
+    if not isinstance(written, Range):
         return units.to_internal(written, dimension)
     start = None if written.start is None else units.to_internal(written.start, dimension)
     return Free(units.to_internal(written.min, dimension), units.to_internal(written.max, dimension), start)
 
 
-def _rotation(written: document.RotationTable | None, units: Units) -> Rotation:
+def _rotation(written: RotationTable | None, units: Units) -> Rotation:
+    """Return the rotation of a stated pose: none where the file states none."""
     if written is None:
         return Rotation()
     return Rotation(written.axis, _value(written.angle, units, Dimension.ANGLE))
 
 
-def _tasks(written: list[document.TaskTable]) -> list[Task]:
-    return [_task(task, index) for index, task in enumerate(written)]
+def _task(written: TaskTable, index: int) -> Task:
+    """Return a task.
 
+    Args:
+        written: its table.
+        index: its place among the tasks.
 
-def _task(written: document.TaskTable, index: int) -> Task:
+    Raises:
+        CaseError: the motion is stated in two ways, or a part of its screw is missing or not allowed.
+    """
     key, name = f"task[{index}]", written.name or f"task {index + 1}"
     if written.twist is None:
-        return Task(_screw(written, key), Sense(written.sense), name, written.weight)
+        twist = unit_twist(written.axis, written.point, written.pitch, key)
+        return Task(twist, Sense(written.sense), name, written.weight)
     for part in ("axis", "point", "pitch"):
         if getattr(written, part) is not None:
             raise CaseError(f"{key}.{part}", "cannot stand beside twist; say the motion in one way")
     return Task(written.twist, Sense(written.sense), name, written.weight)
 
 
-def _screw(written: document.TaskTable, key: str) -> FloatArray:
-    """The unit twist of a task that is given by axis, point and pitch."""
-    axis, point, pitch = written.axis, written.point, written.pitch
-    if axis is None:
-        raise CaseError(f"{key}.axis", "is missing: give axis, point and pitch, or twist")
-    if not any(axis):
-        raise CaseError(f"{key}.axis", "must not be zero: it gives no direction", axis)
-    if pitch is None:
-        raise CaseError(f"{key}.pitch", "is missing: a number, 0 for a rotation, inf for a translation")
-    if pitch == math.inf:
-        return screw_from_axis(axis, point or (0.0, 0.0, 0.0), pitch)
-    if not math.isfinite(pitch):
-        raise CaseError(f"{key}.pitch", "must be a number or inf", pitch)
-    if point is None:
-        raise CaseError(f"{key}.point", "is missing: any point on the axis")
-    for part, number in (("pitch", pitch), *((f"point[{i}]", each) for i, each in enumerate(point))):
-        if abs(number) > LARGEST:
-            raise CaseError(f"{key}.{part}", f"must be at most {LARGEST:g} in size", number)
-    return screw_from_axis(axis, point, pitch)
+def _published(row: PublishedTable) -> Published:
+    """Return a published number."""
+    value = tuple(row.value) if isinstance(row.value, list) else (row.value,)
+    return Published(row.quantity, value, row.source, row.reproduced, row.because, row.decimals, row.over)

@@ -1,11 +1,11 @@
-"""Robots by name, with their options checked; whatever is wrong with another package's robot becomes a sentence."""
+"""Robots by name, with checks of their options. Every fault of another package's robot becomes a sentence."""
 
 from __future__ import annotations
 
 import inspect
 import typing
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -16,13 +16,17 @@ from .starter import toml_value
 
 
 def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
-    """The robot of a name, with its options checked against what its function declares.
+    """Return a robot by name.
+
+    Args:
+        name: name of the robot.
+        options: its options by name, as ``tomllib`` returns them; checked against the signature of its function.
 
     Raises:
-        CaseError: no such robot or option, or an option has a value that is not allowed.
+        CaseError: there is no such robot or option, or an option has a value that is not allowed.
     """
     options = options or {}
-    function = _function(name)
+    function = _find_function(name)
     declared, hints = _signature(name, function)
     for key, value in options.items():
         if key not in declared:
@@ -39,46 +43,75 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
             raise CaseError(f"robot.{key}", f"is missing: {name!r} needs it")
     try:
         model = function(**options)
-    except Exception as error:  # whatever another package's function may raise
-        raise _unusable(name, function, f"{type(error).__name__}: {error}") from error
+    except Exception as error:  # another package's function may raise any exception
+        raise _error(name, function, f"{type(error).__name__}: {error}") from error
     if not isinstance(model, Model):
-        raise _unusable(name, function, f"it returned a {type(model).__name__}, not a Model")
+        raise _error(name, function, f"it returned a {type(model).__name__}, not a Model")
     if model.name != name:
-        raise _unusable(name, function, f"its model calls itself {model.name!r}")
+        raise _error(name, function, f"its model calls itself {model.name!r}")
     return model
 
 
-def _unusable(name: str, function: RobotFunction, fault: str) -> CaseError:
+def _error(name: str, function: RobotFunction, fault: str) -> CaseError:
+    """Return the error of a robot function that cannot be used."""
     origin = f"{getattr(function, '__module__', '?')}:{getattr(function, '__qualname__', '?')}"
     return CaseError("robot.model", f"cannot be used: {origin}: {fault}", name)
 
 
-def model_options(name: str) -> list[tuple[str, str, str | None]]:
-    """Options of a robot: name, what is allowed, default; no default when the option must be given."""
-    declared, hints = _signature(name, _function(name))
-    rows: list[tuple[str, str, str | None]] = []
+class ModelOption(NamedTuple):
+    """An option of a robot.
+
+    Attributes:
+        name: the option's name.
+        allowed: allowed values, in words.
+        default: the default as TOML writes it; None where the option must be given.
+    """
+
+    name: str
+    allowed: str
+    default: str | None
+
+
+def model_options(name: str) -> list[ModelOption]:
+    """Return the options of a robot.
+
+    Raises:
+        CaseError: there is no such robot, or its function cannot be used.
+    """
+    declared, hints = _signature(name, _find_function(name))
+    rows = []
     for key, option in declared.items():
         hint = hints.get(key, Any)
         choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
         allowed = listing(map(toml_value, choices)) if choices else getattr(hint, "__name__", str(hint))
-        rows.append((key, allowed, None if option.default is option.empty else toml_value(option.default)))
+        default = None if option.default is option.empty else toml_value(option.default)
+        rows.append(ModelOption(key, allowed, default))
     return rows
 
 
 def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect.Parameter], dict[str, Any]]:
-    """What a robot function declares: its options, and their types."""
+    """Return the options of a robot function, and their types.
+
+    Raises:
+        CaseError: the function cannot be used.
+    """
     try:
         declared = inspect.signature(function).parameters
         hints = typing.get_type_hints(function)
     except Exception as error:  # a hint may name anything
-        raise _unusable(name, function, f"{type(error).__name__}: {error}") from error
+        raise _error(name, function, f"{type(error).__name__}: {error}") from error
     for key, option in declared.items():
         if option.kind not in (option.KEYWORD_ONLY, option.POSITIONAL_OR_KEYWORD):
-            raise _unusable(name, function, f"its option {key!r} cannot be given by name")
+            raise _error(name, function, f"its option {key!r} cannot be given by name")
     return declared, hints
 
 
-def _function(name: str) -> RobotFunction:
+def _find_function(name: str) -> RobotFunction:
+    """Return the function of a robot.
+
+    Raises:
+        CaseError: there is no such robot, or its entry point is no function.
+    """
     try:
         function = robot_function(name)
     except UnknownModelError:

@@ -1,7 +1,8 @@
-"""A case file as it is written: the tables and keys, and nothing else than these.
+"""Schema of case files: tables and keys.
 
-The classes mirror the file, in the user's units and words. They check what can be checked without knowing the robot:
-keys, types, finite numbers. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`.
+The classes mirror the file, in the user's units and words. They check keys, types and finite numbers, for which no
+robot need be known. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`. A key that may be left
+out has the default of the value that it becomes.
 """
 
 from __future__ import annotations
@@ -20,9 +21,13 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from .faults import _case_error
+from ..units import Units
+from .case import Case
+from .faults import case_error
 from .limits.limits import LimitsTable
+from .settings import Expectation, Published, Search
 from .table import Table, Vector
+from .task import Task
 
 
 class Range(Table):
@@ -33,28 +38,26 @@ class Range(Table):
     start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
 
 
-def _number_or_range(value: object) -> str:
+def _tag_of_number(value: object) -> str:
+    """Return the branch of a union for a number or a range."""
     return "<range>" if isinstance(value, dict | Range) else "<number>"
 
 
-def _value_or_list(value: object) -> str:
-    return "<list>" if isinstance(value, list | tuple) else _number_or_range(value)
+def _tag_of_value(value: object) -> str:
+    """Return the branch of a union for a number, a range or a list of them."""
+    return "<list>" if isinstance(value, list | tuple) else _tag_of_number(value)
 
 
 Value = Annotated[
-    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_number_or_range)
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_tag_of_number)
 ]
-
-
 Numbers = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
     Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
 ]
-
-
 VectorOrValue = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
-    Discriminator(_value_or_list),
+    Discriminator(_tag_of_value),
 ]
 
 
@@ -62,9 +65,9 @@ class UnitsTable(Table):
     """Units of every number in the file."""
 
     length: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)] = Field(
-        default="m", description="label of the length unit"
+        default=Units.length, description="label of the length unit"
     )
-    angle: Literal["deg", "rad"] = Field(default="deg", description="unit of angles")
+    angle: Literal["deg", "rad"] = Field(default=Units.angle, description="unit of angles")
 
 
 class RobotTable(Table):
@@ -77,12 +80,14 @@ class RobotTable(Table):
         default_factory=dict, description="a number or { min, max } for each parameter; a list of three for a point"
     )
     characteristic_length: FiniteFloat = Field(
-        default=1.0, gt=0, description="length by which unit couples are made comparable with unit forces"
+        default=Case.characteristic_length,
+        gt=0,
+        description="length by which unit couples are made comparable with unit forces",
     )
 
     @property
     def options(self) -> dict[str, Any]:
-        """The model's own options."""
+        """The model's own options, as ``tomllib`` returns their values."""
         return dict(self.model_extra or {})
 
 
@@ -145,52 +150,54 @@ class TaskTable(Table):
     pitch: float | None = Field(
         default=None, description="translation per radian; inf is a pure translation along the axis"
     )
-    weight: FiniteFloat = Field(default=1.0, gt=0, description="what the task counts for beside others")
+    weight: FiniteFloat = Field(default=Task.weight, gt=0, description="weight of the task beside others")
     twist: Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)] | None = Field(
         default=None, description="angular velocity and velocity at the world origin, instead of axis, point and pitch"
     )
 
 
 class CombineTable(Table):
-    """How several tasks are brought together, and several poses."""
+    """Combination of several tasks, and of several poses."""
 
     method: Literal["average", "weighted-sum", "worst-case"] | None = Field(
         default=None,
         description="average of the tasks' optima (equation 15), best weighted sum, or best worst task",
     )
     over_poses: Literal["sum", "mean", "worst"] | None = Field(
-        default=None, description="what F is over several poses; the sum if left out"
+        default=None, description="combination of F over several poses; the sum if left out"
     )
 
 
 class ToleranceTable(Table):
     """Manufacturing tolerances."""
 
-    joint_centre: FiniteFloat = Field(description="how far off each joint centre may be built, in any direction")
+    joint_centre: FiniteFloat = Field(description="largest error of each joint centre, in any direction")
 
 
 class SolveTable(Table):
-    """How the solver searches."""
+    """Settings of the search."""
 
-    starts: int = Field(default=32, ge=1, le=100_000, description="number of starting points")
-    seed: int = Field(default=0, ge=0, description="seed of the random ones")
-    max_iterations: int = Field(default=500, ge=1, le=1_000_000, description="limit for each start")
+    starts: int = Field(default=Search.starts, ge=1, le=100_000, description="number of starting points")
+    seed: int = Field(default=Search.seed, ge=0, description="seed of the random ones")
+    max_iterations: int = Field(default=Search.max_iterations, ge=1, le=1_000_000, description="limit for each start")
 
 
 class ExpectedValueTable(Table):
-    """A number of the result that a regression holds the case to."""
+    """A number that a regression expects in the result."""
 
     quantity: str = Field(min_length=1, description="dotted path in the JSON result, such as pose.angle")
-    value: FiniteFloat = Field(description="what it must be, in the case's units")
-    within: FiniteFloat = Field(gt=0, description="how far it may be off")
+    value: FiniteFloat = Field(description="expected number, in the case's units")
+    within: FiniteFloat = Field(gt=0, description="largest difference from it")
 
 
 class ExpectTable(Table):
-    """What a regression holds the case to."""
+    """Values that a regression expects."""
 
-    F: FiniteFloat | None = Field(default=None, ge=0, description="objective at the optimum")
-    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="relative; absolute where F is 0")
-    singular: bool | None = Field(default=None, description="whether J is rank deficient at the optimum")
+    F: FiniteFloat | None = Field(default=Expectation.F, ge=0, description="objective at the optimum")
+    tolerance: FiniteFloat = Field(default=Expectation.tolerance, gt=0, description="relative; absolute where F is 0")
+    singular: bool | None = Field(
+        default=Expectation.singular, description="whether J is rank deficient at the optimum"
+    )
     value: list[ExpectedValueTable] = Field(default_factory=list, description="other numbers of the result")
 
 
@@ -201,12 +208,15 @@ class PublishedTable(Table):
     value: Numbers = Field(description="as printed")
     source: str = Field(min_length=1, description="where")
     reproduced: bool = Field(description="whether this program reproduces it")
-    because: str = Field(default="", description="the reason, where it does not")
-    decimals: int | None = Field(default=None, ge=0, le=15, description="printed decimals, if the value hides zeros")
-    over: str | None = Field(default=None, description="the case that a gain is over")
+    because: str = Field(default=Published.because, description="the reason, where it does not")
+    decimals: int | None = Field(
+        default=Published.decimals, ge=0, le=15, description="printed decimals, if the value hides zeros"
+    )
+    over: str | None = Field(default=Published.over, description="the case that a gain is over")
 
     @model_validator(mode="after")
-    def _reason_given(self) -> PublishedTable:
+    def _refuse_incomplete(self) -> PublishedTable:
+        """Return the table, or refuse a missing reason, and a gain without its other case."""
         if not self.reproduced and not self.because:
             raise PydanticCustomError(
                 "reason", "{fault}", {"key": "because", "fault": "is missing: say why the number is not reproduced"}
@@ -222,26 +232,29 @@ class Document(Table):
 
     model_config = ConfigDict(title="screwsynth case file")
 
-    title: str = Field(default="", description="one line for people")
+    title: str = Field(default=Case.title, description="one line for people")
     units: UnitsTable = UnitsTable()
     robot: RobotTable
     pose: Poses
     task: Annotated[list[TaskTable], Field(min_length=1)]
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
-    limits: LimitsTable | None = Field(default=None, description="what can be built")
-    tolerance: ToleranceTable | None = Field(default=None, description="what it may cost to build inexactly")
+    limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
+    tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
     solve: SolveTable = SolveTable()
     expect: ExpectTable = ExpectTable()
     published: list[PublishedTable] = Field(default_factory=list)
 
 
 def parse_document(tables: dict[str, Any]) -> Document:
-    """The document, or its first fault as a sentence.
+    """Return a document as tables of the schema.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it.
 
     Raises:
-        CaseError: with the dotted key of the fault.
+        CaseError: the first fault, with its dotted key.
     """
     try:
         return Document.model_validate(tables)
     except ValidationError as error:
-        raise _case_error(error.errors(include_url=False)[0]) from None
+        raise case_error(error.errors(include_url=False)[0]) from None

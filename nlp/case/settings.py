@@ -1,26 +1,25 @@
-"""How a case is searched, and what a regression expects of it."""
+"""Settings of the search of a case, and values that a regression expects of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..errors import CaseError
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
 class Search:
-    """How the solver searches.
+    """Settings of the search.
 
     Attributes:
         starts: number of starting points.
         seed: seed of the random ones.
-        max_iterations: Ipopt's limit for each start.
-        compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. It needs a C
-            compiler, and a second or two the first time.
+        max_iterations: the solver's limit for each start.
+        compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. Compiled C
+            needs a C compiler, and a second or two the first time.
+
+    Raises:
+        CaseError: a number is too small.
     """
 
     starts: int = 32
@@ -38,7 +37,13 @@ class Search:
                 raise CaseError(f"solve.{key}", f"must be at least {least}", value)
 
     def but(self, starts: int | None, seed: int | None, *, compiled: bool = False) -> Search:
-        """The same search with another number of starts or seed where they are given, and compiled if asked."""
+        """Return the same settings but for the ones that are given.
+
+        Args:
+            starts: number of starting points; None for the same.
+            seed: seed; None for the same.
+            compiled: whether the objective is compiled, also where these settings leave it interpreted.
+        """
         return Search(
             self.starts if starts is None else starts,
             self.seed if seed is None else seed,
@@ -49,7 +54,13 @@ class Search:
 
 @dataclass(frozen=True)
 class ExpectedValue:
-    """A number of the result, by its dotted path there, and how far it may be off."""
+    """A number that a regression expects in the result.
+
+    Attributes:
+        quantity: dotted path in the result, such as ``pose.angle``.
+        value: the expected number, in the case's units.
+        within: largest difference from it.
+    """
 
     quantity: str
     value: float
@@ -58,7 +69,14 @@ class ExpectedValue:
 
 @dataclass(frozen=True)
 class Expectation:
-    """What a regression holds the case to; ``tolerance`` is relative, and absolute where F is 0."""
+    """Values that a regression expects of a case.
+
+    Attributes:
+        F: objective at the optimum; None where nothing is expected of it.
+        tolerance: largest difference of F, relative; absolute where F is 0.
+        singular: whether J is rank deficient at the optimum; None where nothing is expected of it.
+        values: other numbers of the result.
+    """
 
     F: float | None = None
     tolerance: float = 1e-6
@@ -71,13 +89,13 @@ class Published:
     """A number that the literature prints, and whether this program reproduces it.
 
     Attributes:
-        quantity: dotted path in the result, such as ``pose.angle``, or ``gain``: by how many percent F exceeds that of
-            the case ``over``.
-        value: as printed.
-        source: where.
-        reproduced: whether this program reproduces it.
-        because: the reason, where it does not.
-        decimals: digits printed behind the point, where the value alone does not show them.
+        quantity: dotted path in the result, such as ``pose.angle``, or ``gain``: the percentage by which F exceeds that
+            of the case ``over``.
+        value: the number as printed.
+        source: its place in the literature.
+        reproduced: whether this program reproduces the number.
+        because: the reason, where this program does not.
+        decimals: number of digits printed behind the point, where the value alone does not show it.
         over: name of the case that a gain is over.
     """
 

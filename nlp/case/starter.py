@@ -1,4 +1,4 @@
-"""A commented case file to begin with, for any robot."""
+"""Starter: a commented case file for any robot."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from collections.abc import Sequence
 
 from ...models import Dimension, Model, Parameter
 from ..units import Units
+from .settings import Search
 
 _UNITS = Units("cm", "deg")
 
-#: A starter's free dimensions lie within this part of their typical values.
+#: Half range of a starter's free numbers, as a part of their typical values.
 _SPREAD = 0.25
 
 
 def starter_case(model: Model) -> str:
-    """Text of a case file for a robot at its typical dimensions, with the pose and one dimension free.
+    """Return the text of a case file for a robot at its typical dimensions, with the pose and one dimension free.
 
-    It solves as it is, and says in comments what may be changed.
+    The case can be solved as it is. Comments in the text explain its keys.
+
+    Args:
+        model: the robot.
     """
-    z = model.home[2]
+    z, search = model.home[2], Search()
     reach = _SPREAD * abs(z) or 1.0
     options = [f"{key} = {toml_value(value)}" for key, value in model.options.items()]
     lines = [
@@ -41,10 +45,10 @@ def starter_case(model: Model) -> str:
         "",
         "# A number is fixed; { min = a, max = b } is free between its bounds, with an optional start.",
         "[robot.parameters]",
-        *(_line(parameter, freed=index == 0) for index, parameter in enumerate(model.parameters)),
+        *(_parameter_line(parameter, is_free=index == 0) for index, parameter in enumerate(model.parameters)),
         "",
         "[pose]                        # of the platform in the base's frame, z along the base's normal",
-        f"position = [{_free(0, reach)}, {_free(0, reach)}, {_free(z, reach)}]",
+        f"position = [{_free_number(0, reach)}, {_free_number(0, reach)}, {_free_number(z, reach)}]",
         "rotation = { angle = { min = -20, max = 20 } }                        # any axis, at most 20 deg",
         "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
         "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
@@ -68,30 +72,33 @@ def starter_case(model: Model) -> str:
         ),
         "",
         "[solve]",
-        "starts = 32                   # starting points; more find the best of several optima more surely",
-        "seed = 0",
+        f"starts = {search.starts}".ljust(30) + "# starting points; more find the best of several optima more surely",
+        f"seed = {search.seed}",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _line(parameter: Parameter, *, freed: bool) -> str:
+def _parameter_line(parameter: Parameter, *, is_free: bool) -> str:
+    """Return the line of a parameter, free about its typical value or fixed there."""
     values = [_UNITS.shown(value, parameter.dimension) for value in parameter.typical]
     width = _SPREAD * max(abs(value) for value in values) or 1.0
     domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
-    texts = [_free(value, width, domain) if freed else f"{value:.10g}" for value in values]
+    texts = [_free_number(value, width, domain) if is_free else f"{value:.10g}" for value in values]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
-    return f"{parameter.name} = {text}   # {parameter.description}, {_measure(parameter.dimension)}"
+    return f"{parameter.name} = {text}   # {parameter.description}, {_unit_words(parameter.dimension)}"
 
 
-def _free(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
+def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
+    """Return a range about a number as TOML; the number alone where its domain leaves no range."""
     lower, upper = max(middle - width, domain[0]), min(middle + width, domain[1])
     return f"{{ min = {lower:g}, max = {upper:g} }}" if lower < upper else f"{middle:g}"
 
 
 def toml_value(value: object) -> str:
-    """A robot's option as TOML writes it."""
+    """Return the value of a robot's option as TOML writes it."""
     return repr(value) if isinstance(value, float) else json.dumps(value, default=str)
 
 
-def _measure(dimension: Dimension) -> str:
+def _unit_words(dimension: Dimension) -> str:
+    """Return the unit of a dimension in words."""
     return _UNITS.label(dimension) or "a plain number"

@@ -1,4 +1,4 @@
-"""What every table of a case file is: known keys only, and pydantic's strict types."""
+"""Base class of the tables of a case file: known keys only, and pydantic's strict types."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
 class Table(BaseModel):
-    """A TOML table with its known keys only."""
+    """A table of a case file, with its known keys only."""
 
     # Validators are built when a document is first read, once for the whole tree of tables.
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
-    def _only_known_keys(cls, table: object) -> object:
+    def _refuse_unknown_keys(cls, table: object) -> object:
+        """Return the table unchanged, or refuse its first unknown key."""
         if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
             for key in table:
                 if key not in cls.model_fields:

@@ -1,4 +1,4 @@
-"""Tasks of a case, and how several are combined."""
+"""Tasks of a case, and the methods that combine several."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...models import screw_from_axis
+from ...models import FloatArray, screw_from_axis
 from ..errors import CaseError
+from .checks import check_direction, check_size, check_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
 class Sense(enum.Enum):
-    """Whether F is to be as large or as small as possible."""
+    """Sense of the optimisation of F."""
 
     MAX = "max"
     MIN = "min"
@@ -27,9 +28,9 @@ class Task:
 
     Attributes:
         twist: (6,) ``(omega, v)`` in the world frame; ``v`` is the velocity of the platform point at the world origin.
-        sense: whether the robot should put much or little work rate into it.
+        sense: whether F is maximised or minimised.
         name: a few words.
-        weight: positive; what the task counts for beside others.
+        weight: positive weight among several tasks.
     """
 
     twist: ArrayLike
@@ -48,7 +49,7 @@ class Task:
         name: str = "task",
         weight: float = 1.0,
     ) -> Task:
-        """A unit screw motion from its axis.
+        """Return a unit screw motion about an axis.
 
         Args:
             sense: ``"max"`` or ``"min"``.
@@ -59,20 +60,45 @@ class Task:
             weight: positive.
 
         Raises:
-            CaseError: the sense is another word, or the point is missing.
-            ValueError: the axis is zero, or a number is not finite.
+            CaseError: the sense is another word, the axis is zero, the point is missing, or a number is not finite.
         """
         if sense not in ("max", "min", Sense.MAX, Sense.MIN):
             raise CaseError("task.sense", "must be 'max' or 'min'", sense)
-        if point is None and pitch != math.inf:
-            raise CaseError("task.point", "is missing: any point on the axis")
-        return cls(
-            screw_from_axis(axis, (0.0, 0.0, 0.0) if point is None else point, pitch), Sense(sense), name, weight
-        )
+        return cls(unit_twist(axis, point, pitch, "task"), Sense(sense), name, weight)
+
+
+def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | None, key: str) -> FloatArray:
+    """Return the twist (6,) of a unit screw motion.
+
+    Args:
+        axis: (3,) direction, any length but zero.
+        point: (3,) any point of the axis, length; needed unless the pitch is infinite.
+        pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
+        key: dotted key of the task, for messages.
+
+    Raises:
+        CaseError: a part is missing or not allowed.
+    """
+    if axis is None:
+        raise CaseError(f"{key}.axis", "is missing: give axis, point and pitch, or twist")
+    direction = check_direction(axis, f"{key}.axis")
+    if pitch is None:
+        raise CaseError(f"{key}.pitch", "is missing: a number, 0 for a rotation, inf for a translation")
+    if pitch == math.inf:
+        return screw_from_axis(direction, (0.0, 0.0, 0.0), pitch)
+    if not math.isfinite(pitch):
+        raise CaseError(f"{key}.pitch", "must be a number or inf", pitch)
+    if point is None:
+        raise CaseError(f"{key}.point", "is missing: any point on the axis")
+    check_size(pitch, f"{key}.pitch")
+    on_axis = check_vector(point, f"{key}.point")
+    for index, coordinate in enumerate(on_axis.tolist()):
+        check_size(coordinate, f"{key}.point[{index}]")
+    return screw_from_axis(direction, on_axis, pitch)
 
 
 class Method(enum.Enum):
-    """How several tasks are brought together."""
+    """Method that combines several tasks."""
 
     AVERAGE = "average"
     WEIGHTED_SUM = "weighted-sum"

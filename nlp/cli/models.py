@@ -27,7 +27,7 @@ def models(
         show(console(), [models_table((each, _description(each)) for each in model_names())])
         return
     options = model_options(name)
-    needed = [option for option, _, default in options if default is None]
+    needed = [option.name for option in options if option.default is None]
     # Without the options that it cannot do without, a robot has no parameters to show yet.
     model = None if needed else build_model(name)
     if plot is not None:

@@ -31,13 +31,15 @@ def report(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_target(out)
     check_library("plotly", "reports")
-    from ..output.report.html import report as page_about
+    from ..output.report.report import report_of
+    from ..output.report.webpage import page_of
     from ..results.regression import check_case
     from ..results.result import result_of
 
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
-    check = check_case(case, {case: result_of(found)}) if loaded.published else None
-    write_text(out, page_about(found, text=text, check=check))
+    result = result_of(found)
+    check = check_case(case, {case: result}) if loaded.published else None
+    write_text(out, page_of(report_of(text, solution, result, check)))
     if out != "-":
         typer.echo(f"{out}: {solution.status.value}")
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

@@ -10,8 +10,8 @@ from ..solver.solution import Combination, Solution, TaskOutcome
 from .data import CombinedData, CombinedPointData, CombinedResult, OutcomeData
 from .design import limits_data, margins_data
 from .evidence import certificate_data, optimality_data
-from .jsondata import vector
-from .point import finite, head_data, robot_data, versions
+from .jsondata import finite_or_none, vector
+from .point import head_data, robot_data, versions
 from .solution import starts_data, task_result
 
 
@@ -77,8 +77,8 @@ def _outcome(outcome: TaskOutcome, *, answered: bool) -> OutcomeData:
         weight=outcome.task.weight,
         F=None if state is None else outcome.F,
         best=best,
-        loss=finite(loss),
-        relative_loss=finite(loss / best) if best else None,
+        loss=finite_or_none(loss),
+        relative_loss=finite_or_none(loss / best) if best else None,
         unique=outcome.unique,
         verdict=None if outcome.evidence is None else outcome.evidence.kind,
         rates=None if state is None else vector(state.rates),

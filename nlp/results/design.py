@@ -12,9 +12,8 @@ from ..evidence.tolerance import tolerance_loss
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
 from ..units import Units
-from .jsondata import vector
+from .jsondata import finite_or_none, vector
 from .parts import JointGradientData, LimitData, MarginData, RelaxationData, SensitivityData, ToleranceData
-from .point import finite
 
 
 def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[MarginData, ...]:
@@ -27,12 +26,12 @@ def _margin(units: Units, row: Margin) -> MarginData:
         name=row.name,
         key=row.key,
         bound=row.bound,
-        value=finite(units.shown(row.value, row.dimension)),
+        value=finite_or_none(units.shown(row.value, row.dimension)),
         limit=units.shown(row.limit, row.dimension),
-        margin=finite(units.shown(row.margin, row.dimension)),
+        margin=finite_or_none(units.shown(row.margin, row.dimension)),
         unit=units.label(row.dimension),
         active=row.active,
-        cost=None if row.cost is None else row.cost * units.to_internal(1.0, row.dimension),
+        cost=None if row.cost is None else units.per_unit(row.cost, row.dimension),
     )
 
 
@@ -80,7 +79,7 @@ def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
             name=row.name,
             value=units.shown(row.value, row.dimension),
             unit=units.label(row.dimension),
-            derivative=row.derivative * units.to_internal(1.0, row.dimension),
+            derivative=units.per_unit(row.derivative, row.dimension),
         )
         for row in sensitivities(nlp, x)
     )

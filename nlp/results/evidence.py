@@ -9,8 +9,7 @@ from ..certificate.certificate import Certificate
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from .data import ActiveData, CertificateData, OptimalityData
-from .jsondata import vector
-from .point import finite
+from .jsondata import finite_or_none, vector
 
 
 def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
@@ -20,17 +19,16 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
     units = nlp.case.units
     return OptimalityData(
         kind=evidence.kind,
-        stationarity=finite(evidence.stationarity),
-        feasibility=finite(evidence.feasibility),
-        complementarity=finite(evidence.complementarity),
+        stationarity=finite_or_none(evidence.stationarity),
+        feasibility=finite_or_none(evidence.feasibility),
+        complementarity=finite_or_none(evidence.complementarity),
         licq=evidence.licq,
         active=tuple(
             ActiveData(
                 name=side.name,
                 bound=side.bound,
                 value=units.shown(side.value, side.dimension),
-                # F per unit of the limit: the unit's own factor divides.
-                multiplier=side.multiplier * units.to_internal(1.0, side.dimension),
+                multiplier=units.per_unit(side.multiplier, side.dimension),
             )
             for side in evidence.active
         ),
@@ -56,9 +54,9 @@ def certificate_data(certificate: Certificate | None) -> CertificateData | None:
         return None
     return CertificateData(
         status=certificate.status,
-        bound=finite(certificate.bound),
-        incumbent=finite(certificate.incumbent),
-        gap=finite(certificate.gap),
+        bound=finite_or_none(certificate.bound),
+        incumbent=finite_or_none(certificate.incumbent),
+        gap=finite_or_none(certificate.gap),
         relative_gap=certificate.relative_gap,
         engine=certificate.engine,
         boxes=certificate.boxes,

@@ -6,6 +6,7 @@ command a thirtieth slower.
 """
 
 import enum
+import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, NamedTuple, TypeAlias, TypeVar, dataclass_transform, get_origin
 
@@ -108,6 +109,11 @@ def _plain(value: object) -> JsonValue:
     if isinstance(value, enum.Enum):
         return _plain(value.value)
     raise TypeError(f"JSON has no type for {value!r}")
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a number, or None for one that JSON cannot hold."""
+    return float(value) if math.isfinite(value) else None
 
 
 def vector(values: FloatArray) -> Vector:

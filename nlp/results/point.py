@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -46,6 +47,7 @@ def head_data(case: Case) -> HeadData:
     return HeadData(schema=SCHEMA, case=case.name, title=case.title, model=case.model.name, units=units)
 
 
+@cache
 def versions() -> VersionsData:
     """Return the versions of the programs that the numbers depend on."""
     return VersionsData(
@@ -54,11 +56,6 @@ def versions() -> VersionsData:
         numpy=np.__version__,
         python=platform.python_version(),
     )
-
-
-def finite(value: float) -> float | None:
-    """Return a number, or None for one that JSON cannot hold."""
-    return float(value) if math.isfinite(value) else None
 
 
 def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> RobotData:

@@ -21,6 +21,7 @@ from typing import TypeAlias
 
 from ...models import component_names
 from ..case.case import Case
+from ..case.overrides import Settings
 from ..case.reader import load_case, shipped_cases
 from ..case.settings import Published, Search
 from ..errors import CaseError, EvaluationError, InputError
@@ -34,9 +35,6 @@ from .result import result_of
 
 #: A result as JSON's own types.
 JsonData: TypeAlias = dict[str, JsonValue]
-#: Numbers of a case by name, in its file's units.
-Settings: TypeAlias = dict[str, float | list[float]]
-
 #: Relative difference of F within which an argument of a flat optimum counts as reproduced.
 FLAT = 1e-5
 #: Starting points for the search over a single argument.
@@ -225,9 +223,9 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
 
     None when the number is no argument of F, or the printed point is no robot.
     """
-    printed: Settings = {}
+    printed: dict[str, float | list[float]] = {}
     for each in case.published:
-        printed |= _setting(case, each.quantity, each.value)
+        printed.update(_setting(case, each.quantity, each.value))
     own, robot = _setting(case, row.quantity, row.value), _robot(result)
     if not own or robot is None:
         return None
@@ -253,7 +251,7 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
         return {path.removeprefix("pose."): list(value) if path == "pose.axis" else value[0]}
     name = path.removeprefix("parameters.")
     if path.startswith("parameters.") and name in case.parameters:
-        return {name: value[0] if len(value) == 1 else list(value)}
+        return {case.parameter_name(name): value[0] if len(value) == 1 else list(value)}
     return {}
 
 
@@ -266,8 +264,9 @@ def _robot(result: CaseResult) -> RobotData | None:
 
 def _own_settings(case: Case, robot: RobotData) -> Settings:
     """Return the computed point as settings of the case."""
-    settings: Settings = {
-        name: list(value) if isinstance(value, tuple) else value for name, value in robot.parameters.items()
+    settings: dict[str, float | list[float]] = {
+        case.parameter_name(name): list(value) if isinstance(value, tuple) else value
+        for name, value in robot.parameters.items()
     }
     settings |= dict(zip(component_names("p", 3), robot.pose.position, strict=True))
     settings["angle"] = robot.pose.angle

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from ...models import Model, Parameter
+from ..case.robots import ModelOption
 from ..units import Units
 from .text import Line, TextTable, Tone
 
@@ -15,23 +16,21 @@ def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
     return TextTable(("robot", "what it is"), tuple(models))
 
 
-def model_words(
-    name: str, model: Model | None, options: Sequence[tuple[str, str, str | None]]
-) -> Iterator[Line | TextTable]:
+def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) -> Iterator[Line | TextTable]:
     """Yield one robot: its options, parameters, rows and measures.
 
     Args:
         name: of the robot.
         model: the robot; None where an option without a default keeps it from being built: then only options are shown.
-        options: name, allowed values and default of each.
+        options: its options.
     """
     yield Line(name, tone=Tone.TITLE)
     if model is not None:
         yield Line(model.description)
     if options:
         rows = [
-            (option, allowed, "none: must be given" if default is None else default)
-            for option, allowed, default in options
+            (option.name, option.allowed, "none: must be given" if option.default is None else option.default)
+            for option in options
         ]
         yield TextTable(("option", "allowed", "default"), tuple(rows))
     if model is None:

@@ -11,7 +11,8 @@ from ..solver.starts import StartStatus
 from .data import OptimumData, ReachedData, SolveResult, StartsData
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
-from .point import finite, head_data, objective, robot_data, versions, violations
+from .jsondata import finite_or_none
+from .point import head_data, objective, robot_data, versions, violations
 
 
 def task_result(solution: ProgramSolution, task: int = 0, certificate: Certificate | None = None) -> SolveResult:
@@ -31,7 +32,7 @@ def task_result(solution: ProgramSolution, task: int = 0, certificate: Certifica
         sense=nlp.sense,
         status=solution.status,
         F=objective(nlp, x, state) if solved else None,
-        reached=None if answer else ReachedData(F=finite(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
+        reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=relaxation_data(nlp, solution.relaxation),
         robot=None if state is None else robot_data(nlp, x, state, task),
         optimality=optimality_data(nlp, solution.evidence),

@@ -62,7 +62,9 @@ def design_table(
     for parameter in case.model.parameters:
         shown = robot.parameters[parameter.name]
         values = shown if isinstance(shown, tuple) else (shown,)
-        for name, value, given in zip(parameter.components, values, case.components(parameter.name), strict=True):
+        for name, value, given in zip(
+            case.component_names(parameter), values, case.components(parameter.name), strict=True
+        ):
             add(name, parameter.dimension, value, given)
     stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
     for prefix, pose, found in zip(case.pose_prefixes, case.poses, stated, strict=True):

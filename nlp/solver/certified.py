@@ -123,8 +123,9 @@ def certify(
     if several and with_proof and case.method is Method.AVERAGE:
         raise OptionError("proof: a case whose tasks are averaged has no one program to prove something of")
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
-    if nlps[0].n:
-        search_tape(standard_form(nlps[0]))  # an operation without a rule is refused before anything is solved
+    if given is None and nlps[0].n:
+        # An operation without a rule is refused before a solve.
+        search_tape(standard_form(nlps[0]))
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None) -> Certificate:

@@ -407,3 +407,59 @@ def test_a_faulty_robot_does_not_hide_the_others(faulty: tuple[str, str, str], i
     assert len(err.splitlines()) <= 1
     for name in ("stewart-gough", "hexapod", "three-upu", "tripod"):
         assert name in out + err
+
+
+def test_parameters_with_the_names_of_the_pose(install: Install, tmp_path: Path, cli: Run) -> None:
+    """A robot whose parameters are called as numbers of the pose: its own are written with ``robot.`` before them."""
+    module = MODULE.replace('Parameter("radius"', 'Parameter("p_x"').replace('Parameter("small"', 'Parameter("angle"')
+    install({"tripod": "robots:tripod"}, module)
+    edits = [("radius = { min", "p_x = { min"), ("small = 6", "angle = 6")]
+    pose = "position = [{ min = -2, max = 1 }, 0, 30]\nrotation = { axis = [0, 0, 1], angle = 5 }"
+    relation = '[limits]\ncustom = ["robot.p_x - 2*p_x + 0*robot.angle + 0*angle <= 20"]\n\n[solve]'
+    path = case_file(tmp_path, *edits, ("position = [0, 0, 30]", pose), ("[solve]", relation))
+
+    code, out, err = cli("solve", path)
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    for name, words in {
+        "robot.p_x": ("8 .. 12", "F/cm"),
+        "robot.angle": ("6 ", "fixed", "F/cm"),
+        "p_x": ("-2 .. 1",),
+        "angle": ("5 ", "fixed", "F/deg"),
+    }.items():
+        assert all(word in rows[name] for word in words), rows[name]
+
+    code, out, err = cli("solve", path, "--json", "-")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    assert set(result["parameters"]) == {"p_x", "angle"}
+    sensitivity = {row["name"]: row for row in result["sensitivity"]}
+    assert (sensitivity["robot.angle"]["value"], sensitivity["angle"]["value"]) == (6, 5)
+    held = {row["name"]: row["multiplier"] for row in result["optimality"]["active"]}
+    assert held
+    assert set(held) <= {"robot.p_x", "p_x", "custom: robot.p_x - 2*p_x + 0*robot.angle + 0*angle <= 20"}
+
+    settings = ("--set", "robot.p_x=9", "--set", "robot.angle=7", "--set", "p_x=0.5", "--set", "angle=3")
+    code, out, err = cli("evaluate", path, *settings, "--json", "-")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    assert result["parameters"] == {"p_x": 9, "angle": 7}
+    assert (result["pose"]["position"], result["pose"]["angle"]) == ([0.5, 0, 30], 3)
+
+    check_refused(cli("evaluate", path, "--set", "robot.p_y=1"), "robot.p_y", "did you mean 'robot.p_x'", "robot.angle")
+    wrong = case_file(tmp_path, *edits, ("[solve]", '[limits]\ncustom = ["robot.p_y >= 1"]\n\n[solve]'))
+    check_refused(cli("solve", wrong), "limits.custom[0]", "'robot.p_y' at position 1", "did you mean 'robot.p_x'")
+
+
+def test_a_parameter_is_held_by_its_own_bound_and_not_by_that_of_the_pose(
+    install: Install, tmp_path: Path, cli: Run
+) -> None:
+    install({"tripod": "robots:tripod"}, MODULE.replace('Parameter("radius"', 'Parameter("p_x"'))
+    path = case_file(tmp_path, ("radius = {", "p_x = {"), ("position = [0", "position = [{ min = -1, max = 1 }"))
+    _, out, _ = cli("solve", path, "--json", "-")
+    result = json.loads(out)
+    held = {row["name"]: f"{row['bound']}, {row['multiplier']:.4g} F/cm" for row in result["optimality"]["active"]}
+    assert held
+    rows = {line.split()[0]: line for line in cli("solve", path)[1].splitlines() if line.strip()}
+    for name in ("robot.p_x", "p_x"):
+        assert (held[name] in rows[name]) if name in held else ("F/cm" not in rows[name])

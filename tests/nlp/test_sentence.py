@@ -52,6 +52,17 @@ def test_sine_and_cosine_take_the_angles_of_the_case() -> None:
     assert difference("sin(angle) >= cos(60)", math.radians(1)) == pytest.approx(0, abs=1e-15)
 
 
+def test_a_name_may_have_a_dot_where_the_case_has_such_a_name() -> None:
+    names = ("p_x", "robot.p_x")
+    relation = parse("robot.p_x - 2.5*p_x >= .5", names)
+    assert float(expression(relation.left, {"p_x": SX(2), "robot.p_x": SX(7)})) == 2.0
+    with pytest.raises(SentenceError, match=r"'robot.p_y' at position 1 is no number of this case; did you mean"):
+        parse("robot.p_y >= 0", names)
+    for text in ("p_x.real >= 0", "robot. p_x >= 0", "robot.2 >= 0"):
+        with pytest.raises(SentenceError):
+            parse(text, names)
+
+
 REFUSED = {
     "": ("the sentence ends at position 1",),
     "x1": (">=", "the sentence ends at position 3"),

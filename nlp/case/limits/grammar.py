@@ -1,8 +1,9 @@
 """Relations between the numbers of a case, as people write them: ``x1 - 1.5*x2 >= 0``.
 
 The language is small: numbers, names, ``+ - * / ^``, brackets, the functions ``sqrt``, ``sin``, ``cos`` and ``abs``,
-and one relation ``>=``, ``<=`` or ``==``. ``^`` binds tighter than a sign and to the right, as in mathematics.
-Nothing is ever handed to Python's own interpreter: a text becomes a tree, and a tree a CasADi expression.
+and one relation ``>=``, ``<=`` or ``==``. A name may have a dot in it, as ``robot.p_x`` has. ``^`` binds tighter than a
+sign and to the right, as in mathematics. Nothing is ever handed to Python's own interpreter: a text becomes a tree, and
+a tree a CasADi expression.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _OPERATIONS: dict[str, Callable[[SX, SX], SX]] = {
     "^": lambda a, b: a**b,
 }
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*)|(?P<sign>>=|<=|==|[-+*/^()]))"
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*(?:\.[^\W\d]\w*)*)|(?P<sign>>=|<=|==|[-+*/^()]))"
 )
 
 
@@ -136,6 +137,7 @@ class _Reader:
 
     def __init__(self, text: str, names: Collection[str]) -> None:
         self._text, self._names = text, names
+        self._heads = {head for head, dot, _ in (name.partition(".") for name in names) if dot}
         self._tokens = list(self._split())
         self._at = self._depth = 0
 
@@ -223,8 +225,12 @@ class _Reader:
                 at += len(self._text[at:]) - len(self._text[at:].lstrip())
                 raise SentenceError(f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}")
             kind = str(found.lastgroup)
-            yield _Token(kind, found[kind], found.start(kind))
-            at = found.end()
+            text, start = found[kind], found.start(kind)
+            head = text.partition(".")[0]
+            # A dot belongs to a name only behind a word that begins names with a dot.
+            text = head if kind == "name" and head not in self._heads else text
+            yield _Token(kind, text, start)
+            at = start + len(text)
         yield _Token("end", "", len(self._text.rstrip()))
 
     def _pointed(self, place: int) -> str:

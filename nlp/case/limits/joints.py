@@ -78,20 +78,6 @@ class ConeTable(Table):
     )
 
 
-class HomeTable(Table):
-    """The pose at which joints are mounted straight."""
-
-    position: Vector = Field(description="origin of the platform frame")
-    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="axis of rotation")
-    angle: FiniteFloat = Field(default=0.0, description="angle of rotation")
-
-
-NumberOrCone = Annotated[
-    Annotated[FiniteFloat, Tag("<number>")] | Annotated[ConeTable, Tag("<range>")],
-    Discriminator(lambda value: "<range>" if isinstance(value, dict | ConeTable) else "<number>"),
-]
-
-
 @dataclass(frozen=True)
 class MountingPose:
     """The pose at which passive joints are mounted straight: position, and ``exp(angle [axis]x)``."""
@@ -99,6 +85,20 @@ class MountingPose:
     position: Triple
     axis: Triple = (0.0, 0.0, 1.0)
     angle: float = 0.0
+
+
+class HomeTable(Table):
+    """The pose at which joints are mounted straight."""
+
+    position: Vector = Field(description="origin of the platform frame")
+    axis: Vector = Field(default=list(MountingPose.axis), description="axis of rotation")
+    angle: FiniteFloat = Field(default=MountingPose.angle, description="angle of rotation")
+
+
+NumberOrCone = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[ConeTable, Tag("<range>")],
+    Discriminator(lambda value: "<range>" if isinstance(value, dict | ConeTable) else "<number>"),
+]
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ LimitT = TypeVar("LimitT", bound=Limit[Any])
 
 
 class _OpenTable(Table):
-    """What a design must keep to be built; other keys are measures that the robot itself has."""
+    """Limits that a design must keep to be built; other keys are measures that the robot itself has."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, IntervalTable]

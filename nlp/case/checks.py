@@ -1,0 +1,117 @@
+"""Checks of a case's numbers: finite, not too large, inside their range. Faults are in the words of a case file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...models import Dimension, FloatArray
+from ..errors import CaseError
+from ..units import Units
+from .pose import LARGEST, Free, Value
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+#: A bound written in degrees may differ from the same bound in radians by rounding: by this part of the number.
+_ROUNDING = 1e-12
+
+
+def check_value(
+    value: Value,
+    key: str,
+    dimension: Dimension,
+    units: Units,
+    domain: tuple[float, float] = (-math.inf, math.inf),
+) -> Value:
+    """Return a fixed or free number; one that leaves its domain by rounding only is moved back into it.
+
+    Args:
+        value: the number, radians for an angle.
+        key: its dotted key, for messages.
+        dimension: length, angle or plain number.
+        units: units for people.
+        domain: smallest and largest value.
+
+    Raises:
+        CaseError: a number is not finite, too large or outside the domain, or two bounds are crossed.
+    """
+    if not isinstance(value, Free):
+        return _check_number(value, key, dimension, units, domain)
+    lower = _check_number(value.lower, f"{key}.min", dimension, units, domain)
+    upper = _check_number(value.upper, f"{key}.max", dimension, units, domain)
+    if not lower < upper:
+        fault = f"must be below max = {units.text(upper, dimension)}; a fixed value is a number alone"
+        raise CaseError(f"{key}.min", fault, units.shown(lower, dimension))
+    start = value.start
+    if start is not None:
+        start = _check_number(start, f"{key}.start", dimension, units, (lower, upper))
+    return Free(lower, upper, start)
+
+
+def _check_number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:
+    """Return a number; the arguments and errors are those of :func:`check_value`."""
+    number = float(value)
+    if not math.isfinite(number):
+        raise CaseError(key, "must be finite", number)
+    check_size(number, key)
+    lower, upper = domain
+    slack = _ROUNDING * max(1.0, abs(number))
+    if not lower - slack <= number <= upper + slack:
+        least, most = (units.text(end, dimension) for end in domain)
+        allowed = f"between {least} and {most}"
+        if math.isinf(upper):
+            allowed = f"at least {least}"
+        elif math.isinf(lower):
+            allowed = f"at most {most}"
+        raise CaseError(key, f"must be {allowed}", units.shown(number, dimension))
+    return min(max(number, lower), upper)
+
+
+def check_size(number: float, key: str) -> None:
+    """Refuse a number larger than any number of a case may be.
+
+    Args:
+        number: the number.
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: it is larger.
+    """
+    if abs(number) > LARGEST:
+        raise CaseError(key, f"must be at most {LARGEST:g} in size", number)
+
+
+def check_vector(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
+    """Return three finite numbers as an array (3,).
+
+    Args:
+        values: the numbers.
+        key: their dotted key, for messages.
+
+    Raises:
+        CaseError: they are not three finite numbers.
+    """
+    vector: FloatArray = np.array(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise CaseError(key, "must be three finite numbers")
+    return vector
+
+
+def check_direction(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
+    """Return a direction of any length but zero as an array (3,).
+
+    Args:
+        values: its components.
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: the components are not three finite numbers, or all zero.
+    """
+    vector = check_vector(values, key)
+    if not vector.any():
+        raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
+    return vector
