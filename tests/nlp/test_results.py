@@ -24,7 +24,7 @@ from screwsynth.nlp.results.regression import check_case
 from screwsynth.nlp.results.schema import RESULTS, result_schema
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
-from screwsynth.nlp.solver import ipopt, multistart
+from screwsynth.nlp.solver import multistart, starts
 
 Run = Callable[..., tuple[int, str, str]]
 Json = dict[str, Any]
@@ -162,7 +162,9 @@ def test_the_schema_refuses_what_is_more_or_less_than_a_result(
 def test_a_robot_is_there_as_a_whole_or_not_at_all(schema: Json) -> None:
     solution = solve(load_case("paper-4.1-helical"), starts=2)
     whole = json_data(result_of(solution))
-    without = json_data(result_of(replace(solution, status=Status.INFEASIBLE, state=None)))
+    (outcome,) = solution.outcomes
+    failed = replace(outcome, own=replace(outcome.own, status=Status.INFEASIBLE, state=None), state=None)
+    without = json_data(result_of(replace(solution, status=Status.INFEASIBLE, outcomes=(failed,))))
     hold(json.loads(json.dumps(without)), schema, "SolveResult")
     assert "reached" in without
     robot = whole.keys() - without.keys()
@@ -255,7 +257,7 @@ def test_a_page_solves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> Solution:
         raise AssertionError("a page must not solve")
 
-    monkeypatch.setattr(ipopt, "search_from", refuse)
+    monkeypatch.setattr(starts, "search_from", refuse)
     monkeypatch.setattr(multistart, "search_from", refuse)
     assert "compared" in page_of(report_of("", solution, result, check))
     assert 'id="compared"' not in page_of(report_of("", solution, result))
