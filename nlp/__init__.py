@@ -7,6 +7,8 @@ first used, so that the command line starts at once. The stub is read here line 
 
 from importlib import import_module
 
+__version__ = "0.1.0"
+
 with open(f"{__file__.removesuffix('.py')}.pyi", encoding="utf-8") as _stub:
     _lines = [line.split() for line in _stub if line.startswith("from .")]
 _modules = {name: module for _, module, _, _, _, name in _lines}

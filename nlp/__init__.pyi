@@ -1,5 +1,7 @@
 """Programs over the robots of :mod:`screwsynth.models`: the public names, and where each is."""
 
+__version__: str
+
 from .case.case import Case as Case
 from .case.limits.clearance import LegClearance as LegClearance
 from .case.limits.joints import BaseJointAngle as BaseJointAngle

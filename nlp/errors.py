@@ -13,7 +13,6 @@ A search that fails raises no exception: its outcome is the status of the soluti
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -78,6 +77,8 @@ def listing(names: Iterable[str]) -> str:
 
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """Return a hint for a name that is not allowed: the most similar allowed name, if any, then all allowed names."""
+    import difflib  # noqa: PLC0415 - only messages need it
+
     names = list(allowed)
     close = difflib.get_close_matches(name, names, n=1)
     return f"{f'did you mean {close[0]!r}? ' if close else ''}allowed: {listing(names)}"

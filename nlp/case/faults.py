@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -89,6 +88,8 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
 
 def _sentence_of_missing_key(key: str, table: object) -> str:
     """Return the sentence for a key that is missing, with the key of the table that may be meant."""
+    import difflib  # noqa: PLC0415 - only messages need it
+
     close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
     return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
 

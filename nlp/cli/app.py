@@ -34,9 +34,9 @@ for command in (solve, report, certify, verify_proof, check, evaluate, codegen, 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from .. import __version__
 
-        typer.echo(f"screwsynth {version('screwsynth')}")
+        typer.echo(f"screwsynth {__version__}")
         raise typer.Exit
 
 

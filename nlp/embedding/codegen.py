@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable
-from importlib.metadata import version
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -19,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from .. import __version__
 from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError, InputError
@@ -113,7 +113,7 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "id": prefix,
         "ID": prefix.upper(),
         "title": comment_text(case.title or case.name),
-        "version": version("screwsynth"),
+        "version": __version__,
         "casadi": ca.CasadiMeta.version(),
         "length": comment_text(case.units.length),
         "n": str(n),

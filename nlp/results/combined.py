@@ -40,9 +40,9 @@ def combined_result(
         combined=CombinedData(
             method=combination.method,
             value=combination.value,
-            made=point if solution.is_made else None,
-            reached=None if solution.is_made else point,
-            tasks=tuple(_outcome(outcome, answered=solution.is_made) for outcome in solution.outcomes),
+            method_point=point if solution.all_solved else None,
+            reached=None if solution.all_solved else point,
+            tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),
             violated=combination.violated,
             notices=combination.notices,
             optimality=None if combined is None else optimality_data(combined.nlp, combined.evidence),
@@ -61,15 +61,15 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
         return CombinedPointData(robot=None, margins=None, limits=None)
     # Where one program brought the tasks together, a limit has a cost: of that program's value.
     nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
-    margins = margins_data(nlp, x, optimal=combined is not None and solution.is_made)
+    margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
     robot = robot_data(own.own.nlp, solution.x, own.state, None)
     return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
 
 
-def _outcome(outcome: TaskOutcome, *, answered: bool) -> OutcomeData:
+def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
     """Return a task at the combined point; without an answer there is no F, without an own optimum no best."""
     best = outcome.own.F if outcome.own.status.is_answer else None
-    state = outcome.state if answered else None
+    state = outcome.state if is_answer else None
     loss = outcome.loss if state is not None and best is not None else math.nan
     return OutcomeData(
         name=outcome.task.name,

@@ -227,7 +227,7 @@ class CombinedData(JsonObject):
     Attributes:
         method: how they were brought together.
         value: of the combined objective; null for an average, and without an answer.
-        made: the point that the method yields; absent where it yields none.
+        method_point: the point that the method yields; absent where it yields none.
         reached: the point reached where the method yields none; else absent.
         tasks: each task at the combined point.
         violated: names of the bounds and constraints that the combined point lies outside of.
@@ -239,7 +239,7 @@ class CombinedData(JsonObject):
 
     method: Method
     value: float | None
-    made: Inline[CombinedPointData | None]
+    method_point: Inline[CombinedPointData | None]
     reached: Absent[CombinedPointData]
     tasks: tuple[OutcomeData, ...]
     violated: tuple[str, ...]
@@ -251,7 +251,7 @@ class CombinedData(JsonObject):
     @property
     def point(self) -> CombinedPointData | None:
         """The combined point, be it an answer or merely reached."""
-        return self.reached if self.made is None else self.made
+        return self.reached if self.method_point is None else self.method_point
 
 
 class CombinedResult(JsonObject):

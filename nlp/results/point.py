@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import platform
+import sys
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Quantity, axis_from_screw
+from .. import __version__
 from ..case.case import Case
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
@@ -51,10 +51,10 @@ def head_data(case: Case) -> HeadData:
 def versions() -> VersionsData:
     """Return the versions of the programs that the numbers depend on."""
     return VersionsData(
-        screwsynth=version("screwsynth"),
+        screwsynth=__version__,
         casadi=ca.CasadiMeta.version(),
         numpy=np.__version__,
-        python=platform.python_version(),
+        python=".".join(map(str, sys.version_info[:3])),
     )
 
 

@@ -258,7 +258,7 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
 def _robot(result: CaseResult) -> RobotData | None:
     """Return the robot of an answer, or None where its equations have no value."""
     if isinstance(result, CombinedResult):
-        return None if result.combined.made is None else result.combined.made.robot
+        return None if result.combined.method_point is None else result.combined.method_point.robot
     return result.robot
 
 

@@ -64,14 +64,14 @@ def _solved(case: Case, result: SolveResult) -> Summary:
 
 
 def _combined(case: Case, result: CombinedResult) -> Summary:
-    combined, made = result.combined, result.combined.made
+    combined, point = result.combined, result.combined.method_point
     yield title_line(case)
     yield from combined_lines(result)
-    robot = None if made is None else made.robot
+    robot = None if point is None else point.robot
     if robot is not None:
         yield combined_design_table(case, combined, robot)
-    if made is not None and made.limits:
-        yield limit_table(made.limits)
+    if point is not None and point.limits:
+        yield limit_table(point.limits)
     yield outcome_table(combined)
     yield from combined_value_lines(combined)
     for task in result.tasks:

@@ -92,7 +92,7 @@ def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> Te
 
 def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) -> TextTable:
     """Return the design that several tasks were combined to."""
-    reached = combined.made is None
+    reached = combined.method_point is None
     active = () if reached or combined.optimality is None else combined.optimality.active
     return design_table(case, robot, reached=reached, active=active)
 

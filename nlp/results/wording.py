@@ -191,7 +191,7 @@ def combined_lines(result: CombinedResult) -> Iterator[Line]:
     """Yield how the tasks were combined, and the limits that the combined point violates."""
     combined, status = result.combined, result.status.value
     yield Line(f"{combined.method.value} ({status})", label="combined by")
-    if combined.made is None:
+    if combined.method_point is None:
         yield Line(f"{status}: this is no answer", tone=Tone.NO_ANSWER)
     for name in combined.violated:
         yield Line(f"violated: {name}", tone=Tone.FAULT)

@@ -22,16 +22,16 @@ class TaskOutcome:
     """One task at the point of a solution.
 
     Attributes:
-        task: the task, its weight as used.
-        own: the solution of the task's own program.
+        task: the task, with its scaled weight.
+        own: solution of the task's own program.
         unique: whether the task's own optimum is the only one.
-        x: (n,) the member of its optimal set that was used.
-        state: the robot at the solution's point, with this task's rates; None where it does not exist. At the first
-            pose, where there are several.
-        F: the task's objective at the solution's point; NaN where it does not exist.
-        evidence: the evidence at the solution's point for this task alone; None when nothing is free.
-        loss: how much worse F is than the task's own optimum; negative where the combined search came upon a better
-            one, and 0 for a case with one task.
+        x: (n,) the member of the task's optimal set that is combined with those of other tasks.
+        state: the robot at the solution's point, with this task's rates, at the first pose; None where the robot does
+            not exist.
+        F: the task's objective at the solution's point; NaN where the robot does not exist.
+        evidence: evidence at the solution's point for this task alone; None when nothing is free.
+        loss: difference by which F is worse than the task's own optimum; negative where the combined search found a
+            better optimum, and 0 for a case with one task.
     """
 
     task: Task
@@ -49,12 +49,13 @@ class Combination:
     """The part of a solution that only several tasks have.
 
     Attributes:
-        method: how the tasks were combined.
-        value: of the combined objective: the weighted sum, or the level that every task keeps; None for an average.
+        method: method that combines the tasks.
+        value: value of the combined objective: the weighted sum, or the level that every task keeps; None for an
+            average.
         weights: one for each task, scaled to sum to the number of tasks.
-        violated: names of the limits that the combined point lies outside of.
+        violated: names of the bounds and constraints that the combined point violates.
         notices: sentences for the user about scaled weights and optima that are not unique.
-        combined: the solution of the combined program; None for an average, or where a task has no optimum of its own.
+        combined: solution of the combined program; None for an average, or where a task has no optimum of its own.
     """
 
     method: Method
@@ -76,10 +77,10 @@ class Solution:
     Attributes:
         case: the case.
         status: how the solve ended.
-        x: (n,) the best point, in the variables of a single task's program: optimal, or merely reached when the status
-            says so.
+        x: (n,) the best point, in the variables of a single task's program. The status says whether it is an optimum
+            or only the point that a failed solve reached.
         outcomes: one for each task.
-        combination: how several tasks were combined; None for one task.
+        combination: the combination of several tasks; None for one task.
         seconds: wall time.
     """
 
@@ -96,8 +97,8 @@ class Solution:
         return self.outcomes[0].own if self.combination is None else self.combination.combined
 
     @property
-    def is_made(self) -> bool:
-        """Whether the point is the one that the method yields, be it within the limits or not."""
+    def all_solved(self) -> bool:
+        """Whether every program that the method needs is solved; the point is then the one that the method yields."""
         alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
         decisive = self.decided_by
         return alone and (decisive is None or decisive.status.is_answer)
@@ -115,7 +116,7 @@ class Solution:
 
     @property
     def state(self) -> RobotState | None:
-        """The robot at the point, with the rates of the first task; None where it does not exist."""
+        """The robot at the point, with the rates of the first task; None where the robot does not exist."""
         return self.outcomes[0].state
 
     @property
@@ -140,7 +141,7 @@ class Solution:
 
     @property
     def relaxation(self) -> tuple[RelaxedLimit, ...]:
-        """Smallest movement found that makes the limits of an infeasible program feasible."""
+        """Smallest relaxation found that makes an infeasible program feasible."""
         return self._decisive().relaxation
 
     @property

@@ -225,7 +225,7 @@ def test_several_tasks_over_several_poses_are_brought_together() -> None:
     )
     tables = tomllib.loads(text.replace("count = 3", 'count = 3\ntask = "drive"'))
     compromise = solve(case_from_tables(tables, name="two", source="two.toml"))
-    assert compromise.is_made
+    assert compromise.all_solved
     assert compromise.combination is not None
     assert compromise.combination.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
     states = [evaluate(compromise.outcomes[0].own.nlp, compromise.x, k).F for k in range(3)]

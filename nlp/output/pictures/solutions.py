@@ -21,7 +21,7 @@ def drawings_of(found: Solution) -> list[Drawing]:
     method = found.combination.method.value
     drawings = []
     for task, outcome in enumerate(found.outcomes):
-        if found.is_made:
+        if found.all_solved:
             headline = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
         else:
             headline = f"{found.status.value}: this is not what was asked for"
