@@ -17,7 +17,7 @@ import pytest
 import screwsynth.cases
 import screwsynth.models
 import screwsynth.nlp
-from screwsynth.nlp.case.limits.limits import LIMIT_TYPES
+from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
 from screwsynth.nlp.case.starter import starter_case
 
 ROOT = Path(__file__).parents[1]

@@ -24,7 +24,7 @@ from pydantic_core import PydanticCustomError
 from ..units import Units
 from .case import Case
 from .faults import case_error
-from .limits.limits import LimitsTable
+from .limits.registry import LimitsTable
 from .settings import Expectation, Published, Search
 from .table import Table, Vector
 from .task import Task

@@ -21,7 +21,7 @@ from screwsynth.nlp import CaseError, LegLength, Limits, Status, case_from_table
 from screwsynth.nlp.case.limits.constraint import LENGTH, BoundedConstraint, between
 from screwsynth.nlp.case.limits.interval import IntervalLimit
 from screwsynth.nlp.case.limits.limit import PosedRobot
-from screwsynth.nlp.case.limits.limits import LIMIT_TYPES
+from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
 from screwsynth.nlp.case.schema import Document
 from screwsynth.nlp.case.starter import starter_case
 
@@ -139,14 +139,14 @@ def test_a_limit_is_added_by_its_file_and_a_row_of_the_registry(tmp_path: Path) 
     room = package / "nlp" / "case" / "limits"
     (module,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     (room / "platform_height.py").write_text(module, encoding="utf-8")
-    registry = (room / "limits.py").read_text(encoding="utf-8")
+    registry = (room / "registry.py").read_text(encoding="utf-8")
     for old, new in (
         ("from .plates import", "from .platform_height import PlatformHeight\nfrom .plates import"),
         ("    RateShare,\n", "    RateShare,\n    PlatformHeight,\n"),
     ):
         assert registry.count(old) == 1
         registry = registry.replace(old, new)
-    (room / "limits.py").write_text(registry, encoding="utf-8")
+    (room / "registry.py").write_text(registry, encoding="utf-8")
 
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     command = [sys.executable, "-P", "-c", SCRIPT]

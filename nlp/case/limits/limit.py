@@ -1,7 +1,7 @@
 """A limit of a case: its table in the file, its check against the robot, and its constraints.
 
 A limit type is one class in one file of this package, and one row of the registry in
-:mod:`screwsynth.nlp.case.limits.limits`. Lengths are in the case's unit and angles in radians. Every constraint's
+:mod:`screwsynth.nlp.case.limits.registry`. Lengths are in the case's unit and angles in radians. Every constraint's
 expression grows with the measured number, so that a lower limit is a lower bound; the constraint's reading brings
 bounds and multipliers back to the words of the case.
 """
@@ -12,16 +12,17 @@ import abc
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeVar
 
 from casadi import SX
-from pydantic import Field
 
 from ....models import Dimension, Model, RobotInstance
 from ...errors import CaseError
 from ...units import Units
-from ..table import Table
 from .constraint import BoundedConstraint
+
+if TYPE_CHECKING:
+    from ..table import Table
 
 #: The value that a case file has at a limit's key: a table, mostly.
 TableT = TypeVar("TableT")
@@ -169,6 +170,8 @@ class Limit(abc.ABC, Generic[TableT]):
     @classmethod
     def fields(cls) -> dict[str, TableField]:
         """Return the keys of ``[limits]`` that belong to this type."""
+        from pydantic import Field  # noqa: PLC0415 - a case without limits starts without it
+
         return {cls.key: TableField(cls.table | None, Field(default=None, description=cls.description))}
 
     @classmethod

@@ -1,70 +1,24 @@
-"""The limits of a case, and the registry of all types of limits.
+"""The limits of a case.
 
 Everything is optional: no limit is no restriction. A limit is checked against the robot once, when its case is made.
-To add a limit, write a subclass of :class:`~.limit.Limit` in a file of its own, and add it to :data:`LIMIT_TYPES`.
+All types of limits are in :mod:`.registry`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
-
-from pydantic import ConfigDict, create_model
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ....models import Model
 from ...errors import CaseError, listing
 from ...units import Units
-from ..table import Table
-from .clearance import LegClearance
-from .interval import IntervalTable
-from .joints import BaseJointAngle, PlatformJointAngle
-from .legs import Actuator, LegLength
 from .limit import Limit, LimitedCase
-from .plates import Footprint, JointSpacing, RadiusRatio
-from .quantity import QuantityLimit
-from .rate_share import RateShare
-from .relation import Relations
-from .singular_values import ConditionNumber, SmallestSingularValue
-
-#: Every type of limit, in the order of documentation and messages.
-LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
-    LegLength,
-    Actuator,
-    BaseJointAngle,
-    PlatformJointAngle,
-    JointSpacing,
-    Footprint,
-    RadiusRatio,
-    LegClearance,
-    ConditionNumber,
-    SmallestSingularValue,
-    RateShare,
-    Relations,
-    QuantityLimit,
-)
-
-LimitT = TypeVar("LimitT", bound=Limit[Any])
-
-
-class _OpenTable(Table):
-    """Limits that a design must keep to be built; other keys are measures that the robot itself has."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, IntervalTable]
-
 
 if TYPE_CHECKING:
-    LimitsTable: TypeAlias = _OpenTable
-else:
-    #: The table ``[limits]`` of a case file.
-    LimitsTable = create_model(
-        "LimitsTable",
-        __base__=_OpenTable,
-        __doc__=_OpenTable.__doc__,
-        __module__=__name__,
-        **{key: tuple(field) for kind in LIMIT_TYPES for key, field in kind.fields().items()},
-    )
+    from .registry import LimitsTable
+
+LimitT = TypeVar("LimitT", bound=Limit[Any])
 
 
 @dataclass(frozen=True, init=False)
@@ -101,6 +55,8 @@ class Limits:
         """
         if written is None:
             return cls()
+        from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
         return cls(*(limit for kind in LIMIT_TYPES for limit in kind.read(written, model, units)))
 
     def __iter__(self) -> Iterator[Limit[Any]]:
@@ -129,11 +85,15 @@ class Limits:
 
 def _rank(limit: Limit[Any]) -> int:
     """Return the place of a limit's type in the registry; types of the user's own come last."""
+    from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
     return LIMIT_TYPES.index(type(limit)) if type(limit) in LIMIT_TYPES else len(LIMIT_TYPES)
 
 
 def _measures(model: Model) -> list[str]:
     """Return the keys of ``[limits]`` that mean something for a robot."""
+    from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
     of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs] if model.legs else []
     own = [quantity.name for quantity in model.quantities]
     always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.key]
