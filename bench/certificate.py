@@ -17,7 +17,7 @@ from screwsynth.nlp.certificate.engines import kernel
 LIMIT = 60.0
 
 
-def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+def measure(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
     best = float("inf")
     for _ in range(3):
         began = time.process_time()
@@ -29,7 +29,7 @@ def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, 
 
 
 def row(name: str, solution: Solution, gap: float, engine: str) -> None:
-    found, seconds = measured(solution, gap, engine)
+    found, seconds = measure(solution, gap, engine)
     relative = "" if found.relative_gap is None else f"{found.relative_gap:.1e}"
     print(
         f"{name:34} {engine:6} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
@@ -37,7 +37,7 @@ def row(name: str, solution: Solution, gap: float, engine: str) -> None:
     )
 
 
-def scaled(free: int) -> Case:
+def case_with(free: int) -> Case:
     """The paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
     ranges = {
         "p_x": Free(-10.0, 10.0), "p_y": Free(-10.0, 10.0), "p_z": Free(20.0, 50.0), "x4": Free(0.0, 0.5235),
@@ -61,7 +61,7 @@ def main(engines: Iterable[str]) -> None:
     for gap in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
         row("paper-4.1-helical", solve(load_case("paper-4.1-helical"), starts=8), gap, next(iter(engines)))
     for free in range(2, 10):
-        solution = solve(scaled(free), starts=16)
+        solution = solve(case_with(free), starts=16)
         row(f"{solution.nlp.n} free variables", solution, 1e-4, next(iter(engines)))
 
 

@@ -42,7 +42,7 @@ def random_case(seed: int) -> Case:
     return Case(stewart_gough(layout=layout), parameters, position, [task], rotation=rotation)
 
 
-def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
+def compare_with_starts(job: tuple[int, int, float, float]) -> dict[str, object]:
     seed, starts, gap, limit = job
     nlp = formulate(random_case(seed))
     solution = solve_program(nlp, Search(starts=starts, seed=seed), jobs=1)
@@ -60,7 +60,7 @@ def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def summary(rows: list[dict[str, object]], starts: float, gap: float, limit: float) -> None:
+def print_summary(rows: list[dict[str, object]], starts: float, gap: float, limit: float) -> None:
     print(f"{len(rows)} problems, {int(starts)} starts each, gap {gap:g}, limit {limit:g} s")
     print(f"bounds below the best start: {sum(bool(row['violated']) for row in rows)}")
     print(f"ball active at the optimum: {sum(bool(row['active']) for row in rows)}")
@@ -86,10 +86,10 @@ def main() -> None:
     jobs = [(seed, int(starts), gap, limit) for seed in range(int(problems))]
     rows: list[dict[str, object]] = []
     with get_context("spawn").Pool(2) as pool:
-        for row in pool.imap_unordered(measured, jobs):
+        for row in pool.imap_unordered(compare_with_starts, jobs):
             rows.append(row)
             if len(rows) % 50 == 0 or len(rows) == len(jobs):
-                summary(rows, starts, gap, limit)
+                print_summary(rows, starts, gap, limit)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ COMMANDS = {
 }
 
 
-def times(folder: Path, command: list[str]) -> tuple[float, float]:
+def measure(folder: Path, command: list[str]) -> tuple[float, float]:
     """Wall and processor milliseconds of a command in an environment."""
     began = time.perf_counter()
     running = subprocess.Popen([folder / command[0], *command[1:]], stdout=subprocess.DEVNULL)
@@ -39,11 +39,11 @@ rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 20
 folders = [BIN, *(Path(argument) for argument in sys.argv[2:3])]
 runs = [(name, folder) for name in COMMANDS for folder in folders]
 for name, folder in runs:  # files into the cache
-    times(folder, COMMANDS[name])
+    measure(folder, COMMANDS[name])
 taken: dict[tuple[str, Path], list[tuple[float, float]]] = {run: [] for run in runs}
 for k in range(rounds):
     for run in runs if k % 2 else reversed(runs):
-        taken[run].append(times(run[1], COMMANDS[run[0]]))
+        taken[run].append(measure(run[1], COMMANDS[run[0]]))
 base = [wall for wall, _ in taken[BASE, BIN]]
 for name in COMMANDS:
     wall, processor = zip(*taken[name, BIN], strict=True)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..solver.solution import Solution
 
 
-class Solved(NamedTuple):
+class SolveOutcome(NamedTuple):
     """A solution, the same with certificates where they were asked for, and whether all of these are proved."""
 
     solution: Solution
@@ -22,7 +22,7 @@ class Solved(NamedTuple):
     is_proved: bool
 
 
-def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> Solved:
+def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> SolveOutcome:
     """Solve a case, and certify it where that is asked for.
 
     Raises:
@@ -33,10 +33,10 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
 
     if certify:
         certified = certify_with_progress(case, jobs=jobs)
-        return Solved(certified.solution, certified, certified.is_proved)
+        return SolveOutcome(certified.solution, certified, certified.is_proved)
     if not sys.stderr.isatty():
         solution = solve(case, jobs=jobs)
-        return Solved(solution, solution, True)
+        return SolveOutcome(solution, solution, True)
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress
@@ -50,7 +50,7 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
             bar.update(line, completed=done, total=total, description=f"{label}{best_text}")
 
         solution = solve(case, jobs=jobs, progress=show)
-    return Solved(solution, solution, True)
+    return SolveOutcome(solution, solution, True)
 
 
 def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`

@@ -25,10 +25,10 @@ _STYLES = {
 def show(console: Console, items: Iterable[Line | TextTable]) -> None:
     """Print lines and tables."""
     for item in items:
-        console.print(_rendered(item))
+        console.print(_render(item))
 
 
-def _rendered(item: Line | TextTable) -> RenderableType:
+def _render(item: Line | TextTable) -> RenderableType:
     return _text(item) if isinstance(item, Line) else _table(item)
 
 

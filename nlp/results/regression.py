@@ -123,18 +123,18 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
     began = time.perf_counter()
     solved = {} if solved is None else solved
     case = load_case(name)
-    result = _solved(name, solved, case)
+    result = _result_for(name, solved, case)
     data = json_data(result)
     return CaseCheck(
         name=case.name,
         title=case.title,
-        expected=tuple(_expected(case, result, data)),
-        published=tuple(_published(name, case, row, result, data, solved) for row in case.published),
+        expected=tuple(_check_expected(case, result, data)),
+        published=tuple(_check_published(name, case, row, result, data, solved) for row in case.published),
         seconds=time.perf_counter() - began,
     )
 
 
-def _solved(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
+def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
     """Return the result of a case by name, solved once; the case itself, where it is read already."""
     if name not in solved:
         case = case or load_case(name)
@@ -142,7 +142,7 @@ def _solved(name: str, solved: dict[str, CaseResult], case: Case | None = None) 
     return solved[name]
 
 
-def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
+def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
     expect = case.expect
     rows = [ExpectedCheck("status", "an answer", result.status.value, 0.0, result.status.is_answer)]
     if expect.F is not None:
@@ -186,13 +186,13 @@ def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
     return numbers if len(numbers) == len(parts) else ()
 
 
-def _published(
+def _check_published(
     name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
 ) -> PublishedCheck:
     if row.over is None:
         computed = _numbers(data, row.quantity)
     else:
-        over, F = _number(json_data(_solved(row.over, solved)), "F"), _number(data, "F")
+        over, F = _number(json_data(_result_for(row.over, solved)), "F"), _number(data, "F")
         computed = (100 * (F - over) / over,) if F is not None and over else ()
     if not result.status.is_answer:
         return PublishedCheck(row, (), False, f"the case has no answer: it is {result.status.value}")
@@ -225,14 +225,14 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
     """
     printed: dict[str, float | list[float]] = {}
     for each in case.published:
-        printed.update(_setting(case, each.quantity, each.value))
-    own, robot = _setting(case, row.quantity, row.value), _robot(result)
+        printed.update(_argument_settings(case, each.quantity, each.value))
+    own, robot = _argument_settings(case, row.quantity, row.value), _answer_robot(result)
     if not own or robot is None:
         return None
-    settings = {**_own_settings(case, robot), **printed}
+    settings = {**_computed_settings(case, robot), **printed}
     try:
-        at_printed = _objectives(load_case(name, settings))
-        best = _objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
+        at_printed = _best_objectives(load_case(name, settings))
+        best = _best_objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
     except (InputError, EvaluationError):
         return None
     differences = []
@@ -242,7 +242,7 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
     return max(differences)
 
 
-def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
+def _argument_settings(case: Case, quantity: str, value: Sequence[float]) -> Settings:
     """Return an argument of F as settings of the case; nothing for anything else."""
     path = quantity.removeprefix("combined.")
     if path == "pose.position":
@@ -255,14 +255,14 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
     return {}
 
 
-def _robot(result: CaseResult) -> RobotData | None:
+def _answer_robot(result: CaseResult) -> RobotData | None:
     """Return the robot of an answer, or None where its equations have no value."""
     if isinstance(result, CombinedResult):
         return None if result.combined.method_point is None else result.combined.method_point.robot
     return result.robot
 
 
-def _own_settings(case: Case, robot: RobotData) -> Settings:
+def _computed_settings(case: Case, robot: RobotData) -> Settings:
     """Return the computed point as settings of the case."""
     settings: dict[str, float | list[float]] = {
         case.parameter_name(name): list(value) if isinstance(value, tuple) else value
@@ -274,7 +274,7 @@ def _own_settings(case: Case, robot: RobotData) -> Settings:
     return settings
 
 
-def _objectives(case: Case) -> list[tuple[float, float]]:
+def _best_objectives(case: Case) -> list[tuple[float, float]]:
     """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):

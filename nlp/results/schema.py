@@ -112,7 +112,7 @@ def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
         if mark is Mark.INLINE:
             _add_inline(fields, annotation, definitions)
             continue
-        schema = _schema(annotation if mark is None else _present(annotation), definitions)
+        schema = _schema(annotation if mark is None else _type_without_none(annotation), definitions)
         fields.properties[name] = {**schema, **({"description": descriptions[name]} if name in descriptions else {})}
         if mark is None:
             fields.required.append(name)
@@ -121,7 +121,7 @@ def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
 
 def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> None:
     """Add the fields of an inline part; where it may be absent, they are there all together or not at all."""
-    kind = _present(annotation)
+    kind = _type_without_none(annotation)
     if not (isinstance(kind, type) and issubclass(kind, JsonObject)):
         raise TypeError(f"only an object can stand inline, which {kind!r} is not")
     part = _fields(kind, definitions)
@@ -135,7 +135,7 @@ def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> Non
             fields.together[name] = [*fields.together.get(name, []), *(others if name == first else [first])]
 
 
-def _present(annotation: object) -> object:
+def _type_without_none(annotation: object) -> object:
     """Return the type of a marked field where it is not None."""
     kind = get_args(annotation)[0]
     if get_origin(kind) not in (Union, UnionType):

@@ -44,10 +44,10 @@ Summary: TypeAlias = Iterator[Line | TextTable]
 
 def case_summary(case: Case, result: CaseResult) -> Summary:
     """Yield the result of a solve, of one task or of several."""
-    return _combined(case, result) if isinstance(result, CombinedResult) else _solved(case, result)
+    return _combined_summary(case, result) if isinstance(result, CombinedResult) else _task_summary(case, result)
 
 
-def _solved(case: Case, result: SolveResult) -> Summary:
+def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from heading_lines(case, result)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
@@ -63,7 +63,7 @@ def _solved(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
 
 
-def _combined(case: Case, result: CombinedResult) -> Summary:
+def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     combined, point = result.combined, result.combined.method_point
     yield title_line(case)
     yield from combined_lines(result)

@@ -54,7 +54,12 @@ def design_table(
     rows: list[tuple[str, ...]] = []
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
-        row = (name, _settled(value, given, units, dimension), units.label(dimension), _range(given, units, dimension))
+        row = (
+            name,
+            _number_text(value, given, units, dimension),
+            units.label(dimension),
+            _range_text(given, units, dimension),
+        )
         reason = held.get(name) or fixed.get(name)
         why = f"{reason}/{units.label(dimension) or 'unit'}" if reason else ""
         rows.append((*row, *((why,) if column else ())))
@@ -97,7 +102,7 @@ def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) 
     return design_table(case, robot, reached=reached, active=active)
 
 
-def _settled(value: float, given: Value, units: Units, dimension: Dimension) -> str:
+def _number_text(value: float, given: Value, units: Units, dimension: Dimension) -> str:
     """Return a number's text, 0 where it is rounding error beside the range that it was free in."""
     if isinstance(given, Free):
         width = units.shown(given.upper - given.lower, dimension)
@@ -105,7 +110,7 @@ def _settled(value: float, given: Value, units: Units, dimension: Dimension) -> 
     return number(value)
 
 
-def _range(given: Value, units: Units, dimension: Dimension) -> str:
+def _range_text(given: Value, units: Units, dimension: Dimension) -> str:
     if not isinstance(given, Free):
         return ""
     return f"{units.shown(given.lower, dimension):g} .. {units.shown(given.upper, dimension):g}"
@@ -175,13 +180,15 @@ def limit_table(limits: Sequence[LimitData]) -> TextTable:
         where = [_place(name) for name in row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
         cost = f"{row.cost + 0.0:+.4g} F/{row.unit or 'unit'}" if row.active and row.cost else ""
-        margin = _beside(row.margin, row.limit) + (", active" if row.active else "")
+        margin = _limit_number_text(row.margin, row.limit) + (", active" if row.active else "")
         shown = ", ".join(where[:_PLACES]) + more
-        rows.append((row.key, f"{row.limit:g}", row.unit, _beside(row.value, row.limit), margin, shown, cost))
+        rows.append(
+            (row.key, f"{row.limit:g}", row.unit, _limit_number_text(row.value, row.limit), margin, shown, cost)
+        )
     return TextTable(("limit", "", "unit", "nearest", "margin", "where", "costs"), tuple(rows))
 
 
-def _beside(value: float | None, limit: float) -> str:
+def _limit_number_text(value: float | None, limit: float) -> str:
     """Return a number's text, 0 where it is rounding error beside a limit."""
     if value is None:
         return "none"

@@ -146,21 +146,21 @@ def certify(
         statement = Statement(minimise=above is not None)
         nlp = _with_sense(nlps[0], statement)
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
-        writer = _writer(nlp) if with_proof else None
+        writer = _proof_writer(nlp) if with_proof else None
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None:
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
         solution = solution_of_one_task(case, own)
-        return Certified(solution, (certificate,), None, statement, _tree(writer, certificate))
+        return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or solve_programs(case, nlps, search, jobs=jobs)
     alone = tuple(certify_one(outcome.own, outcome.task.name, None) for outcome in solution.outcomes)
     if solution.combination is None or solution.combination.combined is None:
         return Certified(solution, alone, None, Statement(), None)
     combined = solution.combination.combined
-    writer = _writer(combined.nlp) if with_proof else None
+    writer = _proof_writer(combined.nlp) if with_proof else None
     certificate = certify_one(combined, case.method.value, writer)
-    statement = _statement(solution.combination, combined)
-    return Certified(solution, alone, certificate, statement, _tree(writer, certificate))
+    statement = _combined_statement(solution.combination, combined)
+    return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:
@@ -203,17 +203,17 @@ def _with_sense(nlp: Nlp, statement: Statement) -> Nlp:
     return replace(nlp, sense=Sense.MIN) if statement.minimise and nlp.sense is not Sense.MIN else nlp
 
 
-def _writer(nlp: Nlp) -> ProofWriter | None:
+def _proof_writer(nlp: Nlp) -> ProofWriter | None:
     return ProofWriter(len(standard_form(nlp).functions)) if nlp.n else None
 
 
-def _tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
+def _complete_tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
     """Return the nodes of a proof, where something is proved."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     return writer.tree() if writer is not None and complete else None
 
 
-def _statement(combination: Combination, combined: ProgramSolution) -> Statement:
+def _combined_statement(combination: Combination, combined: ProgramSolution) -> Statement:
     """Return the statement that names the combined program of several tasks."""
     weights = combination.weights
     if combination.method is Method.WEIGHTED_SUM:

@@ -86,7 +86,7 @@ def combine(
     Returns:
         The solution, with no seconds yet.
     """
-    weights, scaling_notices = _scaled_weights(case)
+    weights, scaling_notices = _scale_weights(case)
     points, unique, notices = _choose_members(nlps, own, polish)
     notices = [*scaling_notices, *notices]
     combined: ProgramSolution | None = None
@@ -122,7 +122,7 @@ class _Weights(NamedTuple):
     notices: list[str]
 
 
-def _scaled_weights(case: Case) -> _Weights:
+def _scale_weights(case: Case) -> _Weights:
     """Return weights that sum to the number of tasks, as equation 15 needs them."""
     given = [task.weight for task in case.tasks]
     total, n = sum(given), len(given)
@@ -201,14 +201,14 @@ def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish:
     return _Members(points, unique, notices)
 
 
-def _is_set(solution: ProgramSolution) -> bool:
+def _may_be_connected(solution: ProgramSolution) -> bool:
     """Return whether the optimum may belong to a connected set of optima."""
     return solution.evidence is not None and solution.evidence.kind in (PointKind.NOT_ISOLATED, PointKind.UNDECIDED)
 
 
 def _is_unique(solution: ProgramSolution) -> bool:
     """Return whether no other optimum with the same F is known."""
-    return len(_known_members(solution)) == 1 and not _is_set(solution)
+    return len(_known_members(solution)) == 1 and not _may_be_connected(solution)
 
 
 def _known_members(solution: ProgramSolution) -> list[FloatArray]:
@@ -217,7 +217,7 @@ def _known_members(solution: ProgramSolution) -> list[FloatArray]:
         return [np.array(solution.x)]
     tolerance = SAME_VALUE * solution.nlp.objective_scale
     best = solution.optima[0].F
-    if _is_set(solution):
+    if _may_be_connected(solution):
         converged = [start for start in solution.starts if start.status is StartStatus.CONVERGED]
         return [start.x for start in converged if abs(start.F - best) <= tolerance]
     return [optimum.x for optimum in solution.optima if abs(optimum.F - best) <= tolerance]
@@ -237,7 +237,7 @@ def _nearest_member(
         return float(np.linalg.norm((x - target) / nlp.scale))
 
     closest = min(members, key=distance)
-    if not _is_set(solution):
+    if not _may_be_connected(solution):
         return closest
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]

@@ -123,10 +123,10 @@ def solve_program(
     limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
     if solution.status is not Status.INFEASIBLE or not limited:
         return solution
-    stretched = formulate_relaxation(nlp)
+    elastic = formulate_relaxation(nlp)
     points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
     few = replace(search, starts=min(search.starts, _ELASTIC_STARTS))
-    relaxed = _search(stretched, few, points, jobs, None, solver)
+    relaxed = _search(elastic, few, points, jobs, None, solver)
     # An optimum of relaxations is often degenerate, with more limits active than it takes; what counts is that it is
     # feasible.
     feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
@@ -151,7 +151,7 @@ def _search(
     """Search a program from the first points and from sampled ones."""
     began = time.perf_counter()
     if nlp.n == 0:
-        return _at_the_only_point(nlp, search, began)
+        return _evaluate_without_variables(nlp, search, began)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     done: list[Start] = []
     best: float | None = None
@@ -162,14 +162,14 @@ def _search(
         if progress is not None:
             progress(len(done), len(points), best)
     starts, optima = _distinct_optima(nlp, done)
-    beaten = _better_unconverged(nlp, starts, optima)
-    if optima and beaten is None:
+    better = _find_better_start(nlp, starts, optima)
+    if optima and better is None:
         x, evidence = optima[0].x, optima[0].evidence
     else:
-        x = (beaten or min(starts, key=lambda start: (start.violation, start.stationarity))).x
+        x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
     return ProgramSolution(
-        status=_status(evidence, bool(optima) and beaten is None),
+        status=_status(evidence, bool(optima) and better is None),
         nlp=nlp,
         x=frozen_array(x, (nlp.n,)),
         state=state_or_none(nlp, x),
@@ -181,7 +181,7 @@ def _search(
     )
 
 
-def _at_the_only_point(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
+def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
     """Evaluate a program without variables."""
     x = frozen_array(nlp.start, (0,))
     status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
@@ -190,7 +190,7 @@ def _at_the_only_point(nlp: Nlp, search: Search, began: float) -> ProgramSolutio
     return ProgramSolution(status, nlp, x, state, evidence, (), (), search.seed, time.perf_counter() - began)
 
 
-def _better_unconverged(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
+def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
     """Return a feasible start that did not converge and is better than every optimum found, or None.
 
     Then the best optimum found is not the best there is, and must not be given for it.
@@ -259,7 +259,7 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
     """Group starts whose points count as the same, in the order of the first of each group."""
     groups: list[list[Start]] = []
     for start in starts:
-        same = next((group for group in groups if _distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
+        same = next((group for group in groups if _largest_distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
         if same is None:
             groups.append([start])
         else:
@@ -267,6 +267,6 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
     return groups
 
 
-def _distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:
+def _largest_distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:
     """Return the largest distance along one variable, in half ranges."""
     return float(np.max(np.abs(one - other) / nlp.scale))

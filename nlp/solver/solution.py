@@ -127,29 +127,29 @@ class Solution:
     @property
     def nlp(self) -> Nlp:
         """The program that decided."""
-        return self._decisive().nlp
+        return self._decisive_solution().nlp
 
     @property
     def starts(self) -> tuple[Start, ...]:
         """Every start of the program that decided, in order."""
-        return self._decisive().starts
+        return self._decisive_solution().starts
 
     @property
     def optima(self) -> tuple[Optimum, ...]:
         """Distinct optima of the program that decided, best first."""
-        return self._decisive().optima
+        return self._decisive_solution().optima
 
     @property
     def relaxation(self) -> tuple[RelaxedLimit, ...]:
         """Smallest relaxation found that makes an infeasible program feasible."""
-        return self._decisive().relaxation
+        return self._decisive_solution().relaxation
 
     @property
     def seed(self) -> int:
         """Seed of the starting points."""
         return self.outcomes[0].own.seed
 
-    def _decisive(self) -> ProgramSolution:
+    def _decisive_solution(self) -> ProgramSolution:
         """Return the solution of the program that decided.
 
         Raises:

@@ -99,16 +99,16 @@ def search_from(
         InputError: the objective is to be compiled, and cannot be.
     """
     threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
-    waiting: SimpleQueue[LocalSearch] = SimpleQueue()
+    idle: SimpleQueue[LocalSearch] = SimpleQueue()
     for each in solver(nlp, search, points, min(threads, len(points))):
-        waiting.put(each)
+        idle.put(each)
 
     def search_one(point: FloatArray) -> SolverResult:
-        local_search = waiting.get()
+        local_search = idle.get()
         try:
             return local_search(point)
         finally:
-            waiting.put(local_search)
+            idle.put(local_search)
 
     known: list[Start] = []
     with ThreadPoolExecutor(threads) as pool:
@@ -162,12 +162,12 @@ def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: floa
     generous: a side that does not belong gets a multiplier of the wrong sign and leaves the active set in the
     correction.
     """
-    table = nlp.sides
-    reported = np.concatenate([found.bound_multipliers, found.constraint_multipliers])[table.place]
+    sides = nlp.sides
+    reported = np.concatenate([found.bound_multipliers, found.constraint_multipliers])[sides.place]
     # Multipliers of bounds are per half range already, those of constraints are not.
-    strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
+    strength = sides.sign * reported * np.where(sides.place < nlp.n, 1.0, 1 / at.per_unit)
     near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
-    held = np.flatnonzero(table.equal | near)
+    held = np.flatnonzero(sides.equal | near)
     # No more sides than variables can hold a point: those with the least multipliers beside their slack are left out.
-    order = np.where(table.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
+    order = np.where(sides.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
     return [int(j) for j in held[np.sort(np.argsort(-order, kind="stable")[: nlp.n])]]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .markup import Markup, joined, tag
+from .markup import Markup, join_markup, tag
 
 #: Size of a chart in its own units, and the margins for its axes.
 _WIDTH, _HEIGHT = 320.0, 190.0
@@ -118,7 +118,7 @@ class _Scale:
 
 def _svg(parts: Sequence[object], words: str) -> Markup:
     return tag(
-        "svg", joined(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
+        "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
     )
 
 
@@ -128,11 +128,11 @@ def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
     parts = []
     for value in _ticks(*scale.across, 5):
         x = f"{scale.x(value):.1f}"
-        parts.append(tag("text", _shown(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
+        parts.append(tag("text", _tick_text(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
     for value in _ticks(*scale.up, 5):
         y = scale.y(value)
         parts.append(tag("path", d=f"M{_LEFT:g} {y:.1f}H{right:g}", class_="rule"))
-        parts.append(tag("text", _shown(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
+        parts.append(tag("text", _tick_text(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
     parts.append(tag("path", d=f"M{_LEFT:g} {_TOP:g}V{floor:g}H{right:g}", class_="axis"))
     middle = (_LEFT + right) / 2
     parts.append(tag("text", labels[0], x=f"{middle:g}", y=f"{_HEIGHT - 6:g}", class_="label middle"))
@@ -175,5 +175,5 @@ def _ticks(low: float, high: float, about: int) -> list[float]:
     return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def _shown(value: float) -> str:
+def _tick_text(value: float) -> str:
     return f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")

@@ -11,7 +11,7 @@ from ...results.tables import MOST_OPTIMA, optimum_table
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
-from .markup import Markup, html_table, joined, paragraphs, tag
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 
@@ -28,7 +28,7 @@ def optima(report: Report) -> Markup:
         if len(solutions) > 1:
             parts.append(tag("h3", name))
         parts += _optima_of(solution)
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
@@ -51,7 +51,7 @@ def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
     yield html_table(optimum_table(solution), f"Where they lie{more}")
 
 
-def around(report: Report) -> Markup:
+def surroundings(report: Report) -> Markup:
     """Return F along each variable through the answer, and over pairs of variables."""
     parts: list[Markup] = []
     with_maps = [k for k, part in enumerate(report.parts) if part.planes]
@@ -80,7 +80,7 @@ def around(report: Report) -> Markup:
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))
         parts.append(_maps(report, with_maps))
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _slice(part: Part, each: Slice) -> Markup:
@@ -139,4 +139,4 @@ def _maps(report: Report, parts: Sequence[int]) -> Markup:
         aria_label="Map of F over two variables",
     )
     few = tag("p", f"The first {shown} of {every} pairs are here.") if shown < every else None
-    return joined([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])
+    return join_markup([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])

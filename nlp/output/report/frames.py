@@ -113,7 +113,7 @@ class _TimedPosture(NamedTuple):
     posture: Posture
 
 
-class _Travel(NamedTuple):
+class _PostureSequence(NamedTuple):
     """Postures in order of time, and the index of the one at ``t = 0``."""
 
     postures: list[_TimedPosture]
@@ -129,7 +129,7 @@ def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
-    postures, zero = _travel(drawing)
+    postures, zero = _postures_along_motion(drawing)
     return {
         "name": "" if motion is None else motion.name,
         "headline": drawing.headline,
@@ -158,13 +158,13 @@ def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
     }
 
 
-def _travel(drawing: Drawing) -> _Travel:
+def _postures_along_motion(drawing: Drawing) -> _PostureSequence:
     """Return postures along the motion of a drawing.
 
     There are fewer where the robot cannot be put together farther on, and only the drawing's own without a motion.
     """
     if drawing.motion is None:
-        return _Travel([_TimedPosture(0.0, drawing.posture)], 0)
+        return _PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
     step = _largest_time(drawing) / _SIDE
     sides: list[list[_TimedPosture]] = []
     for sign in (-1, 1):
@@ -180,7 +180,7 @@ def _travel(drawing: Drawing) -> _Travel:
             side.append(_TimedPosture(sign * step * k, last))
         sides.append(side)
     back, forth = sides
-    return _Travel([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
+    return _PostureSequence([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
 
 
 def _largest_time(drawing: Drawing) -> float:

@@ -38,10 +38,10 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
         label = key.rstrip("_").replace("_", "-")
         parts.append(label if value is True else f'{label}="{escape(str(value))}"')
     opening = f"<{' '.join(parts)}>"
-    return Markup(opening if name in _VOID else f"{opening}{joined(content)}</{name}>")
+    return Markup(opening if name in _VOID else f"{opening}{join_markup(content)}</{name}>")
 
 
-def joined(content: Iterable[object]) -> Markup:
+def join_markup(content: Iterable[object]) -> Markup:
     """Return several pieces of content as one."""
     return Markup(
         "".join(part if isinstance(part, Markup) else escape(str(part)) for part in content if part is not None)
@@ -50,7 +50,7 @@ def joined(content: Iterable[object]) -> Markup:
 
 def paragraphs(lines: Iterable[Line | str]) -> Markup:
     """Return a paragraph for each line of text; its label stands before it."""
-    return joined(tag("p", _line(line)) for line in lines)
+    return join_markup(tag("p", _line(line)) for line in lines)
 
 
 def _line(line: Line | str) -> object:
@@ -58,7 +58,7 @@ def _line(line: Line | str) -> object:
         return line
     if not line.label:
         return line.words
-    return joined([tag("span", f"{line.label}:", class_="label"), " ", line.words])
+    return join_markup([tag("span", f"{line.label}:", class_="label"), " ", line.words])
 
 
 def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:

@@ -27,10 +27,10 @@ from ...results.wording import (
     tolerance_line,
 )
 from ..pictures.style import RATE_COLOURS
-from .exploration import around, optima
+from .exploration import optima, surroundings
 from .frames import ViewData
-from .judgement import certificates, evidence_section, published
-from .markup import Markup, html_table, joined, paragraphs, tag
+from .judgement import certificate_section, evidence_section, published_section
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
 
 
@@ -42,10 +42,10 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("result", "Result", _result(report)),
         ("limits", "Limits: margins and costs", _limits(report)),
         ("optima", "Optima found", optima(report)),
-        ("around", "F around this point", around(report)),
+        ("around", "F around this point", surroundings(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
-        ("certificate", "Certificate", certificates(report)),
-        ("published", "Published and computed", published(report)),
+        ("certificate", "Certificate", certificate_section(report)),
+        ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
     return [(anchor, title, content) for anchor, title, content in found if content]
@@ -151,7 +151,7 @@ def _robot(report: Report) -> Markup:
     )
     content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
     note = "Without a script nothing moves and the picture is missing; every number is in the tables."
-    return joined([*content, tag("noscript", tag("p", note))])
+    return join_markup([*content, tag("noscript", tag("p", note))])
 
 
 def _legend(view: ViewData) -> Markup:
@@ -167,7 +167,7 @@ def _legend(view: ViewData) -> Markup:
         " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
         " Point at a limb for its length, rate, share of F and wrench.",
     ]
-    return joined([bar, *words])
+    return join_markup([bar, *words])
 
 
 def _rates(view: ViewData) -> Markup:
@@ -217,12 +217,12 @@ def _rates(view: ViewData) -> Markup:
 def _result(report: Report) -> Markup:
     result = report.result
     if isinstance(result, CombinedResult):
-        return _combined(report, result)
+        return _combined_result(report, result)
     sentences = [f"It would be {relaxation_words(row)}." for row in result.relaxation or ()]
-    return joined([*_one(report.case, result, "design"), paragraphs(sentences)])
+    return join_markup([*_task_tables(report.case, result, "design"), paragraphs(sentences)])
 
 
-def _combined(report: Report, result: CombinedResult) -> Markup:
+def _combined_result(report: Report, result: CombinedResult) -> Markup:
     case, combined = report.case, result.combined
     parts: list[Markup] = []
     robot = None if combined.point is None else combined.point.robot
@@ -237,11 +237,11 @@ def _combined(report: Report, result: CombinedResult) -> Markup:
     for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"“{report.parts[k].name}” by itself"))
         parts.append(paragraphs([headline(own)]))
-        parts += _one(case, own, f"design-{k + 1}")
-    return joined(parts)
+        parts += _task_tables(case, own, f"design-{k + 1}")
+    return join_markup(parts)
 
 
-def _one(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
+def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
     """Return the tables of one task's result."""
     robot, reached = result.robot, result.reached is not None
     if robot is None:
@@ -269,7 +269,7 @@ def _limits(report: Report) -> Markup:
         parts.append(paragraphs([tolerance_line(result.tolerance, result.F, report.case.units)]))
     every = html_table(margin_table(margins), "Every margin, positive inside")
     parts.append(tag("details", tag("summary", f"Every margin ({len(margins)})"), every))
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _origin(report: Report) -> Markup:
@@ -283,7 +283,9 @@ def _origin(report: Report) -> Markup:
         tag("span", id="copied", role="status"),
         class_="controls script",
     )
-    return joined([html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text])
+    return join_markup(
+        [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
+    )
 
 
 def _limits_of(report: Report) -> Sequence[LimitData]:

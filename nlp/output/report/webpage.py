@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from string import Template
 
-from .markup import Markup, joined, script_json, tag
+from .markup import Markup, join_markup, script_json, tag
 from .report import Report
 from .sections import answer, sections
 
@@ -21,7 +21,7 @@ def page_of(report: Report) -> str:
     found = sections(report)
     title = report.case.title or report.case.name
     contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
-    body = joined(
+    body = join_markup(
         tag(
             "section",
             tag("h2", heading, id=f"{anchor}-heading"),
