@@ -18,6 +18,7 @@ LIMIT = 60.0
 
 
 def measure(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+    """Return the certificate of a solution, and the CPU seconds of the fastest of up to three runs."""
     best = float("inf")
     for _ in range(3):
         began = time.process_time()
@@ -29,6 +30,7 @@ def measure(solution: Solution, gap: float, engine: str) -> tuple[Certificate, f
 
 
 def row(name: str, solution: Solution, gap: float, engine: str) -> None:
+    """Print one row of the table."""
     found, seconds = measure(solution, gap, engine)
     relative = "" if found.relative_gap is None else f"{found.relative_gap:.1e}"
     print(
@@ -38,7 +40,7 @@ def row(name: str, solution: Solution, gap: float, engine: str) -> None:
 
 
 def case_with(free: int) -> Case:
-    """The paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
+    """Return the paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
     ranges = {
         "p_x": Free(-10.0, 10.0), "p_y": Free(-10.0, 10.0), "p_z": Free(20.0, 50.0), "x4": Free(0.0, 0.5235),
         "x2": Free(6.0, 10.0), "x3": Free(0.1, 0.5),
@@ -53,6 +55,7 @@ def case_with(free: int) -> Case:
 
 
 def main(engines: Iterable[str]) -> None:
+    """Print the table: cases by engine, then gaps, then numbers of free variables."""
     print(f"{'case':34} {'engine':6} {'asked':>7} {'status':10} {'boxes':>9} {'CPU s':>9} gap")
     for name in ("paper-4.1-helical", "paper-4.1-rotation", "paper-4.2-rotation", "paper-4.2-translation", "paper-4.3"):
         solution = solve(load_case(name), starts=8)

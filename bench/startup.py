@@ -1,8 +1,8 @@
-"""Time of whole commands beside the bare import of their libraries, taken in turns so that a busy machine burdens all.
+"""Time of whole commands beside the bare import of their libraries, run in turns so that a busy machine slows all.
 
 Run by hand: ``.venv/bin/python bench/startup.py [rounds] [bin folder of another environment]``. The aims: a solve with
-32 starts in at most 4 times the import, and help in no more than it. With another environment, such as one with an
-older version, every command is run in both, one after the other, and the median of the differences is shown.
+32 starts in at most 4 times the import, and help in no more than the import. With another environment, such as one with
+an older version, every command is run in both, one after the other, and the median of the differences is shown.
 """
 
 import os
@@ -25,7 +25,7 @@ COMMANDS = {
 
 
 def measure(folder: Path, command: list[str]) -> tuple[float, float]:
-    """Wall and processor milliseconds of a command in an environment."""
+    """Return wall and processor milliseconds of a command in an environment."""
     began = time.perf_counter()
     running = subprocess.Popen([folder / command[0], *command[1:]], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(running.pid, 0)

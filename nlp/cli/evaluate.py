@@ -47,7 +47,7 @@ def _parse_setting(text: str) -> tuple[str, float | list[float]]:
     """Read ``NAME=NUMBER`` or ``NAME=X,Y,Z``.
 
     Raises:
-        InputError: it is neither.
+        InputError: the text is neither.
     """
     from ..errors import InputError
 

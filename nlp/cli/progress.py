@@ -1,4 +1,4 @@
-"""Solves and certificates with a line of progress on standard error, where that is a terminal."""
+"""Solves and certificates with a line of progress on standard error, where standard error is a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 
 class SolveOutcome(NamedTuple):
-    """A solution, the same with certificates where they were asked for, and whether all of these are proved."""
+    """Outcome of a solve.
+
+    Attributes:
+        solution: the solution.
+        found: the solution with its certificates; without certification, the solution.
+        is_proved: whether every certificate is proved; true without certification.
+    """
 
     solution: Solution
     found: Solution | Certified
@@ -23,7 +29,7 @@ class SolveOutcome(NamedTuple):
 
 
 def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> SolveOutcome:
-    """Solve a case, and certify it where that is asked for.
+    """Solve a case, and certify it with ``certify``.
 
     Raises:
         CaseError: the case contradicts itself.
