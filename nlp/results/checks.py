@@ -1,4 +1,4 @@
-"""Checks of cases as a result: the types, and how they are made."""
+"""Checks of cases as a result: the types and their construction."""
 
 from collections.abc import Sequence
 
@@ -109,6 +109,7 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
 
 
 def _expected_data(row: ExpectedCheck) -> ExpectedData:
+    """Return the check of an expected number as data."""
     return ExpectedData(
         quantity=row.quantity,
         expected=row.expected,
@@ -119,6 +120,7 @@ def _expected_data(row: ExpectedCheck) -> ExpectedData:
 
 
 def _published_data(row: PublishedCheck) -> PublishedData:
+    """Return the check of a published number as data."""
     said = row.published
     return PublishedData(
         quantity=said.quantity,

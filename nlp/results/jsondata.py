@@ -1,8 +1,8 @@
 """Frozen values that JSON writes as objects: their base class, the marks of their fields, and the conversion.
 
-A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type checkers treat it as one. It is
-none, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a short
-command a thirtieth slower.
+A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type checkers treat it as a dataclass. It
+is no dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a
+short command a thirtieth slower.
 """
 
 import enum
@@ -19,7 +19,7 @@ JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, J
 
 
 class Mark(enum.Enum):
-    """Treatment of a field that is not simply written under its own name."""
+    """Treatment of a field that is not always written, or not under its own name."""
 
     ABSENT = "left out where it is None"
     INLINE = "its own fields stand in its place; none of them where it is None"
@@ -31,9 +31,9 @@ class Size(NamedTuple):
     entries: int
 
 
-#: A field that is left out of the object where it is None.
+#: A field that is absent from the object where the value is None.
 Absent: TypeAlias = Annotated[_T | None, Mark.ABSENT]
-#: A field in whose place its own fields stand.
+#: A field whose own fields are written in its place.
 Inline: TypeAlias = Annotated[_T, Mark.INLINE]
 
 Vector: TypeAlias = tuple[float, ...]
@@ -75,6 +75,7 @@ class JsonObject:
 
 
 def _mark_of(kind: object) -> Mark | None:
+    """Return the mark of a field's annotation; None without one."""
     marks = getattr(kind, "__metadata__", ()) if get_origin(kind) is Annotated else ()
     return next((mark for mark in marks if isinstance(mark, Mark)), None)
 
@@ -98,6 +99,7 @@ def json_data(value: JsonObject) -> dict[str, JsonValue]:
 
 
 def _json_value(value: object) -> JsonValue:
+    """Return a field's value as JSON's own types."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, JsonObject):

@@ -73,6 +73,7 @@ def _compound(kind: object, definitions: Schema) -> Schema:
 
 
 def _reference(kind: type[JsonObject], definitions: Schema) -> Schema:
+    """Return a reference to the schema of an object type, which is added to the definitions."""
     name = kind.__name__
     if name not in definitions:
         fields = _fields(kind, definitions)
@@ -106,6 +107,7 @@ class _Fields(NamedTuple):
 
 
 def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
+    """Return the fields of an object type, those of its inline parts among them."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
     for name, annotation in kind.__annotations__.items():
         mark = kind.marks[name]
@@ -120,7 +122,7 @@ def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
 
 
 def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> None:
-    """Add the fields of an inline part; where it may be absent, they are there all together or not at all."""
+    """Add the fields of an inline part; where the part may be absent, its fields are present together or not at all."""
     kind = _type_without_none(annotation)
     if not (isinstance(kind, type) and issubclass(kind, JsonObject)):
         raise TypeError(f"only an object can stand inline, which {kind!r} is not")
@@ -136,7 +138,7 @@ def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> Non
 
 
 def _type_without_none(annotation: object) -> object:
-    """Return the type of a marked field where it is not None."""
+    """Return the type of a marked field, without None."""
     kind = get_args(annotation)[0]
     if get_origin(kind) not in (Union, UnionType):
         return kind
