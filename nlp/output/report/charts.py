@@ -1,4 +1,4 @@
-"""Small charts as SVG within a page: they need no script, scale with the page, and print."""
+"""Small charts as SVG within a page; a chart needs no script, scales with the page, and prints."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ def line_chart(
     labels: tuple[str, str],
     bounds: Sequence[float] = (),
 ) -> Markup:
-    """Return a chart of lines over one axis, or a sentence where no point of theirs has a value.
+    """Return a chart of lines over one axis, or a sentence where no point of the lines has a value.
 
     Args:
         curves: at least one.
         spots: marked points.
         words: the chart's text alternative, a sentence.
         labels: of the horizontal and the vertical axis.
-        bounds: values on the horizontal axis that get a vertical line each.
+        bounds: values on the horizontal axis, each marked by a vertical line.
     """
     xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
     ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
@@ -117,6 +117,7 @@ class _Scale:
 
 
 def _svg(parts: Sequence[object], words: str) -> Markup:
+    """Return a chart from its parts, with its text alternative."""
     return tag(
         "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
     )
@@ -158,7 +159,7 @@ def _path(scale: _Scale, curve: Curve) -> str:
 
 
 def _range_with_room(low: float, high: float, part: float) -> tuple[float, float]:
-    """Return a range with room at its ends, in parts of its width; a range without width gets one first."""
+    """Return a range with room at its ends, in parts of its width; a range without width is widened first."""
     # Differences near rounding error would show as noise over the whole height.
     width = high - low
     if width <= 1e-6 * max(abs(low), abs(high)):
@@ -168,7 +169,7 @@ def _range_with_room(low: float, high: float, part: float) -> tuple[float, float
 
 
 def _ticks(low: float, high: float, about: int) -> list[float]:
-    """Return round values within a range, about so many."""
+    """Return at most ``about + 1`` round values within a range."""
     step = 10.0 ** math.floor(math.log10((high - low) / about))
     step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (factor * step) <= about)
     first = math.ceil(low / step - 1e-9)
@@ -176,4 +177,5 @@ def _ticks(low: float, high: float, about: int) -> list[float]:
 
 
 def _tick_text(value: float) -> str:
+    """Return a number as the label of a tick."""
     return f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")

@@ -1,4 +1,4 @@
-"""The surroundings of the answer as HTML: other optima, slices and maps of F."""
+"""Surroundings of the answer as HTML: other optima, slices and maps of F."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .slices import Slice, has_loops
 
 
 def optima(report: Report) -> Markup:
-    """Return the distinct optima that the starts ended at: F against count, and where they lie."""
+    """Return the distinct optima found from the starts: a chart of counts over F, and a table of their variables."""
     parts: list[Markup] = []
     solutions = [(part.name, part.solution) for part in report.parts]
     if report.combined is not None:
@@ -32,6 +32,7 @@ def optima(report: Report) -> Markup:
 
 
 def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
+    """Yield the starts of one program, and its distinct optima."""
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
@@ -84,6 +85,7 @@ def surroundings(report: Report) -> Markup:
 
 
 def _slice(part: Part, each: Slice) -> Markup:
+    """Return a chart of F along one variable, with a sentence about it."""
     nlp, x = part.nlp, part.x
     variable, units = nlp.program.variables[each.variable], nlp.case.units
     values = [units.shown(float(value), variable.dimension) for value in each.values]
@@ -119,6 +121,12 @@ def _slice(part: Part, each: Slice) -> Markup:
 
 
 def _maps(report: Report, parts: Sequence[int]) -> Markup:
+    """Return the frame of the maps of F, and the choice of two variables.
+
+    Args:
+        report: the report.
+        parts: indices of the parts with maps.
+    """
     options = []
     for k in parts:
         part = report.parts[k]

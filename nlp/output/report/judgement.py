@@ -29,6 +29,7 @@ def evidence_section(report: Report) -> Markup:
 
 
 def _evidence_of(result: SolveResult) -> Iterator[Markup]:
+    """Yield the evidence about one program's point."""
     yield paragraphs(evidence_lines(result))
     optimality = result.optimality
     if optimality is None:
@@ -40,13 +41,14 @@ def _evidence_of(result: SolveResult) -> Iterator[Markup]:
 
 
 def _active(optimality: OptimalityData) -> Markup:
+    """Return the active bounds and limits as a table, or a sentence without any."""
     if not optimality.active:
         return tag("p", "No bound or limit is active.")
     return html_table(active_table(optimality), "Active bounds and limits")
 
 
 def certificate_section(report: Report) -> Markup:
-    """Return the proven bounds, and how each came about."""
+    """Return the proven bounds, and the course of each search."""
     result = report.result
     found: list[tuple[str, CertificateData | None]] = []
     if isinstance(result, CombinedResult):
@@ -67,7 +69,7 @@ def certificate_section(report: Report) -> Markup:
 
 
 def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
-    """Return a chart of the bound and the best F known against time, from (seconds, bound, incumbent) on the way."""
+    """Return a chart of the bound and the incumbent against time, from a history of (seconds, bound, incumbent)."""
     if not history:
         return []
     if len(history) == 1:
@@ -88,7 +90,7 @@ def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
 
 
 def published_section(report: Report) -> Markup:
-    """Return what the literature prints beside what is computed here."""
+    """Return the published numbers beside the computed ones."""
     if report.check is None:
         return Markup("")
     caption = "What the literature prints beside what is computed here"

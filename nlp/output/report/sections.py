@@ -1,4 +1,4 @@
-"""A report as sections of HTML: words and tables, and a chart with its text alternative where one helps."""
+"""Sections of a report as HTML: words, tables, and charts with text alternatives."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .report import Report
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Return every section that has something to show: its anchor, its heading and its content."""
+    """Return the anchor, heading and content of every section that has content."""
     found = [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", _robot(report)),
@@ -52,7 +52,7 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
 
 
 def answer(report: Report) -> Markup:
-    """Return the answer, for the top of the page, or the sentence that there is none."""
+    """Return the answer for the top of the page, or the sentence that there is no answer."""
     result = report.result
     if isinstance(result, SolveResult):
         lines = [headline(result).words]
@@ -68,6 +68,7 @@ def answer(report: Report) -> Markup:
 
 
 def _case(report: Report) -> Markup:
+    """Return the case in words."""
     case, first = report.case, report.parts[0]
     lines = [f"{case.model.description}."]
     for task in case.tasks:
@@ -105,6 +106,7 @@ def _case(report: Report) -> Markup:
 
 
 def _robot(report: Report) -> Markup:
+    """Return the 3-D view with its controls, its legend and the rates."""
     views = [part.view for part in report.parts if part.view is not None]
     if not views:
         return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
@@ -145,7 +147,7 @@ def _robot(report: Report) -> Markup:
             aria_label="The robot in three dimensions; the table below says the same in numbers.",
         ),
         buttons,
-        # Printers get a copy of the picture, because what WebGL draws is not printed.
+        # A copy of the picture is for printing, because browsers do not print WebGL.
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
@@ -171,9 +173,9 @@ def _legend(view: ViewData) -> Markup:
 
 
 def _rates(view: ViewData) -> Markup:
-    """Return the rates of every row at the drawn posture; the script keeps the table in step with the platform."""
+    """Return the rates of every row at the drawn posture; the script updates the table as the platform moves."""
     frame = view["frames"][view["zero"]]
-    # Where the task's motion is resisted by nothing, what is left is rounding.
+    # Where nothing resists the task's motion, the rates are rounding error.
     rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
     largest = max(map(abs, rates), default=0.0) or 1.0
     total = sum(rate**2 for rate in rates)
@@ -215,6 +217,7 @@ def _rates(view: ViewData) -> Markup:
 
 
 def _result(report: Report) -> Markup:
+    """Return the design, and the tables of its robot."""
     result = report.result
     if isinstance(result, CombinedResult):
         return _combined_result(report, result)
@@ -223,6 +226,7 @@ def _result(report: Report) -> Markup:
 
 
 def _combined_result(report: Report, result: CombinedResult) -> Markup:
+    """Return the design at the combined point, then each task by itself."""
     case, combined = report.case, result.combined
     parts: list[Markup] = []
     robot = None if combined.point is None else combined.point.robot
@@ -256,6 +260,7 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
 
 
 def _limits(report: Report) -> Markup:
+    """Return the limits with their costs, and every margin."""
     limits, margins = _limits_of(report), _margins_of(report)
     if not limits:
         return Markup("")
@@ -273,6 +278,7 @@ def _limits(report: Report) -> Markup:
 
 
 def _origin(report: Report) -> Markup:
+    """Return versions, settings of the search, and the text of the case."""
     result = report.result
     origin = origin_table(result.versions, report.case.search, result.seconds)
     text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
@@ -289,7 +295,7 @@ def _origin(report: Report) -> Markup:
 
 
 def _limits_of(report: Report) -> Sequence[LimitData]:
-    """Return the limits of the case at the point that the report is about."""
+    """Return the limits of the case at the report's point."""
     result = report.result
     if isinstance(result, SolveResult):
         return result.limits
@@ -297,7 +303,7 @@ def _limits_of(report: Report) -> Sequence[LimitData]:
 
 
 def _margins_of(report: Report) -> Sequence[MarginData]:
-    """Return the margins at the point that the report is about."""
+    """Return the margins at the report's point."""
     result = report.result
     if isinstance(result, SolveResult):
         return result.margins
