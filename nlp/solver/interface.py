@@ -17,7 +17,7 @@ from ..program.nlp import Nlp
 
 
 class StopReason(enum.Enum):
-    """Why a local solver stopped."""
+    """Reason why a local solver stopped."""
 
     SUCCEEDED = "succeeded"
     ITERATION_LIMIT = "iteration limit"

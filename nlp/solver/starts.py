@@ -41,7 +41,7 @@ _STARTS_PER_JOB = 12
 
 
 class StartStatus(enum.Enum):
-    """How the search from one starting point ended; each value is a sentence for people."""
+    """Outcome of the search from one starting point; each value is a sentence for people."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "stopped at the iteration limit: raise solve.max_iterations"

@@ -50,7 +50,8 @@ SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NU
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`.
+    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the
+    :class:`~screwsynth.nlp.program.nlp.Nlp`.
 
     Attributes:
         name: in the words of a case.
