@@ -50,8 +50,9 @@ SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NU
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the
-    :class:`~screwsynth.nlp.program.nlp.Nlp`.
+    """A named smooth constraint ``lower <= expression <= upper``.
+
+    Its bounds are numbers of the :class:`~screwsynth.nlp.program.nlp.Nlp`.
 
     Attributes:
         name: in the words of a case.
