@@ -92,7 +92,7 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
         return cls(min=smallest, max=largest)
 
     def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
-        """Return what is measured on a robot."""
+        """Return the dimension of the measured quantity."""
         return self.measured
 
     def check(self, case: LimitedCase) -> None:

@@ -18,7 +18,7 @@ def report(found: Solution | Certified, *, text: str = _NO_CASE_FILE, check: Cas
 
     Args:
         found: a solution, or a solution with certificates.
-        text: the case as it is written in its file.
+        text: text of the case file.
         check: published and expected numbers beside the computed ones; left out, the page does not show them.
 
     Raises:
