@@ -35,8 +35,10 @@ def test_every_public_name_is_there_and_listed_in_order(package: object) -> None
 def test_the_stub_is_the_one_list_of_public_names() -> None:
     stub = Path(screwsynth.nlp.__file__).with_suffix(".pyi")
     tree = ast.parse(stub.read_text(encoding="utf-8"))
-    places = {alias.asname: (node.module, alias.name) for node in tree.body[1:] for alias in node.names}  # type: ignore[attr-defined]
-    assert all(isinstance(node, ast.ImportFrom) and node.level == 1 for node in tree.body[1:])
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    places = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
+    assert all(node.level == 1 for node in imports)
+    assert [ast.unparse(node) for node in tree.body[1:] if node not in imports] == ["__version__: str"]
     assert sorted(places) == screwsynth.nlp.__all__ == dir(screwsynth.nlp)
     for name, (module, own_name) in places.items():
         assert own_name == name
