@@ -387,11 +387,14 @@ def numbers_of_the_simulator() -> Iterator[tuple[str, str]]:
     F = [each.F for each in found]
     legs, twist, worst = found[int(np.argmin(F))]
     wide = [objective(placed_with(each, x1=2.0), twist) for each in states("flight-simulator")]
+    neutral = [found[0].legs, placed_with(states("flight-simulator")[0], x1=2.0)]
+    surge = [objective(each, translation(1, 0, 0)) for each in neutral]
     q = np.abs(rates(legs, twist))
     yield "F in the eight poses, m^2", ", ".join(f"{each:.2f}" for each in F)
     yield "worst pose", str(int(np.argmin(F)) + 1)
     yield "the worst F with a base of 2 m, m^2", f"{min(wide):.2f}"
-    yield "torque about the roll axis there, legs of 40 kN", f"{40 * sum(q):.0f} kN m"
+    yield "F of surge in the first pose, as it is and with a base of 2 m", f"{surge[0]:.2f} and {surge[1]:.2f}"
+    yield "torque about the roll axis in the worst pose, legs of 40 kN", f"{40 * sum(q):.0f} kN m"
     yield "roll speed there, legs of 1 m/s", f"{math.degrees(1 / max(q)):.0f} deg/s"
     yield "resolution of roll there, legs known to 0.1 mm", f"{math.degrees(1e-4 / math.sqrt(worst)) * 1000:.1f} mdeg"
 
