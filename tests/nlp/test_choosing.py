@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from screwsynth.nlp import Case, RobotState, Solution, case_from_tables, evaluate, load_case, solve
+from screwsynth.nlp import Case, RobotState, Solution, case_from_tables, evaluate, formulate, load_case, solve
 from screwsynth.nlp.case.reader import find_case
 
 Array = NDArray[np.float64]
@@ -229,7 +229,7 @@ def test_units_leave_f_of_a_translation_and_square_that_of_a_rotation() -> None:
         for key in ("x1", "x2"):
             tables["robot"]["parameters"][key] = scaled(tables["robot"]["parameters"][key], 1e-3)
         tables["pose"]["position"] = scaled(tables["pose"]["position"], 1e-3)
-        for key in ("leg_length", "joint_spacing", "footprint", "leg_clearance"):
+        for key in ("leg_length", "joint_spacing", "footprint"):
             if key in tables["limits"]:
                 tables["limits"][key] = scaled(tables["limits"][key], 1e-3)
         assert "point" not in tables["task"][0] or not any(tables["task"][0]["point"])
@@ -296,6 +296,15 @@ def start_of(number: Any) -> float:  # noqa: ANN401 - what TOML holds
 
 def objective(legs: Legs, twist: Array) -> float:
     return float(np.sum(rates(legs, twist) ** 2))
+
+
+@ALL
+def test_the_characteristic_length_has_no_effect_on_robots_with_legs_only(name: str) -> None:
+    case = load_case(name)
+    assert case.characteristic_length == 1
+    longer, nlp = formulate(replace(case, characteristic_length=7.5)), formulate(case)
+    for k in range(case.pose_count):
+        assert evaluate(longer, longer.start, k).F == evaluate(nlp, nlp.start, k).F
 
 
 def numbers_of_the_peg() -> Iterator[tuple[str, str]]:
