@@ -51,10 +51,12 @@ def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
         _Column(header, [_plain(row[k]) for row in shown], [_style(row[k]) for row in shown])
         for k, header in enumerate(table.headers)
     ]
+    if table.title:
+        yield Text(table.title, style=_LABEL)
     for part in _parts(columns, width):
         yield from _part_lines(part, len(shown), width)
     if table.folded:
-        yield Text(f"and {table.folded} {table.folded_words}", style=_LABEL)
+        yield Text(f"and {table.folded} {table.folded_words}; --csv FILE lists them", style=_LABEL)
 
 
 class _Column:

@@ -66,6 +66,7 @@ class TextTable:
         headers: of the columns; a second line is the unit.
         rows: a cell for each column; a line where its tone matters, a figure for a number with all its digits.
         name: one word, by which a table is asked for; empty for a table that nobody asks for.
+        title: line above the table on a terminal; empty where the table needs none.
         folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
         folded_words: name of these rows in the plural.
     """
@@ -73,5 +74,6 @@ class TextTable:
     headers: tuple[str, ...]
     rows: tuple[tuple[str | Line, ...], ...]
     name: str = ""
+    title: str = ""
     folded: int = 0
     folded_words: str = "rows"
