@@ -80,7 +80,7 @@ class Certificate:
 
     @property
     def is_obvious(self) -> bool:
-        """Whether the bound says no more than that F is at least 0, as a sum of squares is, and the best F is above 0."""
+        """Whether the bound says no more than that F, a sum of squares, is at least 0, and the best F is above that."""
         # A gap that is not relative is one beside 0: the bound 0 proves it.
         met = self.status is CertificateStatus.PROVED and not self.is_relative
         floor = 0.0 if math.isnan(self.incumbent) else _OBVIOUS * abs(self.incumbent)

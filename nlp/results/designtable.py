@@ -12,7 +12,7 @@ from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..units import Units
 from .rounding import STATED, listed, number, robot_size, settled, size_of_F
-from .text import TextTable
+from .text import FEWEST_FOLDED, TextTable
 
 if TYPE_CHECKING:
     from .data import ActiveData, CombinedData, SolveResult
@@ -131,12 +131,13 @@ def design_table(
     rows.sort(key=lambda row: row.place)
     fixed = [row for row in rows if row.place is _Place.FIXED]
     folded = len(fixed) - _FIXED if len(fixed) < len(rows) else 0
-    if folded > 0:
+    folded = folded if folded >= FEWEST_FOLDED else 0
+    if folded:
         fixed.sort(key=lambda row: -row.felt)
         rows[len(rows) - len(fixed) :] = fixed
     headers = ("", "reached" if reached else "value", "unit", "free between", *(("held by",) if reasons.any else ()))
     cells = tuple(row.cells for row in rows)
-    return TextTable(headers, cells, "design", folded=max(folded, 0), folded_words="more fixed numbers")
+    return TextTable(headers, cells, "design", folded=folded, folded_words="more fixed numbers")
 
 
 def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:

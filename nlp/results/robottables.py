@@ -13,7 +13,7 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..units import rate_unit
 from .rounding import number, rate_sizes, settled_F, settled_rates, size_of
-from .text import Figure, TextTable
+from .text import FEWEST_FOLDED, Figure, TextTable
 
 if TYPE_CHECKING:
     from .parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
@@ -140,7 +140,8 @@ def _signed_angle(case: Case, index: int, pose: PoseStateData) -> float:
 def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterator[TextTable]:
     """Yield the rates, then each measure, with a row for each pose and a column for each limb."""
     rows, task = case.model.wrenches, robot.task
-    folded = max(len(several.poses) - _POSES, 0)
+    folded = len(several.poses) - _POSES
+    folded = folded if folded >= FEWEST_FOLDED else 0
     if task is not None:
         values = [_settled_pose_F(pose, task) for pose in several.poses]
         marks = ["worst" if worst else "" for worst in _worst(values, task)]

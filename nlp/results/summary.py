@@ -20,7 +20,7 @@ from .wording import (
     heading_lines,
     singularity_lines,
     starts_lines,
-    task_line,
+    task_lines,
     title_line,
     tolerance_line,
     violation_lines,
@@ -96,7 +96,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     robot = result.robot
     yield title_line(case)
     for each in result.tasks:
-        yield task_line(each.task, case.units)
+        yield from task_lines(each.task, case.units)
         yield Line(number(0.0 if each.task_is_free and robot.several is None else each.F), label="F")
     yield from violation_lines(result.violated)
     yield design_table(case, robot)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+#: Fewer rows than these are not worth folding.
+FEWEST_FOLDED = 3
+
 
 class Tone(enum.Enum):
     """Meaning of a text beside its words."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
 from ..case.task import Sense
@@ -35,21 +35,42 @@ def title_line(case: Case) -> Line:
     return Line(case.title or case.name, tone=Tone.TITLE)
 
 
-def task_line(task: TaskData, units: Units) -> Line:
-    """Return a task: name, sense and motion."""
-    return Line(f"{task.name}, {task.sense.value} F: {task_words(task, units)}", label="task")
+def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
+    """Yield a task: name, sense, motion, and the axis's point nearest to the origin where the case states another."""
+    points = _stated_and_nearest(task)
+    if points is None:
+        yield Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
+        return
+    stated, nearest = points
+    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
+    yield Line(f"nearest to the origin at {nearest}", label="task's axis")
 
 
 def task_words(task: TaskData, units: Units) -> str:
     """Return a task's motion in words, with the point that the case states beside the one nearest to the origin."""
+    points = _stated_and_nearest(task)
+    if points is None:
+        return motion_words(task.motion, units)
+    stated, nearest = points
+    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    return f"{screw} through {stated}, nearest to the origin at {nearest}"
+
+
+class _Points(NamedTuple):
+    """The points of a task's axis as text: the stated one, and the one nearest to the origin."""
+
+    stated: str
+    nearest: str
+
+
+def _stated_and_nearest(task: TaskData) -> _Points | None:
+    """Return the points of a task's axis; None where its case states none, or the nearest one."""
     if task.stated_point is None or task.motion.point is None:
-        return motion_words(task.motion, units)
+        return None
     size = _reach(task.motion, 0.0)
-    stated, nearest = _triple(task.stated_point, size), _triple(task.motion.point, size)
-    if stated == nearest:
-        return motion_words(task.motion, units)
-    words = _screw_words(task.motion, units, size)
-    return f"{words} through {stated}, nearest to the origin at {nearest}"
+    points = _Points(_triple(task.stated_point, size), _triple(task.motion.point, size))
+    return None if points.stated == points.nearest else points
 
 
 def motion_words(motion: MotionData, units: Units, size: float = 0.0) -> str:
@@ -121,7 +142,7 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
     """Yield title, task, and F or the status."""
     yield title_line(case)
     if result.robot is not None and result.robot.task is not None:
-        yield task_line(result.robot.task, case.units)
+        yield from task_lines(result.robot.task, case.units)
     yield headline(result, case)
 
 
