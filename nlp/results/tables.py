@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..evidence.kkt import ACTIVE
 from ..units import Units
 from .data import CombinedData
-from .rounding import number, rate_sizes, settled, settled_F, task_F
+from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
 from .wording import SET, counted, motion_words
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 #: So many places where a limit is active are named.
 _PLACES = 3
+#: Error of the margin in an active limit, as a part of the limit: that of the test whether a point lies on it.
+_ON_LIMIT = 10 * ACTIVE
 #: So many optima are shown in full.
 MOST_OPTIMA = 12
 
@@ -67,8 +70,10 @@ def _text(value: float | None, size: float) -> str:
 
 
 def _margin_text(margin: float | None, beside: float, word: str) -> str:
-    """Return a margin's text; at an active limit it is 0, up to the error that makes a limit active."""
-    return number(0.0) if word == "active" and margin is not None else _text(margin, beside)
+    """Return a margin's text; at an active limit its error is that of the test for active limits."""
+    if margin is None:
+        return "none"
+    return number(margin, beside, digits=6, part=_ON_LIMIT if word == "active" else NOISE)
 
 
 def _place(name: str) -> str:
