@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...evidence.state import ZERO_F
 from ...results.data import SolveResult
 from ...results.parts import RobotData
 from ...results.rounding import number, settled, task_F
@@ -102,7 +103,7 @@ def _slice(part: Part, each: Slice) -> Markup:
     inside = np.where(each.inside > 0, each.F, np.nan)
     width = values[-1] - values[0]
     at = settled(units.shown(float(x[each.variable]), variable.dimension), width)
-    here = nlp.evaluate(x)[0]
+    here = settled(nlp.evaluate(x)[0], nlp.objective_scale, ZERO_F)
     unit = units.label(variable.dimension)
     finite = np.isfinite(each.F)
     if finite.any():
