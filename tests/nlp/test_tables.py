@@ -19,6 +19,7 @@ from screwsynth.models import model_names, three_upu
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, build_model, load_case, shipped_cases, solve
 from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
@@ -33,6 +34,7 @@ from screwsynth.nlp.results.data import SolveResult
 from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
 from screwsynth.nlp.results.point import motion_data
 from screwsynth.nlp.results.result import result_of
+from screwsynth.nlp.results.robotwording import model_words
 from screwsynth.nlp.results.rounding import listed, number
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.tables import limit_table, margin_table, optimum_table
@@ -123,6 +125,11 @@ def test_no_number_of_an_evaluation_is_split_at_any_width(name: str) -> None:
     check_widths(tuple(evaluation_summary(case, evaluated(case))))
 
 
+def test_no_word_about_a_robot_is_split_at_any_width() -> None:
+    for name in model_names():
+        check_widths(tuple(model_words(name, build_model(name), model_options(name))))
+
+
 def test_a_narrow_table_goes_on_below_with_the_names_of_its_rows() -> None:
     numbers = [f"{k}.123456" for k in range(9)]
     table = TextTable(("leg", *(f"column {k}\nmm" for k in range(9))), (("1-", *numbers), ("1+", *numbers)))
@@ -131,6 +138,15 @@ def test_a_narrow_table_goes_on_below_with_the_names_of_its_rows() -> None:
     assert sum(line.startswith("1- ") for line in lines) == 2
     assert all(len(re.findall(re.escape(each), "\n".join(lines))) == 2 for each in numbers)
     assert printed([TextTable(("", ""), (("x", "y" * 90),))], 60).count("y") == 90
+
+
+def test_no_rounding_noise_on_a_page() -> None:
+    case = load_case("paper-4.4-min")
+    solution = solve(case, starts=2)
+    page = page_of(report_of("", solution, result_of(solution)))
+    assert re.search(r"\de-[23]\d", page), "the JSON has the noise as it is"
+    words = re.sub(r"<script.*?</script>|<p><span class=.label.>evidence:.*?</p>", "", page, flags=re.DOTALL)
+    assert not re.findall(r".{40}\de-[1-3]\d", words)
 
 
 @pytest.mark.parametrize("name", [*shipped_cases()])
