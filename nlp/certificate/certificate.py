@@ -112,7 +112,10 @@ class Certificate:
             return (
                 f"nothing useful is proved yet ({self.reason or 'the gap asked for allows it'}): F is at least 0{best}"
             )
-        what = f"no point of the box within the limits has F {word} than {self.bound + 0.0:.10g}{best}{beaten}"
+        # A lower bound may be rounded down to 0, an upper one may not.
+        is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_scale
+        bound = 0.0 if is_noise else self.bound + 0.0
+        what = f"no point of the box within the limits has F {word} than {bound:.10g}{best}{beaten}"
         if self.status is CertificateStatus.PROVED:
             return f"proved: {what}, {SCOPE}"
         return f"incomplete ({self.reason}), but proved: {what}, {SCOPE}"

@@ -251,7 +251,8 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
         part = "" if certificate.relative_gap is None else f" ({certificate.relative_gap:.2e} of it)"
         yield Line(f"{certificate.gap:.3g}{part}", label="gap")
     left = f", {certificate.open:,} left" if certificate.open else ""
-    boxes = f"{certificate.boxes:,} boxes{left} in {certificate.seconds:.2f} s"
+    word = "box" if certificate.boxes == 1 else "boxes"
+    boxes = f"{certificate.boxes:,} {word}{left} in {certificate.seconds:.2f} s"
     yield Line(f"{boxes}, engine {certificate.engine}", label="search")
 
 

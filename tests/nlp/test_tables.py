@@ -32,6 +32,7 @@ from screwsynth.nlp.program.epigraph import with_exact_level
 from screwsynth.nlp.program.formulation import formulate, formulate_each
 from screwsynth.nlp.results.data import SolveResult
 from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
+from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.point import motion_data
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.robotwording import model_words
@@ -39,7 +40,7 @@ from screwsynth.nlp.results.rounding import listed, number
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.tables import limit_table, margin_table, optimum_table
 from screwsynth.nlp.results.text import Line, TextTable, Tone
-from screwsynth.nlp.results.wording import headline, motion_words, task_words
+from screwsynth.nlp.results.wording import certificate_lines, headline, motion_words, task_words
 
 Run = Callable[..., tuple[int, str, str]]
 WIDTHS = (60, 80, 100, 120)
@@ -394,6 +395,10 @@ def test_a_certificate_that_proves_only_the_obvious_says_so() -> None:
     assert useful.statement.startswith("incomplete")
     below = replace(early, above=-1.0, status=CertificateStatus.PROVED)
     assert "says nothing useful: F is at least 0" in below.statement
+    assert "1 boxes" not in "".join(line.words for line in certificate_lines(certificate_data(replace(early, boxes=1))))
+    fixed = certify_program(formulate(load_case("paper-4.4-snu")))
+    assert 0 < fixed.bound < 1e-20
+    assert "has F smaller than 0; the best point known has 0" in fixed.statement
     # Where F reaches 0, the bound 0 is all there is to prove.
     reached = replace(early, status=CertificateStatus.PROVED, incumbent=0.0, bound=0.0)
     assert reached.statement.startswith("proved: no point of the box")
