@@ -109,6 +109,8 @@ def _check_shapes(model: Model) -> None:
     for parameter in model.parameters:
         if len(parameter.typical) not in (1, 3):
             raise _model_error(model, f"parameter {parameter.name!r} should have 1 or 3 components")
+        if len(parameter.starter or parameter.typical) != len(parameter.typical):
+            raise _model_error(model, f"parameter {parameter.name!r} should have as many components in a starter case")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),

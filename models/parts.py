@@ -41,6 +41,8 @@ class Parameter:
         lower, upper: least and largest value with which the robot exists.
         is_direction: whether the parameter is a unit vector. A fixed one is normalised; a free one has its unit length
             as an equation of the program.
+        starter: value of each component in a starter case, where the robot is singular at its typical values; None for
+            the typical value.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Parameter:
     lower: float = -float("inf")
     upper: float = float("inf")
     is_direction: bool = False
+    starter: tuple[float, ...] | None = None
 
     @property
     def components(self) -> tuple[str, ...]:

@@ -56,12 +56,22 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
         first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
         if first is None:
             parameters.append(
-                _direction_parameter(f"u1_{row.limb}", f"first axis of limb {row.limb}'s upper joint", _radial(k))
+                _direction_parameter(
+                    f"u1_{row.limb}",
+                    f"first axis of limb {row.limb}'s upper joint",
+                    _radial(k),
+                    starter=_radial(k) if axes == "free" else _tilted(_radial(k)),
+                )
             )
             first = parameters[-1].symbol
         if axes == "free":
             parameters.append(
-                _direction_parameter(f"u2_{row.limb}", f"second axis of limb {row.limb}'s upper joint", _tangential(k))
+                _direction_parameter(
+                    f"u2_{row.limb}",
+                    f"second axis of limb {row.limb}'s upper joint",
+                    _tangential(k),
+                    starter=_tilted(_tangential(k)),
+                )
             )
             second = parameters[-1].symbol
             u1, u2 = pose.rotation @ first, pose.rotation @ second
@@ -117,7 +127,30 @@ def _tangential(k: int) -> SX:
     return SX([-math.sin(k * _THIRD), math.cos(k * _THIRD), 0.0])
 
 
-def _direction_parameter(name: str, description: str, typical: SX) -> Parameter:
+def _tilted(direction: SX) -> SX:
+    """Return a horizontal unit vector (3, 1) tilted upwards.
+
+    With all axes in the platform's plane the three couples are about one normal, and the robot is singular.
+    """
+    return 0.8 * direction + SX([0.0, 0.0, 0.6])
+
+
+def _direction_parameter(name: str, description: str, typical: SX, *, starter: SX) -> Parameter:
     """Return a parameter that is a unit vector."""
-    x, y, z = (float(typical[i]) for i in range(3))
-    return Parameter(name, SX.sym(name, 3), Dimension.NUMBER, description, (x, y, z), -1.0, 1.0, is_direction=True)
+    return Parameter(
+        name,
+        SX.sym(name, 3),
+        Dimension.NUMBER,
+        description,
+        _triple(typical),
+        -1.0,
+        1.0,
+        is_direction=True,
+        starter=_triple(starter),
+    )
+
+
+def _triple(vector: SX) -> tuple[float, float, float]:
+    """Return the components of a constant (3, 1)."""
+    x, y, z = (float(vector[i]) for i in range(3))
+    return x, y, z

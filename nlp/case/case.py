@@ -16,7 +16,7 @@ import numpy as np
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ..errors import CaseError, nearest
 from ..units import Units
-from .checks import check_direction, check_value
+from .checks import check_direction, check_value, check_vector
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
 from .names import parameter_name, pose_prefixes
@@ -282,7 +282,8 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
             raise CaseError(f"{key}.twist", fault)
         if not (math.isfinite(task.weight) and task.weight > 0):
             raise CaseError(f"{key}.weight", "must be positive", task.weight)
-        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight)))
+        point = None if task.point is None else frozen_array(check_vector(task.point, f"{key}.point"), (3,))
+        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight), point))
     names = [task.name for task in tasks]
     for index, name in enumerate(names):
         if name in names[:index]:

@@ -5,6 +5,7 @@ A case is named by its path; a shipped case also by its bare name.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -249,7 +250,8 @@ def _task(written: TaskTable, index: int) -> Task:
     key, name = f"task[{index}]", written.name or f"task {index + 1}"
     if written.twist is None:
         twist = unit_twist(written.axis, written.point, written.pitch, key)
-        return Task(twist, Sense(written.sense), name, written.weight)
+        point = None if written.pitch == math.inf else written.point
+        return Task(twist, Sense(written.sense), name, written.weight, point)
     for part in ("axis", "point", "pitch"):
         if getattr(written, part) is not None:
             raise CaseError(f"{key}.{part}", "cannot stand beside twist; say the motion in one way")

@@ -79,8 +79,8 @@ def starter_case(model: Model) -> str:
 
 
 def _parameter_line(parameter: Parameter, *, is_free: bool) -> str:
-    """Return the line of a parameter, free about its typical value or fixed there."""
-    values = [_UNITS.shown(value, parameter.dimension) for value in parameter.typical]
+    """Return the line of a parameter, free about its value in a starter or fixed there."""
+    values = [_UNITS.shown(value, parameter.dimension) for value in parameter.starter or parameter.typical]
     width = _SPREAD * max(abs(value) for value in values) or 1.0
     domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
     texts = [_free_number(value, width, domain) if is_free else f"{value:.10g}" for value in values]

@@ -31,12 +31,14 @@ class Task:
         sense: whether F is maximised or minimised.
         name: a few words.
         weight: positive weight among several tasks.
+        point: (3,) point of the axis as it was stated, length; None for a translation, and for a task given as a twist.
     """
 
     twist: ArrayLike
     sense: Sense = Sense.MAX
     name: str = "task"
     weight: float = 1.0
+    point: ArrayLike | None = None
 
     @classmethod
     def screw(
@@ -64,7 +66,8 @@ class Task:
         """
         if sense not in ("max", "min", Sense.MAX, Sense.MIN):
             raise CaseError("task.sense", "must be 'max' or 'min'", sense)
-        return cls(unit_twist(axis, point, pitch, "task"), Sense(sense), name, weight)
+        twist = unit_twist(axis, point, pitch, "task")
+        return cls(twist, Sense(sense), name, weight, None if pitch == math.inf else point)
 
 
 def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | None, key: str) -> FloatArray:

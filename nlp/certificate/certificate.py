@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 from ...models import FloatArray
 from ..case.task import Sense
+from ..evidence.state import ZERO_F
 from ..program.nlp import Nlp
 
+#: Part of the incumbent below which a lower bound is as good as 0.
+_OBVIOUS = 1e-9
 #: Scope of every statement: the expressions as CasADi holds them, not the machine.
 SCOPE = "for the double-precision expression graph of this case"
 
@@ -76,20 +79,43 @@ class Certificate:
         return self.gap / abs(self.incumbent)
 
     @property
+    def is_obvious(self) -> bool:
+        """Whether the bound says no more than that F, a sum of squares, is at least 0, and the best F is above that."""
+        # A gap that is not relative is one beside 0: the bound 0 proves it.
+        met = self.status is CertificateStatus.PROVED and not self.is_relative
+        floor = 0.0 if math.isnan(self.incumbent) else _OBVIOUS * abs(self.incumbent)
+        reached = abs(self.incumbent) <= ZERO_F * self.nlp.objective_scale
+        return self.nlp.sense is Sense.MIN and self.bound <= floor and not (met or reached)
+
+    @property
     def statement(self) -> str:
         """The proven statement in one sentence, with its limits."""
-        word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
-        best = "" if math.isnan(self.incumbent) else f"; the best point known has {self.incumbent:.10g}"
-        beaten = ", better than the one given" if self.was_beaten else ""
         if self.status is CertificateStatus.INFEASIBLE:
             return f"proved: no point of the box keeps all limits, {SCOPE}"
         if self.status is CertificateStatus.REFUSED:
             return f"refused: {self.reason}"
+        return self._bound_statement
+
+    @property
+    def _bound_statement(self) -> str:
+        """The statement of a bound."""
+        word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
+        value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_scale else self.incumbent
+        best = "" if math.isnan(value) else f"; the best point known has {value:.10g}"
+        beaten = ", better than the one given" if self.was_beaten else ""
         if self.above is not None and self.status is CertificateStatus.PROVED:
-            return f"proved: F is above {self.above:.10g} on the whole box within the limits{best}, {SCOPE}"
+            obvious = ", which says nothing useful: F is at least 0" if self.above < 0 else ""
+            return f"proved: F is above {self.above:.10g} on the whole box within the limits{obvious}{best}, {SCOPE}"
         if not math.isfinite(self.bound):
             return f"nothing is proved: {self.reason}{best}"
-        what = f"no point of the box within the limits has F {word} than {self.bound + 0.0:.10g}{best}{beaten}"
+        if self.is_obvious:
+            return (
+                f"nothing useful is proved yet ({self.reason or 'the gap asked for allows it'}): F is at least 0{best}"
+            )
+        # A lower bound may be rounded down to 0, an upper one may not.
+        is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_scale
+        bound = 0.0 if is_noise else self.bound + 0.0
+        what = f"no point of the box within the limits has F {word} than {bound:.10g}{best}{beaten}"
         if self.status is CertificateStatus.PROVED:
             return f"proved: {what}, {SCOPE}"
         return f"incomplete ({self.reason}), but proved: {what}, {SCOPE}"

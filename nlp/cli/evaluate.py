@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, JsonFile, check_target, console, write_json
+from .options import CaseName, CsvFile, CsvTable, JsonFile, check_csv, check_target, console, write_csv, write_json
 
 
 def evaluate(
@@ -16,6 +16,8 @@ def evaluate(
         typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),
     ] = None,
     json_file: JsonFile = None,
+    csv_file: CsvFile = None,
+    table: CsvTable = None,
 ) -> None:
     """Show F, J, rank and rates at one point; nothing is optimised.
 
@@ -30,12 +32,17 @@ def evaluate(
 
     loaded = load_case(case, dict(_parse_setting(text) for text in settings or []))
     check_target(json_file)
+    check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         write_json(json_file, result)
-    if json_file != "-":
+    if csv_file is not None:
+        from ..results.alltables import evaluation_tables
+
+        write_csv(csv_file, evaluation_tables(loaded, result), table)
+    if "-" not in (json_file, csv_file):
         from ..output.terminal import show
         from ..results.summary import evaluation_summary
 

@@ -8,15 +8,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rich.console import Console
 
+    from ..case.case import Case
     from ..results.jsondata import JsonObject
+    from ..results.text import TextTable
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
     str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")
 ]
 JsonFile = Annotated[str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.")]
+CsvFile = Annotated[
+    str | None, typer.Option("--csv", metavar="FILE", help="Write the tables with all digits; - is stdout.")
+]
+CsvTable = Annotated[
+    str | None, typer.Option("--table", metavar="NAME", help="Write this table only, such as design, limbs or limits.")
+]
 Starts = Annotated[int | None, typer.Option(min=1, max=100_000, help="Starting points instead of the case's.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")]
@@ -59,6 +69,44 @@ def write_json(target: str, result: JsonObject) -> None:
     from ..results.jsondata import json_data
 
     write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
+
+
+def check_csv(target: str | None, table: str | None, json_file: str | None, case: Case, *, at_point: bool) -> None:
+    """Refuse a file that cannot be written, or a table that the command has none of, before the work begins.
+
+    Args:
+        target: of the tables.
+        table: name of the only table to write.
+        json_file: target of the result.
+        case: the case.
+        at_point: whether the case is evaluated at a point, and not solved.
+
+    Raises:
+        InputError: it is refused.
+    """
+    from ..errors import InputError, listing
+    from ..results.alltables import table_names
+
+    if target is None and table is not None:
+        raise InputError(f"--table {table}: needs --csv FILE")
+    if target == "-" and json_file == "-":
+        raise InputError("standard output can take one of --json - and --csv - only")
+    names = table_names(case, at_point=at_point)
+    if table is not None and table not in names:
+        raise InputError(f"--table {table}: must be one of {listing(names)}")
+    check_target(target)
+
+
+def write_csv(target: str, tables: Iterable[TextTable], name: str | None) -> None:
+    """Write tables as comma-separated values, to standard output for ``-``.
+
+    Raises:
+        InputError: it cannot be written, or the result has no table of this name.
+    """
+    from ..output.csvtables import tables_as_csv
+    from ..output.files import write_text
+
+    write_text(target, tables_as_csv(tables, name))
 
 
 def console() -> Console:

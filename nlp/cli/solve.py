@@ -7,7 +7,22 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_picture, check_target, console, write_json
+from .options import (
+    CaseName,
+    CsvFile,
+    CsvTable,
+    Jobs,
+    JsonFile,
+    PlotFile,
+    Seed,
+    Starts,
+    check_csv,
+    check_picture,
+    check_target,
+    console,
+    write_csv,
+    write_json,
+)
 
 
 def solve(
@@ -19,6 +34,8 @@ def solve(
         bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
     ] = False,
     json_file: JsonFile = None,
+    csv_file: CsvFile = None,
+    table: CsvTable = None,
     plot: PlotFile = None,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
@@ -32,16 +49,21 @@ def solve(
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     check_target(json_file)
+    check_csv(csv_file, table, json_file, loaded, at_point=False)
     check_picture(plot)
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
     if json_file is not None:
         write_json(json_file, result)
+    if csv_file is not None:
+        from ..results.alltables import case_tables
+
+        write_csv(csv_file, case_tables(loaded, result), table)
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 
         draw(solution, plot)
-    if json_file != "-":
+    if "-" not in (json_file, csv_file):
         from ..output.terminal import show
         from ..results.summary import case_summary
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...models import Dimension, FloatArray
 from ..case.limits.constraint import BoundedConstraint, Constraint
 from ..program.nlp import Nlp
-from .kkt import linearise, multipliers
+from .kkt import FEASIBLE, linearise, multipliers
 from .state import RobotState, evaluate
 
 
@@ -34,6 +34,7 @@ class Margin:
         limit: the number in the case, radians for angles.
         dimension: of both.
         active: whether the point lies on it.
+        violated: whether the point lies outside of it by more than a feasible point may.
         cost: derivative of the optimal F by the limit, per radian for angles; None where there is no optimum.
     """
 
@@ -44,6 +45,7 @@ class Margin:
     limit: float
     dimension: Dimension
     active: bool
+    violated: bool
     cost: float | None
 
     @property
@@ -87,6 +89,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
                 limit=constraint.reading.from_value(limit),
                 dimension=constraint.reading.dimension,
                 active=j in active,
+                violated=bool(at.slack[j] < -FEASIBLE),
                 cost=float(gained[j] * constraint.reading.slope(limit)) if optimal else None,
             )
         )
@@ -110,6 +113,7 @@ def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
             limit=item.constraint.reading.from_value(limit),
             dimension=item.constraint.reading.dimension,
             active=False,
+            violated=False,
             cost=0.0 if optimal else None,
         )
         for item, value in zip(nlp.constant_limits, measured, strict=True)

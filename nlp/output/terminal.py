@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
-from rich.console import Console, RenderableType
-from rich.table import Table
+from rich.cells import cell_len
+from rich.console import Console
 from rich.text import Text
 
 from ..results.text import Line, TextTable, Tone
@@ -20,17 +20,17 @@ _STYLES = {
     Tone.FAULT: "red",
     Tone.CAUTION: "yellow",
 }
+#: Spaces between columns, where they fit; else the smaller number.
+_GAP, _NARROW_GAP = 3, 2
+#: Words in a column wrap at this width or a larger one, so that a column never becomes a word a line.
+_WRAPPED = 14
 
 
 def show(console: Console, items: Iterable[Line | TextTable]) -> None:
-    """Print lines and tables."""
+    """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself."""
     for item in items:
-        console.print(_render(item))
-
-
-def _render(item: Line | TextTable) -> RenderableType:
-    """Return a line or a table for a console."""
-    return _text(item) if isinstance(item, Line) else _table(item)
+        for line in [_text(item)] if isinstance(item, Line) else _table_lines(item, console.width):
+            console.print(line)
 
 
 def _text(line: Line) -> Text:
@@ -42,10 +42,136 @@ def _text(line: Line) -> Text:
     return Text.assemble(*label, line.before, (line.text, style), line.after)
 
 
-def _table(table: TextTable) -> Table:
-    found = Table(box=None, pad_edge=False, header_style=_LABEL, padding=(0, 3, 0, 0))
-    for header in table.headers:
-        found.add_column(header, overflow="fold")
-    for row in table.rows:
-        found.add_row(*(_text(cell) if isinstance(cell, Line) else cell for cell in row))
-    return found
+def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
+    """Yield the lines of a table in a width: in several tables below each other where one would be too wide.
+
+    Each of these begins with the first column, which names the rows.
+    """
+    shown = table.rows[: len(table.rows) - table.folded]
+    columns = [
+        _Column(header, [_plain(row[k]) for row in shown], [_style(row[k]) for row in shown])
+        for k, header in enumerate(table.headers)
+    ]
+    if table.title:
+        yield Text(table.title, style=_LABEL)
+    for part in _parts(columns, width):
+        yield from _part_lines(part, len(shown), width)
+    if table.folded:
+        yield Text(f"and {table.folded} {table.folded_words}; --csv FILE lists them", style=_LABEL)
+
+
+class _Column:
+    """A column of a table: header, cells, and the widths that it can have."""
+
+    def __init__(self, header: str, cells: Sequence[str], styles: Sequence[str]) -> None:
+        self.header, self.cells, self.styles = header, cells, styles
+        inside = max(map(cell_len, cells), default=0)
+        words = max((cell_len(word) for text in (header, *cells) for word in text.split()), default=0)
+        #: Width without a break.
+        self.natural = max(inside, *map(cell_len, header.split("\n")))
+        #: Width with breaks between the words of the header only.
+        self.narrow = max(inside, *(cell_len(word) for word in header.split()), 0)
+        #: Least width.
+        self.least = min(self.narrow, max(words, _WRAPPED))
+
+
+def _parts(columns: Sequence[_Column], width: int) -> Iterator[Sequence[_Column]]:
+    """Yield the columns of each of the tables that a table becomes, so that each fits a width."""
+    first, *others = columns
+    if not others or _fits([column.least for column in columns], width):
+        yield columns
+        return
+    part = [first]
+    for column in others:
+        # Columns of a part keep their cells in one line, where the width allows that for a column alone.
+        if len(part) > 1 and not _fits([each.narrow for each in (*part, column)], width):
+            yield part
+            part = [first]
+        part.append(column)
+    yield part
+
+
+def _fits(widths: Sequence[int], width: int) -> bool:
+    return sum(widths) + _NARROW_GAP * (len(widths) - 1) <= width
+
+
+def _part_lines(columns: Sequence[_Column], rows: int, width: int) -> Iterator[Text]:
+    """Yield the lines of a table whose columns fit a width."""
+    naturals = [column.natural for column in columns]
+    between = _GAP if sum(naturals) + _GAP * (len(columns) - 1) <= width else _NARROW_GAP
+    widths = _widths(columns, width - between * (len(columns) - 1))
+    headers = [_wrapped(column.header, size) for column, size in zip(columns, widths, strict=True)]
+    tall = max(map(len, headers))
+    raised = [[""] * (tall - len(lines)) + lines for lines in headers]
+    yield from _row_lines(raised, [_LABEL] * len(columns), widths, between)
+    for k in range(rows):
+        cells = [_wrapped(column.cells[k], size) for column, size in zip(columns, widths, strict=True)]
+        yield from _row_lines(cells, [column.styles[k] for column in columns], widths, between)
+
+
+def _widths(columns: Sequence[_Column], width: int) -> list[int]:
+    """Return a width for each column: headers wrap first, then the words of the widest columns."""
+    widths = [column.natural for column in columns]
+    for floors in ([column.narrow for column in columns], [column.least for column in columns]):
+        while sum(widths) > width:
+            wide = [k for k, floor in enumerate(floors) if widths[k] > floor]
+            if not wide:
+                break
+            widths[max(wide, key=widths.__getitem__)] -= 1
+    while sum(widths) > max(width, len(widths)):
+        # A word by itself is wider than the terminal.
+        widths[widths.index(max(widths))] -= 1
+    return widths
+
+
+def _row_lines(
+    cells: Sequence[Sequence[str]], styles: Sequence[str], widths: Sequence[int], between: int
+) -> Iterator[Text]:
+    """Yield the lines of one row, each cell as its lines."""
+    for k in range(max(map(len, cells))):
+        line = Text()
+        for lines, style, size in zip(cells, styles, widths, strict=True):
+            text = lines[k] if k < len(lines) else ""
+            line.append(text, style=style)
+            line.append(" " * (size - cell_len(text) + between))
+        line.rstrip()
+        yield line
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Return the lines of a text in a width, broken between words."""
+    lines: list[str] = []
+    for paragraph in text.split("\n"):
+        if cell_len(paragraph) <= width:
+            lines.append(paragraph)
+            continue
+        line = ""
+        for word in paragraph.split():
+            pieces = list(_pieces(word, width))
+            if line and cell_len(line) + 1 + cell_len(pieces[0]) <= width and len(pieces) == 1:
+                line += f" {word}"
+                continue
+            lines += [line] if line else []
+            *full, line = pieces
+            lines += full
+        lines.append(line)
+    return lines
+
+
+def _pieces(word: str, width: int) -> Iterator[str]:
+    """Yield the pieces of a word, one where it fits a width."""
+    piece = ""
+    for sign in word:
+        if piece and cell_len(piece + sign) > width:
+            yield piece
+            piece = ""
+        piece += sign
+    yield piece
+
+
+def _plain(cell: str | Line) -> str:
+    return cell.words if isinstance(cell, Line) else str(cell)
+
+
+def _style(cell: str | Line) -> str:
+    return _STYLES[cell.tone] if isinstance(cell, Line) else ""

@@ -32,6 +32,7 @@ def _margin(units: Units, row: Margin) -> MarginData:
         margin=finite_or_none(units.shown(row.margin, row.dimension)),
         unit=units.label(row.dimension),
         active=row.active,
+        violated=row.violated,
         cost=None if row.cost is None else units.per_unit(row.cost, row.dimension),
     )
 
@@ -54,6 +55,7 @@ def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
         value=least.value,
         margin=least.margin,
         active=tuple(row.name for row in margins if row.active),
+        violated=tuple(row.name for row in margins if row.violated),
         cost=sum(costs) if costs else None,
     )
 

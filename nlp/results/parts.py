@@ -99,11 +99,13 @@ class TaskData(JsonObject):
         name: of the task.
         sense: whether F is maximised or minimised.
         motion: of the platform.
+        stated_point: the axis's point that the case states; absent where it states none.
     """
 
     name: str
     sense: Sense
     motion: Inline[MotionData]
+    stated_point: Absent[Vector3]
 
 
 class PoseStateData(JsonObject):
@@ -118,6 +120,7 @@ class PoseStateData(JsonObject):
         singular: whether the rank is below six.
         singular_values: of the Jacobian, largest first.
         quantities: leg lengths, joint angles and the like, by limb.
+        limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
     """
 
     F: float
@@ -128,6 +131,7 @@ class PoseStateData(JsonObject):
     singular: bool
     singular_values: Vector
     quantities: Mapping[str, ByOwner]
+    limited_quantities: Absent[Mapping[str, ByOwner]]
 
 
 class PosesData(JsonObject):
@@ -160,6 +164,7 @@ class RobotData(JsonObject):
         free_motions: basis of the motions that no row resists.
         task_is_free: whether F is zero, so that nothing resists the task's motion.
         quantities: leg lengths, joint angles and the like, by limb.
+        limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
         characteristic_length: that relates couples to forces; absent for robots without constraint couples.
         several: the robot at every pose; absent where there is one.
     """
@@ -176,6 +181,7 @@ class RobotData(JsonObject):
     free_motions: tuple[MotionData, ...]
     task_is_free: Absent[bool]
     quantities: Mapping[str, ByOwner]
+    limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
     several: Inline[PosesData | None]
 
@@ -208,6 +214,7 @@ class MarginData(JsonObject):
         margin: distance from the limit, positive inside.
         unit: of value, limit and margin.
         active: whether the point lies on the limit.
+        violated: whether the point lies outside of the limit by more than rounding error.
         cost: derivative of the optimal F by the limit; null where the point is no optimum.
     """
 
@@ -219,6 +226,7 @@ class MarginData(JsonObject):
     margin: float | None
     unit: str
     active: bool
+    violated: bool
     cost: float | None
 
 
@@ -233,6 +241,7 @@ class LimitData(JsonObject):
         value: measured there.
         margin: least margin, positive inside.
         active: everywhere that the point lies on the limit.
+        violated: everywhere that the point lies outside of the limit.
         cost: derivative of the optimal F by the number; null where the point is no optimum.
     """
 
@@ -243,6 +252,7 @@ class LimitData(JsonObject):
     value: float | None
     margin: float | None
     active: tuple[str, ...]
+    violated: tuple[str, ...]
     cost: float | None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -71,7 +71,8 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         EvaluationError: a number is not finite at another pose.
     """
     case = nlp.case
-    several = _poses_data(nlp, x)
+    limited = _limited_quantities(nlp, x)
+    several = _poses_data(nlp, x, limited)
     return RobotData(
         parameters=parameters_data(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
@@ -85,12 +86,38 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         free_motions=tuple(motion_data(twist) for twist in state.free_twists),
         task_is_free=None if task is None else state.is_zero,
         quantities=_quantities(case, state),
+        limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
         several=several,
     )
 
 
-def _poses_data(nlp: Nlp, x: FloatArray) -> PosesData | None:
+def _limited_quantities(nlp: Nlp, x: FloatArray) -> list[Mapping[str, ByOwner]]:
+    """Return the angles that the limits of a case speak of at a point (n,), for each pose; empty without any."""
+    case, program = nlp.case, nlp.program
+    rows = [
+        {limit.key: found for limit in case.limits if (found := limit.measures(robot)) is not None}
+        for robot in program.robots
+    ]
+    if not any(rows):
+        return []
+    columns = [ca.densify(measures.values) for row in rows for measures in row.values()]
+    function = ca.Function("limited", [program.x, program.p], [ca.vertcat(*columns)])
+    values = iter(function(x, nlp.arguments).full().ravel().tolist())
+    return [
+        MappingProxyType(
+            {
+                key: MappingProxyType(
+                    {owner: case.units.shown(next(values), measures.dimension) for owner in measures.owners}
+                )
+                for key, measures in row.items()
+            }
+        )
+        for row in rows
+    ]
+
+
+def _poses_data(nlp: Nlp, x: FloatArray, limited: Sequence[Mapping[str, ByOwner]]) -> PosesData | None:
     """Return the robot at every pose, or None where there is one pose only.
 
     F and rates are those of the program's task; of the first task, where the program combines several.
@@ -101,12 +128,14 @@ def _poses_data(nlp: Nlp, x: FloatArray) -> PosesData | None:
     return PosesData(
         stated_poses=tuple(pose_data(case, pose) for pose in stated_poses(nlp, x)),
         over_poses=case.over_poses,
-        poses=tuple(_pose_state(case, evaluate(nlp, x, k)) for k in range(len(nlp.program.robots))),
+        poses=tuple(
+            _pose_state(case, evaluate(nlp, x, k), limited[k] if limited else None)
+            for k in range(len(nlp.program.robots))
+        ),
     )
 
 
-def _pose_state(case: Case, state: RobotState) -> PoseStateData:
-    """Return the robot at one of several poses."""
+def _pose_state(case: Case, state: RobotState, limited: Mapping[str, ByOwner] | None) -> PoseStateData:
     return PoseStateData(
         F=state.F,
         pose=pose_data(case, state),
@@ -116,6 +145,7 @@ def _pose_state(case: Case, state: RobotState) -> PoseStateData:
         singular=state.is_singular,
         singular_values=vector(state.singular_values),
         quantities=_quantities(case, state),
+        limited_quantities=limited,
     )
 
 
@@ -132,7 +162,12 @@ def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
 def task_data(case: Case, task: int) -> TaskData:
     """Return a task of the case, by its index."""
     chosen = case.tasks[task]
-    return TaskData(name=chosen.name, sense=chosen.sense, motion=motion_data(chosen.twist))
+    return TaskData(
+        name=chosen.name,
+        sense=chosen.sense,
+        motion=motion_data(chosen.twist),
+        stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
+    )
 
 
 def motion_data(twist: ArrayLike) -> MotionData:

@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
 from .data import CombinedResult
-from .tables import (
-    combined_design_table,
-    design_table,
-    jacobian_table,
-    limit_table,
-    outcome_table,
-    principal_table,
-    robot_table,
-    solved_design_table,
-)
+from .designtable import combined_design_table, design_table, solved_design_table
+from .robottables import jacobian_table, robot_tables
+from .rounding import listed, number, robot_size, size_of_F
+from .tables import limit_table, outcome_table, principal_table
 from .text import Line, TextTable
 from .wording import (
     certificate_lines,
@@ -24,11 +18,9 @@ from .wording import (
     combined_value_lines,
     evidence_lines,
     heading_lines,
-    number,
-    numbers,
     singularity_lines,
     starts_lines,
-    task_line,
+    task_lines,
     title_line,
     tolerance_line,
     violation_lines,
@@ -52,13 +44,13 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from heading_lines(case, result)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
-        yield robot_table(case, result.robot)
+        yield from robot_tables(case, result.robot)
     if result.limits:
-        yield limit_table(result.limits)
+        yield limit_table(result.limits, 0.0 if result.robot is None else size_of_F(result.robot))
     if result.tolerance is not None:
         yield tolerance_line(result.tolerance, result.F, case.units)
     yield from evidence_lines(result)
-    yield from starts_lines(result.starts)
+    yield from starts_lines(result.starts, result.robot)
     if result.robot is not None and result.reached is None:
         yield from singularity_lines(result.robot, case.units)
     yield from certificate_lines(result.certificate)
@@ -73,8 +65,8 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         yield combined_design_table(case, combined, robot)
     if point is not None and point.limits:
-        yield limit_table(point.limits)
-    yield outcome_table(combined)
+        yield limit_table(point.limits, combined.value or 0.0)
+    yield outcome_table(combined, result.tasks)
     yield from combined_value_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
@@ -106,14 +98,16 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     robot = result.robot
     yield title_line(case)
     for each in result.tasks:
-        yield task_line(each.task, case.units)
-        yield Line(number(0.0 if each.task_is_free else each.F), label="F")
+        yield from task_lines(each.task, case.units)
+        yield Line(number(0.0 if each.task_is_free and robot.several is None else each.F), label="F")
     yield from violation_lines(result.violated)
     yield design_table(case, robot)
-    yield robot_table(case, robot)
+    yield from robot_tables(case, robot)
     if result.limits:
-        yield limit_table(result.limits)
+        yield limit_table(result.limits, size_of_F(robot))
     yield jacobian_table(case, robot)
-    yield Line(numbers(robot.singular_values), label="singular values")
-    yield principal_table(result.principal_motions, case.units)
+    # As many are zero as the rank says: what is left of them is rounding error.
+    values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
+    yield Line(listed(values), label="singular values")
+    yield principal_table(result.principal_motions, case.units, robot_size(robot))
     yield from singularity_lines(robot, case.units)

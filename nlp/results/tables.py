@@ -1,199 +1,79 @@
-"""Results as tables of text."""
+"""Limits, margins, tasks, optima and motions as tables of text."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-from ...models import Dimension, WrenchKind, component_names
-from ..case.case import Case
-from ..case.pose import Free, Value, sizes_of_turn
+from ..evidence.kkt import ACTIVE
 from ..units import Units
+from .data import CombinedData
+from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
-from .wording import NOISE, SET, motion_words, number, numbers
+from .wording import SET, counted, motion_words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from ..case.settings import Search
     from ..solver.multistart import ProgramSolution
-    from .data import ActiveData, CombinedData, OptimalityData, SolveResult
+    from .data import SolveResult
     from .evaluation import PrincipalMotionsData
-    from .parts import LimitData, MarginData, PosesData, RobotData, SensitivityData, VersionsData
+    from .parts import LimitData, MarginData, RobotData, VersionsData
 
-#: A rotation by less than this, radians, has no determined axis.
-_TURNED = 1e-9
-#: Largest number of places named where a limit is active.
+#: So many places where a limit is active are named.
 _PLACES = 3
-#: Largest number of optima shown in full.
+#: Error of the margin in an active limit, as a part of the limit: that of the test whether a point lies on it.
+_ON_LIMIT = 10 * ACTIVE
+#: So many optima are shown in full.
 MOST_OPTIMA = 12
 
 
-def design_table(
-    case: Case,
-    robot: RobotData,
-    *,
-    reached: bool = False,
-    active: Sequence[ActiveData] = (),
-    sensitivity: Sequence[SensitivityData] = (),
-) -> TextTable:
-    """Return every dimension and the pose: value, unit, the range of a free one, and its active bound or limit.
+def principal_table(motions: PrincipalMotionsData, units: Units, size: float) -> TextTable:
+    """Return the motions at which F is stationary: those of unit rotation, then translations of unit speed.
 
     Args:
-        case: the case.
-        robot: at the point.
-        reached: whether the point is only the one that a failed solve reached.
-        active: bounds and limits that hold the point.
-        sensitivity: of the optimal F to fixed numbers.
+        motions: to show.
+        units: of the case.
+        size: of the robot, length.
     """
-    units = case.units
-    # Variables' bounds come first among the active sides, and the first side of a name stays: no constraint hides one.
-    held = {side.name: f"{side.bound}, {side.multiplier:.4g} F" for side in reversed(active)}
-    fixed = {row.name: f"fixed, {row.derivative + 0.0:+.4g} F" for row in sensitivity}
-    column = ("held by",) if held or fixed else ()
-    rows: list[tuple[str, ...]] = []
-
-    def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
-        row = (
-            name,
-            _number_text(value, given, units, dimension),
-            units.label(dimension),
-            _range_text(given, units, dimension),
-        )
-        reason = held.get(name) or fixed.get(name)
-        why = f"{reason}/{units.label(dimension) or 'unit'}" if reason else ""
-        rows.append((*row, *((why,) if column else ())))
-
-    for parameter in case.model.parameters:
-        shown = robot.parameters[parameter.name]
-        values = shown if isinstance(shown, tuple) else (shown,)
-        for name, value, given in zip(
-            case.component_names(parameter), values, case.components(parameter.name), strict=True
-        ):
-            add(name, parameter.dimension, value, given)
-    stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
-    for prefix, pose, found in zip(case.pose_prefixes, case.poses, stated, strict=True):
-        for name, value, given in zip(component_names("p", 3), found.position, pose.position, strict=True):
-            add(f"{prefix}{name}", Dimension.LENGTH, value, given)
-        angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
-        turned = abs(units.to_internal(found.angle, Dimension.ANGLE)) > _TURNED
-        if not is_held and isinstance(angle, Free):
-            # Then only the size of the angle is limited, and its sign is arbitrary.
-            angle = Free(*sizes_of_turn(angle))
-        axis = numbers(found.axis) if turned or is_held else "none"
-        row = (f"{prefix}axis", axis, "", "" if is_held else "any direction")
-        rows.append((*row, *(("",) if column else ())))
-        add(f"{prefix}angle", Dimension.ANGLE, found.angle, angle)
-    headers = ("", "reached" if reached else "value", "unit", "free between", *column)
-    return TextTable(headers, tuple(rows))
-
-
-def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> TextTable:
-    """Return the design of a solve, with its active bounds where the point is an answer."""
-    reached = result.reached is not None
-    active = () if reached or result.optimality is None else result.optimality.active
-    return design_table(case, robot, reached=reached, active=active, sensitivity=result.sensitivity or ())
-
-
-def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) -> TextTable:
-    """Return the design at the combined point of several tasks."""
-    reached = combined.method_point is None
-    active = () if reached or combined.optimality is None else combined.optimality.active
-    return design_table(case, robot, reached=reached, active=active)
-
-
-def _number_text(value: float, given: Value, units: Units, dimension: Dimension) -> str:
-    """Return a number's text, 0 where it is rounding error beside the range of a free number."""
-    if isinstance(given, Free):
-        width = units.shown(given.upper - given.lower, dimension)
-        value = 0.0 if abs(value) < NOISE * width else value
-    return number(value)
-
-
-def _range_text(given: Value, units: Units, dimension: Dimension) -> str:
-    """Return the range of a free number; empty for a fixed one."""
-    if not isinstance(given, Free):
-        return ""
-    return f"{units.shown(given.lower, dimension):g} .. {units.shown(given.upper, dimension):g}"
-
-
-def robot_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the robot at every pose, or every limb where there is one pose."""
-    return _limb_table(case, robot) if robot.several is None else _pose_table(case, robot.several)
-
-
-def _pose_table(case: Case, several: PosesData) -> TextTable:
-    """Return the robot at every pose: F, position and angle, and the range of each measure over its limbs."""
-    measures = [item for item in case.model.quantities if item.name in several.poses[0].quantities]
-    words = [item.name.replace("_", " ").removesuffix(" angle") for item in measures]
-    labels = [f"{word}\n{case.units.label(item.dimension)}" for word, item in zip(words, measures, strict=True)]
-    rows = []
-    for k, pose in enumerate(several.poses):
-        ranges = []
-        for item in measures:
-            values = pose.quantities[item.name].values()
-            low = "" if item.dimension is Dimension.ANGLE else f"{min(values):.5g} .. "
-            ranges.append(f"{low}{max(values):.5g}")
-        at = [number(value) for value in (*pose.pose.position, pose.pose.angle)]
-        rows.append((str(k + 1), number(pose.F), *at, *ranges, str(pose.rank)))
-    return TextTable(("pose", "F", *component_names("p", 3), "angle", *labels, "rank"), tuple(rows))
-
-
-def _limb_table(case: Case, robot: RobotData) -> TextTable:
-    """Return every row of the Jacobian: its rate, its share of F, and the measures of its limb."""
-    model, rates = case.model, robot.rates or ()
-    couples = any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
-    measures = [item for item in model.quantities if item.name in robot.quantities]
-    labels = [f"{item.name.replace('_', ' ')}\n{case.units.label(item.dimension)}" for item in measures]
-    total = sum(rate**2 for rate in rates)
-    rows = []
-    for row, rate in zip(model.wrenches, rates, strict=True):
-        share = f"{100 * rate**2 / total:.1f} %" if total > 0 and not robot.task_is_free else ""
-        shown = [f"{robot.quantities[item.name].get(row.limb, math.nan):.5g}" for item in measures]
-        rows.append((row.limb, *((row.kind.value,) if couples else ()), f"{rate:+.6g}", share, *shown))
-    return TextTable(("limb", *(("wrench",) if couples else ()), "rate", "share of F", *labels), tuple(rows))
-
-
-def jacobian_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the Jacobian."""
-    rows = zip(case.model.wrenches, robot.jacobian, strict=True)
-    return TextTable(
-        ("J", "f_x", "f_y", "f_z", "m_x", "m_y", "m_z"),
-        tuple((row.limb, *(f"{value:+.6g}" for value in values)) for row, values in rows),
-    )
-
-
-def principal_table(motions: PrincipalMotionsData, units: Units) -> TextTable:
-    """Return the motions at which F is stationary: those of unit rotation, then translations of unit speed."""
     rows = []
     for kind in (motions.rotations, motions.translations):
-        noise = NOISE * kind[-1].F
         for rank, motion in zip(("least", "", "most"), kind, strict=True):
-            F = 0.0 if noise >= motion.F else motion.F
-            rows.append((rank, number(F), motion_words(motion.motion, units)))
-    return TextTable(("resisted", "F", "motion"), tuple(rows))
+            rows.append((rank, number(motion.F, kind[-1].F), motion_words(motion.motion, units, size)))
+    return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
 
 
-def limit_table(limits: Sequence[LimitData]) -> TextTable:
-    """Return every limit of the case: how near the design comes to it, where, and its cost."""
+def limit_table(limits: Sequence[LimitData], F: float = 0.0) -> TextTable:
+    """Return every limit of the case: how near the design comes to it, its cost, and where; violated and active first.
+
+    Args:
+        limits: of the case.
+        F: size of F, of which costs have their error.
+    """
     rows = []
-    for row in limits:
-        where = [_place(name) for name in row.active] or [_place(row.nearest)]
+    for row in sorted(limits, key=lambda each: (not each.violated, not each.active)):
+        where = [_place(name) for name in row.violated or row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
-        cost = f"{row.cost + 0.0:+.4g} F/{row.unit or 'unit'}" if row.active and row.cost else ""
-        margin = _limit_number_text(row.margin, row.limit) + (", active" if row.active else "")
+        slope = settled(row.cost or 0.0, abs(F) / (abs(row.limit) or 1.0))
+        cost = f"{slope:+.4g} F/{row.unit or 'unit'}" if row.active and slope else ""
+        beside = abs(row.limit) or 1.0
+        word = "violated" if row.violated else "active" if row.active else ""
         shown = ", ".join(where[:_PLACES]) + more
-        rows.append(
-            (row.key, f"{row.limit:g}", row.unit, _limit_number_text(row.value, row.limit), margin, shown, cost)
-        )
-    return TextTable(("limit", "", "unit", "nearest", "margin", "where", "costs"), tuple(rows))
+        limit, value = number(row.limit, digits=6), _text(row.value, beside)
+        rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
+    return TextTable(("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits")
 
 
-def _limit_number_text(value: float | None, limit: float) -> str:
-    """Return a number's text, 0 where it is rounding error beside a limit."""
-    if value is None:
+def _text(value: float | None, size: float) -> str:
+    """Return a number's text, 0 where it is rounding error beside a size."""
+    return "none" if value is None else number(value, size, digits=6)
+
+
+def _margin_text(margin: float | None, beside: float, word: str) -> str:
+    """Return a margin's text; at an active limit its error is that of the test for active limits."""
+    if margin is None:
         return "none"
-    return f"{0.0 if abs(value) < NOISE * (abs(limit) or 1.0) else value:.6g}"
+    return number(margin, beside, digits=6, part=_ON_LIMIT if word == "active" else NOISE)
 
 
 def _place(name: str) -> str:
@@ -201,57 +81,101 @@ def _place(name: str) -> str:
     return name.partition(" ")[2]
 
 
-def outcome_table(combined: CombinedData) -> TextTable:
-    """Return each task at the combined point."""
+def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> TextTable:
+    """Return each task at the combined point.
+
+    Args:
+        combined: the combined tasks.
+        tasks: each task by itself, whose motions tell the error of F.
+    """
+    robot = None if combined.point is None else combined.point.robot
     rows = []
-    for task in combined.tasks:
-        F, best, loss = ("none" if value is None else number(value) for value in (task.F, task.best, task.loss))
-        best += "" if task.unique else " (not unique)"
+    for k, task in enumerate(combined.tasks):
+        own = tasks[k].robot if k < len(tasks) else None
+        sizes: list[float] = []
+        if robot is not None and own is not None and own.task is not None:
+            sizes = rate_sizes(robot.jacobian, own.task.motion.twist, robot.pose.position)
+        F, best = (None if value is None else settled_F(value, sizes) for value in (task.F, task.best))
+        loss = None if task.loss is None else settled(task.loss, max(abs(F or 0.0), abs(best or 0.0)))
+        if F == best == 0:
+            loss = 0.0
+        cells = ["none" if value is None else number(value) for value in (F, best, loss)]
+        cells[1] += "" if task.unique else " (not unique)"
         verdict = "" if task.verdict is None else task.verdict.value
-        rows.append((task.name, task.sense.value, f"{task.weight:g}", F, best, loss, verdict))
-    return TextTable(("task", "sense", "weight", "F", "best alone", "loss", "at this point"), tuple(rows))
+        rows.append((task.name, task.sense.value, f"{task.weight:g}", *cells, verdict))
+    headers = ("task", "sense", "weight", "F", "best alone", "loss", "at this point")
+    return TextTable(headers, tuple(rows), "tasks")
 
 
 def margin_table(margins: Sequence[MarginData]) -> TextTable:
-    """Return every margin."""
+    """Return every margin: violated and active ones first."""
+    rows = []
+    for row in sorted(margins, key=lambda each: (not each.violated, not each.active)):
+        beside = abs(row.limit) or 1.0
+        word = "violated" if row.violated else "active" if row.active else ""
+        limit, value = number(row.limit, digits=6), _text(row.value, beside)
+        cells = (row.name, row.bound, value, limit, _margin_text(row.margin, beside, word), row.unit, word)
+        rows.append(cells)
+    return TextTable(("where", "bound", "value", "limit", "margin", "unit", ""), tuple(rows), "margins")
+
+
+def active_table(result: SolveResult | CombinedData, F: float = 0.0) -> TextTable:
+    """Return the bounds and limits that the point lies on or outside of, with their multipliers.
+
+    Args:
+        result: with evidence.
+        F: size of F, of which multipliers have their error.
+    """
+    active = () if result.optimality is None else result.optimality.active
+    violated = _violated(result)
     rows = [
         (
-            row.name,
-            row.bound,
-            "none" if row.value is None else f"{row.value:.6g}",
-            f"{row.limit:.6g}",
-            "none" if row.margin is None else f"{row.margin:.4g}",
-            row.unit,
-            "active" if row.active else "",
+            side.name,
+            side.bound,
+            number(side.value),
+            number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4),
+            "violated" if side.name in violated else "active",
         )
-        for row in margins
+        for side in active
     ]
-    return TextTable(("where", "bound", "value", "limit", "margin", "unit", ""), tuple(rows))
+    return TextTable(("", "side", "value", "multiplier, F per unit", ""), tuple(rows), "active")
 
 
-def active_table(optimality: OptimalityData) -> TextTable:
-    """Return the active bounds and limits with their multipliers."""
-    rows = [(side.name, side.bound, f"{side.value:.7g}", f"{side.multiplier:.4g}") for side in optimality.active]
-    return TextTable(("", "side", "value", "multiplier, F per unit"), tuple(rows))
+def _violated(result: SolveResult | CombinedData) -> Collection[str]:
+    """Return the names of the bounds and constraints that a point violates."""
+    if isinstance(result, CombinedData):
+        return result.violated
+    return () if result.reached is None else [side.name for side in result.reached.violated]
 
 
-def optimum_table(solution: ProgramSolution) -> TextTable:
-    """Return the best of the distinct optima that a solve found: F, and every variable."""
+def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> TextTable:
+    """Return the best of the distinct optima that a solve found: F, and every variable.
+
+    Args:
+        solution: of one program.
+        robot: at the best of them, whose task tells the error of F.
+    """
     units, variables = solution.nlp.case.units, solution.nlp.program.variables
     labels = [(variable.name, units.label(variable.dimension)) for variable in variables]
+    widths = [
+        units.shown(float(size), variable.dimension)
+        for size, variable in zip(solution.nlp.scale, variables, strict=True)
+    ]
     rows = []
     for found in solution.optima[:MOST_OPTIMA]:
         spread = f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
         at = [
-            f"{units.shown(float(value), variable.dimension):.6g}"
-            for value, variable in zip(found.x, variables, strict=True)
+            number(units.shown(float(value), variable.dimension), width, digits=6)
+            for value, variable, width in zip(found.x, variables, widths, strict=True)
         ]
-        rows.append((f"F = {found.F:.7g}, {found.count} starts{spread}", *at))
-    return TextTable(("", *(f"{name}, {unit}" if unit else name for name, unit in labels)), tuple(rows))
+        F = number(task_F(robot, found.F))
+        rows.append((f"F = {F}, {counted(found.count, 'start')}{spread}", *at))
+    headers = ("", *(f"{name}, {unit}" if unit else name for name, unit in labels))
+    return TextTable(headers, tuple(rows), "optima")
 
 
 def origin_table(versions: VersionsData, search: Search, seconds: float) -> TextTable:
     """Return versions, seed, starts and time: all that the numbers depend on."""
     rows = [(name, str(getattr(versions, name))) for name in versions.marks]
     rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
-    return TextTable(("", ""), tuple(rows))
+    return TextTable(("", ""), tuple(rows), "versions")

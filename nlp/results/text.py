@@ -5,6 +5,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+#: Fewer rows than these are not worth folding.
+FEWEST_FOLDED = 3
+
 
 class Tone(enum.Enum):
     """Meaning of a text beside its words."""
@@ -41,14 +44,39 @@ class Line:
         return f"{self.before}{self.text}{self.after}"
 
 
+class Figure(str):
+    """Text of a number, with the number for outputs that keep every digit.
+
+    Attributes:
+        value: the number; 0 where it is below its error bound.
+    """
+
+    __slots__ = ("value",)
+    value: float
+
+    def __new__(cls, text: str, value: float) -> Figure:
+        """Return the text with its number."""
+        made = super().__new__(cls, text)
+        made.value = value
+        return made
+
+
 @dataclass(frozen=True)
 class TextTable:
     """A table of text.
 
     Attributes:
         headers: of the columns; a second line is the unit.
-        rows: a cell for each column; a line where its tone matters.
+        rows: a cell for each column; a line where its tone matters, a figure for a number with all its digits.
+        name: one word, by which a table is asked for; empty for a table that nobody asks for.
+        title: line above the table on a terminal; empty where the table needs none.
+        folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
+        folded_words: name of these rows in the plural.
     """
 
     headers: tuple[str, ...]
     rows: tuple[tuple[str | Line, ...], ...]
+    name: str = ""
+    title: str = ""
+    folded: int = 0
+    folded_words: str = "rows"

@@ -2,39 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
 from ..case.task import Sense
 from ..certificate.certificate import CertificateStatus
-from ..evidence.optimality import PointKind
+from ..evidence.optimality import CURVED, PointKind
 from ..solver.status import Status
 from ..units import Units
+from .rounding import number, robot_size, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
     from .data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult, StartsData
     from .parts import LimitData, MotionData, RelaxationData, RobotData, TaskData, ToleranceData, ViolationData
 
-#: A number below this part of its neighbours or its range is shown as 0; in JSON it stands as it is.
-NOISE = 1e-9
-#: Largest numbers of violated limits, and of optima, shown.
+#: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
 #: An optimum is a set when its points lie apart by more than this part of the ranges.
 SET = 1e-3
-#: A pitch below this is that of a rotation.
-_NO_PITCH = 1e-9
 
 
-def number(value: float) -> str:
-    """Return a number with seven digits."""
-    return f"{value + 0.0:.7g}"
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Return numbers with five digits each."""
-    return "  ".join(f"{value + 0.0:.5g}" for value in values)
+def counted(count: int, noun: str) -> str:
+    """Return a number of things, the noun in the plural but for one."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def title_line(case: Case) -> Line:
@@ -42,26 +35,84 @@ def title_line(case: Case) -> Line:
     return Line(case.title or case.name, tone=Tone.TITLE)
 
 
-def task_line(task: TaskData, units: Units) -> Line:
-    """Return a task: name, sense and motion."""
-    return Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
+def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
+    """Yield a task: name, sense, motion, and the axis's point nearest to the origin where the case states another."""
+    points = _stated_and_nearest(task)
+    if points is None:
+        yield Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
+        return
+    stated, nearest = points
+    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
+    yield Line(f"nearest to the origin at {nearest}", label="task's axis")
 
 
-def motion_words(motion: MotionData, units: Units) -> str:
-    """Return a motion in words: its axis, point and pitch."""
+def task_words(task: TaskData, units: Units) -> str:
+    """Return a task's motion in words, with the point that the case states beside the one nearest to the origin."""
+    points = _stated_and_nearest(task)
+    if points is None:
+        return motion_words(task.motion, units)
+    stated, nearest = points
+    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    return f"{screw} through {stated}, nearest to the origin at {nearest}"
 
-    def triple(values: Sequence[float]) -> str:
-        noise = NOISE * max(1.0, *map(abs, values))
-        return f"({', '.join(f'{value if abs(value) > noise else 0:.4g}' for value in values)})"
 
+class _Points(NamedTuple):
+    """The points of a task's axis as text: the stated one, and the one nearest to the origin."""
+
+    stated: str
+    nearest: str
+
+
+def _stated_and_nearest(task: TaskData) -> _Points | None:
+    """Return the points of a task's axis; None where its case states none, or the nearest one."""
+    if task.stated_point is None or task.motion.point is None:
+        return None
+    size = _reach(task.motion, 0.0)
+    points = _Points(_triple(task.stated_point, size), _triple(task.motion.point, size))
+    return None if points.stated == points.nearest else points
+
+
+def motion_words(motion: MotionData, units: Units, size: float = 0.0) -> str:
+    """Return a motion in words: its axis, point and pitch.
+
+    Args:
+        motion: of the platform.
+        units: of the case.
+        size: length that the motion was computed from, beside which its point and pitch have rounding error.
+    """
     if motion.point is None or motion.pitch == "inf":
-        return f"translation along {triple(motion.axis)}"
-    pitch = "rotation" if abs(motion.pitch) < _NO_PITCH else f"screw of pitch {motion.pitch:.5g} {units.length}"
-    return f"{pitch} about {triple(motion.axis)} through {triple(motion.point)}"
+        return f"translation along {_triple(motion.axis, 1.0)}"
+    reach = _reach(motion, size)
+    return f"{_screw_words(motion, units, reach)} through {_triple(motion.point, reach)}"
 
 
-def headline(result: SolveResult) -> Line:
-    """Return F, or the status of a solve without an answer."""
+def _screw_words(motion: MotionData, units: Units, size: float) -> str:
+    """Return pitch and axis of a motion that is no translation."""
+    pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size)
+    words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
+    return f"{words} about {_triple(motion.axis, 1.0)}"
+
+
+def _reach(motion: MotionData, size: float) -> float:
+    """Return the length beside which a motion's point and pitch have rounding error: |v| / |omega| at least."""
+    omega, v = math.hypot(*motion.twist[:3]), math.hypot(*motion.twist[3:])
+    return max(size, v / omega if omega else 0.0)
+
+
+def _triple(values: Sequence[float], size: float) -> str:
+    return f"({', '.join(number(value, size, digits=4) for value in values)})"
+
+
+def headline(result: SolveResult, case: Case | None = None) -> Line:
+    """Return F, or the status of a solve without an answer.
+
+    A singular answer has another tone, unless its case expects it.
+
+    Args:
+        result: of a task.
+        case: the case; None where the tone does not matter.
+    """
     robot = result.robot
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
@@ -74,17 +125,25 @@ def headline(result: SolveResult) -> Line:
             status = "stationary, not proven optimal"
     if robot is not None and robot.singular:
         status += f", singular: rank {robot.rank}"
-    # Where nothing resists the motion, F is rounding error.
-    F = 0.0 if robot is not None and robot.task_is_free and several is None else result.F
-    return Line(number(F), tone=Tone.ANSWER, before=f"{word} F = ", after=f"   ({status}{over})")
+    tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER
+    # What is left of an F that nothing resists is rounding.
+    F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
+    return Line(number(F), tone=tone, before=f"{word} F = ", after=f"   ({status}{over})")
+
+
+def is_unasked_singularity(robot: RobotData | None, case: Case | None) -> bool:
+    """Return whether a robot is singular, at one of its poses at least, and its case does not expect that."""
+    if robot is None or (case is not None and case.expect.singular):
+        return False
+    return robot.singular or (robot.several is not None and any(pose.singular for pose in robot.several.poses))
 
 
 def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
     """Yield title, task, and F or the status."""
     yield title_line(case)
     if result.robot is not None and result.robot.task is not None:
-        yield task_line(result.robot.task, case.units)
-    yield headline(result)
+        yield from task_lines(result.robot.task, case.units)
+    yield headline(result, case)
 
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:
@@ -97,7 +156,9 @@ def evidence_lines(result: SolveResult) -> Iterator[Line]:
         if evidence.stationarity is not None:
             checks = f"stationarity {evidence.stationarity:.1e}, feasibility {evidence.feasibility:.1e}"
             curvature = evidence.reduced_hessian_eigenvalues
-            smallest = f", smallest curvature {min(curvature):.2e}" if curvature else ", no free direction left"
+            smallest = ", no free direction left"
+            if curvature:
+                smallest = f", smallest curvature {settled(min(curvature), 1.0, CURVED) or 0:.3g}"
             yield Line(checks + (smallest if result.reached is None else ""), label="evidence")
     yield from violation_lines(() if result.reached is None else result.reached.violated)
     for row in result.relaxation or ():
@@ -135,8 +196,13 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         yield Line(text, tone=Tone.FAULT)
 
 
-def starts_lines(starts: StartsData) -> Iterator[Line]:
-    """Yield counts of starts by outcome, and the distinct optima."""
+def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator[Line]:
+    """Yield how the starts ended.
+
+    Args:
+        starts: of a solve.
+        robot: at the best optimum, whose task tells the error of F.
+    """
     if not starts.run:
         return
     yield Line(f"{starts.converged} of {starts.run} converged", label="starts")
@@ -144,17 +210,19 @@ def starts_lines(starts: StartsData) -> Iterator[Line]:
         yield Line(f"  {count}: {sentence}", tone=Tone.CAUTION)
     for index, found in enumerate(starts.optima[:_OPTIMA]):
         note = f", spread over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
-        if index and number(found.F) == number(starts.optima[index - 1].F):
+        F = number(task_F(robot, found.F))
+        if index and number(task_F(robot, starts.optima[index - 1].F)) == F:
             note += ", at another point"
-        yield Line(f"  {found.count} at F = {number(found.F)}{note}")
-    if len(starts.optima) > _OPTIMA:
-        yield Line(f"  and {len(starts.optima) - _OPTIMA} worse optima")
+        yield Line(f"  {found.count} at F = {F}{note}")
+    worse = len(starts.optima) - _OPTIMA
+    if worse > 0:
+        yield Line(f"  and {worse} worse {'optimum' if worse == 1 else 'optima'}")
 
 
 def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
     """Yield the rank of the Jacobian, and the motions that nothing resists."""
     if robot.task_is_free and robot.task is not None:
-        words = motion_words(robot.task.motion, units)
+        words = task_words(robot.task, units)
         free = f"singular: F is 0, so the platform can make the task's motion ({words}) with every actuator locked"
         yield Line(free, tone=Tone.CAUTION)
     if not robot.singular:
@@ -163,7 +231,7 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
     several = " combinations of" if len(robot.free_motions) > 1 else ""
     yield Line(f"{robot.rank}: the structure is singular; nothing resists{several}", label="rank of J")
     for motion in robot.free_motions:
-        yield Line(f"  {motion_words(motion, units)}")
+        yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
 
 
 def tolerance_line(lost: ToleranceData, F: float | None, units: Units) -> Line:
@@ -183,7 +251,8 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
         part = "" if certificate.relative_gap is None else f" ({certificate.relative_gap:.2e} of it)"
         yield Line(f"{certificate.gap:.3g}{part}", label="gap")
     left = f", {certificate.open:,} left" if certificate.open else ""
-    boxes = f"{certificate.boxes:,} boxes{left} in {certificate.seconds:.2f} s"
+    word = "box" if certificate.boxes == 1 else "boxes"
+    boxes = f"{certificate.boxes:,} {word}{left} in {certificate.seconds:.2f} s"
     yield Line(f"{boxes}, engine {certificate.engine}", label="search")
 
 

@@ -198,7 +198,7 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
     assert [float(row[1]) for row in limbs] == pytest.approx(result["rates"], rel=1e-5)
     assert f"{result['F']:.7g}" in found.words
     active = [row["key"] for row in result["limits"] if row["active"]]
-    shown = [row[0] for row in found.tables.get("limit", []) if "active" in row[4]]
+    shown = [row[0] for row in found.tables.get("limit", []) if row[5] == "active"]
     assert shown == active
     for name, version in result["versions"].items():
         assert [name, version] in found.tables["versions"]

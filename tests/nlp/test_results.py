@@ -283,5 +283,5 @@ def test_a_summary_begins_with_its_title_and_ends_with_the_rank() -> None:
     assert isinstance(last, Line)
     assert (last.label, last.text) == ("rank of J", "6")
     design, limbs = (item for item in items if isinstance(item, TextTable))
-    assert [row[0] for row in design.rows[:4]] == ["x1", "x2", "x3", "x4"]
+    assert [row[0] for row in design.rows] == ["p_x", "p_y", "p_z", "axis", "angle", "x1", "x2", "x3", "x4"]
     assert len(limbs.rows) == 6

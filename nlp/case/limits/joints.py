@@ -30,7 +30,7 @@ from ...errors import CaseError
 from ...units import Units
 from ..table import Table, Vector
 from .constraint import BoundedConstraint, Reading, between
-from .limit import Limit, LimitedCase, PosedRobot, TableField, Written
+from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
@@ -160,6 +160,25 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         home = self.about
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
             raise CaseError(key, "must be a pose of finite numbers")
+
+    @property
+    def reference(self) -> str:
+        """Word for the mounting axes."""
+        if self.about is None:
+            return "normal"
+        return "home" if isinstance(self.about, MountingPose) else "axis"
+
+    def measures(self, robot: RobotInstance) -> Measures | None:
+        """Return each joint's angle; None about the plate's normal, where the model's own quantity says the same."""
+        if self.about is None or not robot.legs:
+            return None
+        pairs = [
+            (self._to_world(axis, robot.rotation), leg.span)
+            for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True)
+        ]
+        # The arc tangent is accurate for a leg along its axis, where the arc cosine is not.
+        angles = [ca.atan2(ca.norm_2(ca.cross(axis, span)), ca.dot(axis, span)) for axis, span in pairs]
+        return Measures(tuple(leg.name for leg in robot.legs), ca.vertcat(*angles), Dimension.ANGLE)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the cosine of each joint's angle."""

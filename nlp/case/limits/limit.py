@@ -144,6 +144,20 @@ class PosedRobot(NamedTuple):
     where: str = ""
 
 
+class Measures(NamedTuple):
+    """Numbers that a limit speaks of, in place of the model's quantity with the limit's key.
+
+    Attributes:
+        owners: name of the limb of each number.
+        values: (n, 1) expressions, radians for angles.
+        dimension: of each number.
+    """
+
+    owners: tuple[str, ...]
+    values: SX
+    dimension: Dimension
+
+
 @dataclass(frozen=True)
 class Limit(abc.ABC, Generic[TableT]):
     """A limit that a design must keep.
@@ -215,6 +229,15 @@ class Limit(abc.ABC, Generic[TableT]):
         Raises:
             CaseError: in the words of a case file.
         """
+
+    @property
+    def reference(self) -> str:
+        """Direction that an angle is measured from, in a word or two; empty for other limits."""
+        return ""
+
+    def measures(self, robot: RobotInstance) -> Measures | None:  # noqa: ARG002 - most limits need none
+        """Return the numbers that this limit speaks of, where they are not the model's quantity with its key."""
+        return None
 
     def on_plate(self, plate: Plate) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - most limits have none
         """Return this limit's constraints on the joint centres of one plate."""

@@ -91,7 +91,7 @@ def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tupl
         x, y = scale.x(value), scale.y(count)
         kind = "spot" if k == 0 else "other"
         parts.append(tag("path", d=f"M{x:.1f} {scale.y(0):.1f}V{y:.1f}", class_=f"stem {kind}"))
-        found = f"{count} at F = {value:.7g}"
+        found = f"{count} at F = {value + 0.0:.7g}"
         parts.append(tag("circle", tag("title", found), cx=f"{x:.1f}", cy=f"{y:.1f}", r="5", class_=kind))
     return _svg(parts, words)
 

@@ -7,7 +7,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...evidence.state import ZERO_F
+from ...results.data import SolveResult
+from ...results.parts import RobotData
+from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
+from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
@@ -19,37 +24,44 @@ from .slices import Slice, has_loops
 def optima(report: Report) -> Markup:
     """Return the distinct optima found from the starts: a chart of counts over F, and a table of their variables."""
     parts: list[Markup] = []
-    solutions = [(part.name, part.solution) for part in report.parts]
+    result = report.result
+    results = [result] if isinstance(result, SolveResult) else result.tasks
+    solutions: list[tuple[str, ProgramSolution, RobotData | None]] = [
+        (part.name, part.solution, own.robot) for part, own in zip(report.parts, results, strict=True)
+    ]
     if report.combined is not None:
-        solutions.append(("the combined program", report.combined))
-    for name, solution in solutions:
+        solutions.append(("the combined program", report.combined, None))
+    for name, solution, robot in solutions:
         if not solution.starts:
             continue
         if len(solutions) > 1:
             parts.append(tag("h3", name))
-        parts += _optima_of(solution)
+        parts += _optima_of(solution, robot)
     return join_markup(parts)
 
 
-def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
-    """Yield the starts of one program, and its distinct optima."""
+def _optima_of(solution: ProgramSolution, robot: RobotData | None) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
-    yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
+    yield tag("p", f"{converged} of {counted(len(solution.starts), 'start')} ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
     yield from (tag("p", f"{count}: {status.value}.") for status, count in failed.items())
     if not solution.optima:
         return
     best = solution.optima[0]
-    words = f"{len(solution.optima)} distinct optima; the best, F = {best.F:.7g}, was found {best.count} times."
+    F = number(task_F(robot, best.F))
+    times = "once" if best.count == 1 else f"{best.count} times"
+    words = f"{len(solution.optima)} distinct optima; the best, F = {F}, was found {times}."
     if len(solution.optima) == 1:
-        words = f"All of these ended in one optimum, F = {best.F:.7g}."
+        words = f"All of these ended in one optimum, F = {F}."
+        if best.count == 1:
+            words = f"The optimum that was found: F = {F}."
         yield tag("p", words)
     else:
         chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=("F", "starts"))
         yield tag("figure", chart, tag("figcaption", words))
     left = len(solution.optima) - MOST_OPTIMA
-    more = f" ({left} worse ones are left out)" if left > 0 else ""
-    yield html_table(optimum_table(solution), f"Where they lie{more}")
+    more = f" ({left} worse {'one is' if left == 1 else 'ones are'} left out)" if left > 0 else ""
+    yield html_table(optimum_table(solution, robot), f"Where they lie{more}")
 
 
 def surroundings(report: Report) -> Markup:
@@ -90,8 +102,9 @@ def _slice(part: Part, each: Slice) -> Markup:
     variable, units = nlp.program.variables[each.variable], nlp.case.units
     values = [units.shown(float(value), variable.dimension) for value in each.values]
     inside = np.where(each.inside > 0, each.F, np.nan)
-    at = units.shown(float(x[each.variable]), variable.dimension)
-    here = nlp.evaluate(x)[0]
+    width = values[-1] - values[0]
+    at = settled(units.shown(float(x[each.variable]), variable.dimension), width)
+    here = settled(nlp.evaluate(x)[0], nlp.objective_scale, ZERO_F)
     unit = units.label(variable.dimension)
     finite = np.isfinite(each.F)
     if finite.any():
@@ -100,7 +113,7 @@ def _slice(part: Part, each: Slice) -> Markup:
         if kept.any():
             k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
             best = "largest" if nlp.sign < 0 else "smallest"
-            words += f", {best} within the limits at {values[k]:.5g} {unit}".rstrip()
+            words += f", {best} within the limits at {number(values[k], width, digits=5)} {unit}".rstrip()
             if kept.sum() == 1:
                 words += ", the only one of its points within them"
             elif not kept[finite].all():

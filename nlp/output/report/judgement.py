@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ...evidence.optimality import CURVED
 from ...results.checkwording import published_table
-from ...results.data import CertificateData, CombinedResult, OptimalityData, SolveResult
+from ...results.data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult
+from ...results.rounding import number, size_of_F
 from ...results.tables import active_table
 from ...results.wording import certificate_lines, evidence_lines
 from .charts import Curve, Spot, line_chart
@@ -24,7 +26,7 @@ def evidence_section(report: Report) -> Markup:
     optimality = result.combined.optimality
     if optimality is not None:
         parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
-        parts.append(_active(optimality))
+        parts.append(_active(result.combined, optimality, result.combined.value or 0.0))
     return join_markup(parts)
 
 
@@ -34,17 +36,20 @@ def _evidence_of(result: SolveResult) -> Iterator[Markup]:
     optimality = result.optimality
     if optimality is None:
         return
-    yield _active(optimality)
+    yield _active(result, optimality, 0.0 if result.robot is None else size_of_F(result.robot))
     if optimality.reduced_hessian_eigenvalues and result.reached is None:
-        listed = ", ".join(f"{value:.4g}" for value in optimality.reduced_hessian_eigenvalues)
+        values = optimality.reduced_hessian_eigenvalues
+        listed = ", ".join(number(value, 1.0, digits=4, part=CURVED) for value in values)
         yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
 
 
-def _active(optimality: OptimalityData) -> Markup:
-    """Return the active bounds and limits as a table, or a sentence without any."""
+def _active(result: SolveResult | CombinedData, optimality: OptimalityData, size: float) -> Markup:
     if not optimality.active:
         return tag("p", "No bound or limit is active.")
-    return html_table(active_table(optimality), "Active bounds and limits")
+    table = active_table(result, size)
+    words = {row[-1] for row in table.rows}
+    caption = " and ".join(word for word in ("violated", "active") if word in words).capitalize()
+    return html_table(table, f"{caption} bounds and limits")
 
 
 def certificate_section(report: Report) -> Markup:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from html import escape
 from typing import Any
 
@@ -74,11 +75,17 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
     # A header without text names nothing: the cell is an ordinary one.
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     body = []
-    for row in table.rows:
+    for row in table.rows[: len(table.rows) - table.folded]:
         first, *others = (cell.words if isinstance(cell, Line) else cell for cell in row)
         body.append(tag("tr", tag("th", first, scope="row"), *(_cell(cell) for cell in others)))
     whole = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body), **attributes)
-    return tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)
+    shown = tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)
+    if not table.folded:
+        return shown
+    words = f"{table.folded} {table.folded_words}"
+    rest = replace(table, rows=table.rows[len(table.rows) - table.folded :], folded=0)
+    anchor = f"{attributes['id']}-folded" if "id" in attributes else None
+    return join_markup([shown, tag("details", tag("summary", words), html_table(rest, f"{caption}: {words}", id=anchor))])
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold

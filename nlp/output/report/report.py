@@ -18,6 +18,7 @@ from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
+from ...results.rounding import number
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution
 from ..pictures.drawing import drawing_of
@@ -151,8 +152,9 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
     names, units = nlp.program.variables, nlp.case.units
 
     def text(k: int, value: float) -> str:
-        name = names[k].name
-        return f"{name} = {units.shown(value, names[k].dimension):.5g} {units.label(names[k].dimension)}".strip()
+        name, dimension = names[k].name, names[k].dimension
+        width = units.shown(float(nlp.scale[k]), dimension)
+        return f"{name} = {number(units.shown(value, dimension), width, digits=5)} {units.label(dimension)}".strip()
 
     if not np.isfinite(plane.F).any():
         return f"{names[i].name} and {names[j].name} cannot move while the others are held."

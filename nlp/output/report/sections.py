@@ -7,23 +7,20 @@ from collections.abc import Sequence
 from ...case.case import Case
 from ...case.pose import sizes_of_turn
 from ...results.data import CombinedResult, SolveResult
-from ...results.parts import LimitData, MarginData
-from ...results.point import motion_data
-from ...results.tables import (
-    combined_design_table,
-    limit_table,
-    margin_table,
-    origin_table,
-    outcome_table,
-    robot_table,
-    solved_design_table,
-)
+from ...results.designtable import combined_design_table, solved_design_table
+from ...results.parts import LimitData, MarginData, RobotData
+from ...results.point import task_data
+from ...results.robottables import robot_tables
+from ...results.rounding import number, size_of_F
+from ...results.tables import limit_table, margin_table, origin_table, outcome_table
 from ...results.wording import (
     costliest_words,
+    counted,
     headline,
-    motion_words,
+    is_unasked_singularity,
     relaxation_words,
     singularity_lines,
+    task_words,
     tolerance_line,
 )
 from ..pictures.style import RATE_COLOURS
@@ -58,12 +55,17 @@ def answer(report: Report) -> Markup:
         lines = [headline(result).words]
     else:
         combined = result.combined
-        value = "" if combined.value is None else f", value {combined.value:.7g}"
+        value = "" if combined.value is None else f", value {number(combined.value)}"
         tasks = f"{len(report.parts)} tasks, combined by {combined.method.value}"
         lines = [f"{tasks}: {result.status.value}{value}"]
         if not report.is_answer:
             lines.append("This is no answer: what was reached is shown below.")
     kind = "answer" if report.is_answer else "answer none"
+    robot = _robot_of(report)
+    if report.is_answer and is_unasked_singularity(robot, report.case):
+        kind = "answer singular"
+        if robot is not None and isinstance(result, CombinedResult):
+            lines.append(f"The robot is singular: rank {robot.rank}.")
     return tag("div", paragraphs(lines), class_=kind, id="answer")
 
 
@@ -71,9 +73,9 @@ def _case(report: Report) -> Markup:
     """Return the case in words."""
     case, first = report.case, report.parts[0]
     lines = [f"{case.model.description}."]
-    for task in case.tasks:
+    for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        lines.append(f"Task “{task.name}”: make F {word} for a {motion_words(motion_data(task.twist), case.units)}.")
+        lines.append(f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}.")
     lines.append(
         "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
     )
@@ -101,7 +103,7 @@ def _case(report: Report) -> Markup:
         lines.append(f"Limits: {listed}.")
     search = case.search
     if names:
-        lines.append(f"Searched from {search.starts} starting points, seed {search.seed}.")
+        lines.append(f"Searched from {counted(search.starts, 'starting point')}, seed {search.seed}.")
     return paragraphs(lines)
 
 
@@ -235,7 +237,7 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
         parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     if combined.tasks:
-        parts.append(html_table(outcome_table(combined), "What it means for each task", id="outcomes"))
+        parts.append(html_table(outcome_table(combined, result.tasks), "What it means for each task", id="outcomes"))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
@@ -252,8 +254,12 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
         return [tag("p", "The robot does not exist at the point reached.", class_="warning")]
     caption = "What was reached" if reached else "Dimensions and pose"
     parts = [html_table(solved_design_table(case, result, robot), caption, id=anchor)]
-    caption, kind = ("Limbs", "limbs") if robot.several is None else ("The robot at every pose", "poses")
-    parts.append(html_table(robot_table(case, robot), caption, id=f"{anchor}-{kind}"))
+    first, *others = robot_tables(case, robot)
+    caption = "Limbs" if robot.several is None else "The robot at every pose"
+    parts.append(html_table(first, caption, id=f"{anchor}-{first.name}"))
+    for table in others:
+        caption = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
+        parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
     if not reached:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts
@@ -265,7 +271,9 @@ def _limits(report: Report) -> Markup:
     if not limits:
         return Markup("")
     caption = "How near the robot comes to each limit, and what the limit costs"
-    parts = [html_table(limit_table(limits), caption, id="limit")]
+    robot = _robot_of(report)
+    size = 0.0 if robot is None else size_of_F(robot, _F_of(report))
+    parts = [html_table(limit_table(limits, size), caption, id="limit")]
     costliest = costliest_words(limits)
     if costliest is not None:
         parts.append(tag("p", costliest))
@@ -292,6 +300,20 @@ def _origin(report: Report) -> Markup:
     return join_markup(
         [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
     )
+
+
+def _robot_of(report: Report) -> RobotData | None:
+    """Return the robot that the report is about; None where it does not exist."""
+    result = report.result
+    if isinstance(result, SolveResult):
+        return result.robot
+    return None if result.combined.point is None else result.combined.point.robot
+
+
+def _F_of(report: Report) -> float:  # noqa: N802 - the objective's name
+    """Return the objective, of one task or combined; 0 without an answer."""
+    result = report.result
+    return (result.F if isinstance(result, SolveResult) else result.combined.value) or 0.0
 
 
 def _limits_of(report: Report) -> Sequence[LimitData]:

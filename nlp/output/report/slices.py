@@ -14,6 +14,7 @@ import numpy as np
 
 from ....models import FloatArray, frozen_array
 from ...evidence.kkt import FEASIBLE
+from ...evidence.state import ZERO_F
 from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
 
@@ -160,5 +161,7 @@ def _values(nlp: Nlp, points: FloatArray) -> _Values:
     with np.errstate(invalid="ignore"):
         low = g >= (nlp.g_lower - _WITHIN * size)[:, None]
         high = g <= (nlp.g_upper + _WITHIN * size)[:, None]
-    values = np.where(np.isfinite(F[0]), F[0], np.nan)
+    # What rounding leaves of F is 0.
+    settled = np.where(np.abs(F[0]) > ZERO_F * nlp.objective_scale, F[0], 0.0)
+    values = np.where(np.isfinite(F[0]), settled, np.nan)
     return _Values(values, np.asarray(np.all(low & high, axis=0) & np.isfinite(values), dtype=np.float64))

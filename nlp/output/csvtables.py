@@ -1,0 +1,44 @@
+"""Tables as comma-separated values, with every digit of their numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+
+from ..errors import InputError, listing
+from ..results.text import Figure, Line, TextTable
+
+
+def tables_as_csv(tables: Iterable[TextTable], name: str | None = None) -> str:
+    """Return tables as comma-separated values.
+
+    Args:
+        tables: of a result.
+        name: of the one table to write; None for all, each below a line with its name, with an empty line between.
+
+    Raises:
+        InputError: no table has this name.
+    """
+    named = [table for table in tables if table.name]
+    if name is None:
+        return "\n".join(f"{table.name}\n{_as_csv(table)}" for table in named)
+    for table in named:
+        if table.name == name:
+            return _as_csv(table)
+    raise InputError(f"--table {name}: must be one of {listing([table.name for table in named])}")
+
+
+def _as_csv(table: TextTable) -> str:
+    """Return one table, its headers in the first line."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([header.replace("\n", ", ") or ("note" if k else "name") for k, header in enumerate(table.headers)])
+    writer.writerows([_cell(cell) for cell in row] for row in table.rows)
+    return text.getvalue()
+
+
+def _cell(cell: str | Line) -> str:
+    if isinstance(cell, Figure):
+        return repr(float(cell.value))
+    return cell.words if isinstance(cell, Line) else cell

@@ -1,0 +1,211 @@
+"""The robot as tables of text: its limbs at one pose, or each measure by pose and limb, and its Jacobian."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...models import Dimension, Quantity, WrenchKind, component_names
+from ..case.case import Case
+from ..case.task import Sense
+from ..units import rate_unit
+from .rounding import number, rate_sizes, settled_F, settled_rates, size_of
+from .text import FEWEST_FOLDED, Figure, TextTable
+
+if TYPE_CHECKING:
+    from .parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
+
+#: Poses with F nearer than this part to the worst are as bad.
+_AS_BAD = 1e-6
+#: So many poses are shown by limb on a terminal.
+_POSES = 12
+#: Largest component of the difference of two unit axes that are one.
+_SAME_AXIS = 1e-6
+
+
+class _Measure(NamedTuple):
+    """A measure of the robot's limbs.
+
+    Attributes:
+        name: of the quantity.
+        dimension: of its numbers.
+        words: its name for people.
+        reference: direction that an angle is measured from, as a limit of the case has it; else empty.
+        unit: of its numbers, with the direction that an angle is measured from.
+    """
+
+    name: str
+    dimension: Dimension
+    words: str
+    reference: str
+    unit: str
+
+    def of(self, robot: RobotData | PoseStateData) -> ByOwner:
+        """Return its numbers, as the limits of the case speak of them, by limb."""
+        return (robot.limited_quantities or {}).get(self.name, robot.quantities.get(self.name, {}))
+
+
+def plural_name(quantity: str) -> str:
+    """Return the name of the table of a quantity by pose and limb."""
+    return quantity.replace("_", "-") + "s"
+
+
+def _measures(case: Case, robot: RobotData) -> list[_Measure]:
+    """Return the measures of a robot."""
+    references = {limit.name: limit.reference for limit in case.limits}
+
+    def measure(item: Quantity) -> _Measure:
+        reference = references.get(item.name, "")
+        parts = (f"from {reference}" if reference else "", case.units.label(item.dimension))
+        unit = ", ".join(part for part in parts if part)
+        return _Measure(item.name, item.dimension, item.name.replace("_", " "), reference, unit)
+
+    return [measure(item) for item in case.model.quantities if item.name in robot.quantities]
+
+
+def robot_table(case: Case, robot: RobotData) -> TextTable:
+    """Return the robot at every pose, or every limb where there is one pose."""
+    return _limb_table(case, robot) if robot.several is None else _pose_table(case, robot, robot.several)
+
+
+def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
+    """Yield every limb; or, with several poses, the robot at every pose, then rates and measures by pose and limb."""
+    yield robot_table(case, robot)
+    if robot.several is not None:
+        yield from _tables_by_limb(case, robot, robot.several)
+
+
+def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:
+    """Return the robot at every pose: F, where it stands, and the range of each measure over its limbs."""
+    measures, units = _measures(case, robot), case.units
+    labels = [f"{each.words.removesuffix(' angle')}\n{each.unit}" for each in measures]
+    values = [_settled_pose_F(pose, robot.task) for pose in several.poses]
+    is_worst = _worst(values, robot.task)
+    reach = max(abs(part) for pose in several.poses for part in pose.pose.position)
+    half_turn = units.shown(math.pi, Dimension.ANGLE)
+    rows = []
+    for k, pose in enumerate(several.poses):
+        ranges = [_range_text(each.of(pose), each, case) for each in measures]
+        at = [number(value, reach, digits=6) for value in pose.pose.position]
+        angle = number(_signed_angle(case, k, pose), half_turn, digits=6)
+        mark = "worst" if is_worst[k] else ""
+        rows.append((str(k + 1), number(values[k]), mark, *at, angle, *ranges, str(pose.rank)))
+    position = [f"{name}\n{units.length}" for name in component_names("p", 3)]
+    headers = ("pose", "F", "", *position, f"angle\n{units.angle}", *labels, "rank")
+    return TextTable(headers, tuple(rows), "poses")
+
+
+def _settled_pose_F(pose: PoseStateData, task: TaskData | None) -> float:  # noqa: N802 - the objective's name
+    """Return F at a pose, 0 where it is rounding error."""
+    if task is None:
+        return pose.F
+    return settled_F(pose.F, rate_sizes(pose.jacobian, task.motion.twist, pose.pose.position))
+
+
+def _worst(values: Sequence[float], task: TaskData | None) -> list[bool]:
+    """Return whether F is the worst at each pose; nowhere where all are equal, or the sense is not known."""
+    low, high = min(values), max(values)
+    if task is None or high - low <= _AS_BAD * abs(high):
+        return [False] * len(values)
+    worst = low if task.sense is Sense.MAX else high
+    return [abs(value - worst) <= _AS_BAD * abs(high) for value in values]
+
+
+def _range_text(values: ByOwner, measure: _Measure, case: Case) -> str:
+    """Return the range of a measure over the limbs; of an angle the largest only."""
+    size = size_of(measure.dimension, values.values(), case.units)
+    low, high = (number(end(values.values()), size, digits=5) for end in (min, max))
+    return high if measure.dimension is Dimension.ANGLE else f"{low} .. {high}"
+
+
+def _signed_angle(case: Case, index: int, pose: PoseStateData) -> float:
+    """Return the angle of a pose, negative where it turns backwards about the axis that its case holds or a task's."""
+    counts = np.cumsum([len(each.displacements) for each in case.poses])
+    stated = case.poses[int(np.searchsorted(counts, index, side="right"))]
+    axis = np.asarray(pose.pose.axis)
+    known = [] if stated.rotation.axis is None else [np.asarray(stated.rotation.axis, dtype=np.float64)]
+    known += [np.asarray(task.twist, dtype=np.float64)[:3] for task in case.tasks]
+    for other in known:
+        size = float(np.linalg.norm(other))
+        if size and np.max(np.abs(axis + other / size)) < _SAME_AXIS:
+            return -pose.pose.angle
+        if size and np.max(np.abs(axis - other / size)) < _SAME_AXIS:
+            return pose.pose.angle
+    return pose.pose.angle
+
+
+def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterator[TextTable]:
+    """Yield the rates, then each measure, with a row for each pose and a column for each limb."""
+    rows, task = case.model.wrenches, robot.task
+    folded = len(several.poses) - _POSES
+    folded = folded if folded >= FEWEST_FOLDED else 0
+    if task is not None:
+        values = [_settled_pose_F(pose, task) for pose in several.poses]
+        marks = ["worst" if worst else "" for worst in _worst(values, task)]
+        couples = any(row.kind is WrenchKind.COUPLE for row in rows)
+        unit = rate_unit(task.motion.twist, case.units)
+        labels = [f"{row.limb} {row.kind.value}\n{unit}" if couples else f"{row.limb}\n{unit}" for row in rows]
+        cells = []
+        for k, pose in enumerate(several.poses):
+            sizes = rate_sizes(pose.jacobian, task.motion.twist, pose.pose.position)
+            rates = settled_rates(pose.rates, sizes, is_free=values[k] == 0)
+            cells.append((str(k + 1), *(number(rate, digits=6, signed=True) for rate in rates), marks[k]))
+        title = "rate by pose and limb"
+        yield TextTable(("pose", *labels, ""), tuple(cells), "rates", title, folded, "more poses")
+    for measure in _measures(case, robot):
+        owners = list(measure.of(several.poses[0]))
+        cells = [
+            (str(k + 1), *_measure_cells(measure.of(pose), owners, measure, case))
+            for k, pose in enumerate(several.poses)
+        ]
+        label = case.units.label(measure.dimension)
+        headers = [f"{owner}\n{label}" if label else owner for owner in owners]
+        title = f"{measure.words}{f' from {measure.reference}' if measure.reference else ''} by pose and limb"
+        yield TextTable(("pose", *headers), tuple(cells), plural_name(measure.name), title, folded, "more poses")
+
+
+def _measure_cells(values: ByOwner, owners: Sequence[str], measure: _Measure, case: Case) -> list[str]:
+    size = size_of(measure.dimension, values.values(), case.units)
+    return [number(values[owner], size, digits=5) for owner in owners]
+
+
+def _limb_table(case: Case, robot: RobotData) -> TextTable:
+    """Return every row of the Jacobian: its rate and share of F, for a single task, and the measures of its limb."""
+    model, task = case.model, robot.task
+    rates: Sequence[float] = ()
+    if task is not None and robot.rates is not None:
+        sizes = rate_sizes(robot.jacobian, task.motion.twist, robot.pose.position)
+        rates = settled_rates(robot.rates, sizes, is_free=bool(robot.task_is_free))
+    couples = any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
+    measures = _measures(case, robot)
+    found: list[Mapping[str, str]] = [
+        dict(zip(each.of(robot), _measure_cells(each.of(robot), list(each.of(robot)), each, case), strict=True))
+        for each in measures
+    ]
+    total = sum(rate**2 for rate in rates)
+    rows = []
+    for k, row in enumerate(model.wrenches):
+        cells = [row.limb, *([row.kind.value] if couples else [])]
+        if rates:
+            part = 100 * rates[k] ** 2 / total if total > 0 else 0.0
+            cells += [number(rates[k], digits=6, signed=True), Figure(f"{part:.1f}", part) if total > 0 else ""]
+        rows.append((*cells, *(column.get(row.limb, "") for column in found)))
+    labels = [f"{each.words}\n{each.unit}" for each in measures]
+    headers = ["limb", *(["wrench"] if couples else [])]
+    if task is not None and rates:
+        headers += [f"rate\n{rate_unit(task.motion.twist, case.units)}", "share of F\n%"]
+    return TextTable((*headers, *labels), tuple(rows), "limbs")
+
+
+def jacobian_table(case: Case, robot: RobotData) -> TextTable:
+    """Return the Jacobian: forces are parts of a unit vector, and moments have the error of the longest arm."""
+    arm = max((abs(value) for row in robot.jacobian for value in row[3:]), default=0.0)
+    rows = []
+    for row, values in zip(case.model.wrenches, robot.jacobian, strict=True):
+        cells = [number(value, 1.0, digits=6, signed=True) for value in values[:3]]
+        cells += [number(value, arm, digits=6, signed=True) for value in values[3:]]
+        rows.append((row.limb, *cells))
+    return TextTable(("J", "f_x", "f_y", "f_z", "m_x", "m_y", "m_z"), tuple(rows), "jacobian")

@@ -1,0 +1,114 @@
+"""Numbers as text, 0 where they are below their error bound.
+
+A number that is the sum of larger terms, or that a search has found within a range, has an error in proportion to
+these. Where it is smaller than that, its digits mean nothing, and its text is 0. In JSON every number stands as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from ...models import Dimension
+from ..evidence.state import ZERO_F
+from ..units import Units
+from .text import Figure
+
+if TYPE_CHECKING:
+    from .parts import Jacobian, RobotData
+
+#: Error bound of a number, as a part of its terms, its neighbours or its range: a thousand times what a search leaves.
+NOISE = 1e-9
+#: Error bound of a number that a case states, as a part of the largest beside it: the rounding of a sine, some times.
+STATED = 1e-14
+
+
+def settled(value: float, size: float, part: float = NOISE) -> float:
+    """Return a number, or 0 where it is below a part of a size."""
+    return 0.0 if abs(value) <= part * size else value + 0.0
+
+
+def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = False, part: float = NOISE) -> Figure:
+    """Return the text of a number.
+
+    Args:
+        value: the number.
+        size: of its terms, its neighbours or its range; the number is 0 where it is below a part of this.
+        digits: number of significant digits.
+        signed: whether a positive number has its sign.
+        part: the error bound as a part of the size.
+    """
+    value = settled(value, size, part)
+    return Figure(f"{value:{'+' if signed and value else ''}.{digits}g}", value)
+
+
+def listed(values: Iterable[float]) -> str:
+    """Return numbers with five digits each, 0 where they are rounding error beside the largest."""
+    numbers = list(values)
+    size = max(map(abs, numbers), default=0.0)
+    return "  ".join(number(value, size, digits=5) for value in numbers)
+
+
+def size_of(dimension: Dimension, values: Iterable[float], units: Units) -> float:
+    """Return the size beside which numbers of one dimension have rounding error: half a turn for angles."""
+    return units.shown(math.pi, dimension) if dimension is Dimension.ANGLE else max(map(abs, values), default=0.0)
+
+
+def rate_sizes(jacobian: Jacobian, twist: Sequence[float], position: Sequence[float]) -> list[float]:
+    """Return the size of the terms of each row's rate, ``|m| |omega| + |f| |v|``, with moments about a point.
+
+    Args:
+        jacobian: the rows, force, then moment about the world origin.
+        twist: (6,) of the motion.
+        position: (3,) the platform's origin, as in the objective without cancellation.
+    """
+    omega, v = twist[:3], twist[3:]
+    turn = math.hypot(*omega)
+    way = math.hypot(*(a + b for a, b in zip(v, _cross(omega, position), strict=True)))
+    sizes = []
+    for row in jacobian:
+        arm = (a - b for a, b in zip(row[3:], _cross(position, row[:3]), strict=True))
+        sizes.append(math.hypot(*arm) * turn + math.hypot(*row[:3]) * way)
+    return sizes
+
+
+def settled_rates(rates: Sequence[float], sizes: Sequence[float], *, is_free: bool = False) -> list[float]:
+    """Return rates, 0 where they are rounding error of the terms that they sum.
+
+    Args:
+        rates: one for each row.
+        sizes: of their terms.
+        is_free: whether F counts as zero.
+    """
+    return [0.0 if is_free else settled(rate, size) for rate, size in zip(rates, sizes, strict=True)]
+
+
+def settled_F(F: float, sizes: Sequence[float]) -> float:  # noqa: N802 - the objective's name
+    """Return F, or 0 where rounding leaves as much of the terms of its rates."""
+    return settled(F, math.fsum(size**2 for size in sizes), ZERO_F)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def size_of_F(robot: RobotData, F: float = 0.0) -> float:  # noqa: N802 - the objective's name
+    """Return the size of the terms of F, over all poses; F itself where the task is not known."""
+    if robot.task is None:
+        return abs(F)
+    twist = robot.task.motion.twist
+    poses = [robot] if robot.several is None else robot.several.poses
+    sizes = [size for each in poses for size in rate_sizes(each.jacobian, twist, each.pose.position)]
+    return math.fsum(size**2 for size in sizes)
+
+
+def task_F(robot: RobotData | None, F: float) -> float:  # noqa: N802 - the objective's name
+    """Return a value of F of a robot's task, over its poses, or 0 where it is rounding error there."""
+    return F + 0.0 if robot is None or robot.task is None else settled(F, size_of_F(robot), ZERO_F)
+
+
+def robot_size(robot: RobotData) -> float:
+    """Return a length beside which positions of a robot have rounding error: its longest arm of a moment."""
+    lengths = [abs(part) for row in robot.jacobian for part in row[3:] if any(row[:3])]
+    return max([*lengths, *map(abs, robot.pose.position)]) or 1.0
