@@ -85,7 +85,8 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
     words = f"{table.folded} {table.folded_words}"
     rest = replace(table, rows=table.rows[len(table.rows) - table.folded :], folded=0)
     anchor = f"{attributes['id']}-folded" if "id" in attributes else None
-    return join_markup([shown, tag("details", tag("summary", words), html_table(rest, f"{caption}: {words}", id=anchor))])
+    folded = tag("details", tag("summary", words), html_table(rest, f"{caption}: {words}", id=anchor))
+    return join_markup([shown, folded])
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
