@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
+from .options import CaseName, Jobs, JsonFile, check_outputs, console, write_json
 
 
 def certify(
@@ -36,8 +36,7 @@ def certify(
         if proof == "-" and json_file == "-":
             raise InputError("standard output can take one of --json - and --proof - only")
         loaded = load_case(case)
-        for target in (json_file, proof):
-            check_target(target)
+        check_outputs([case], {"--json": json_file, "--proof": proof})
         certified = certify_with_progress(
             loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
         )

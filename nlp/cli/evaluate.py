@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, JsonFile, check_target, console, write_json
+from .options import CaseName, JsonFile, check_outputs, console, write_json
 
 
 def evaluate(
@@ -29,7 +29,7 @@ def evaluate(
     from ..results.evaluation import evaluation_of
 
     loaded = load_case(case, dict(_setting(text) for text in settings or []))
-    check_target(json_file)
+    check_outputs([case], {"--json": json_file})
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, Starts, check_target
+from .options import CaseName, Jobs, Seed, Starts, check_outputs
 
 
 def report(
@@ -29,7 +29,7 @@ def report(
     loaded = load_case(case)
     text = read_text(str(find_case(case)))
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
-    check_target(out)
+    check_outputs([case], {"--out": out})
     check_library("plotly", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of

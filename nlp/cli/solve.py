@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_picture, check_target, console, write_json
+from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_outputs, check_picture, console, write_json
 
 
 def solve(
@@ -31,8 +31,8 @@ def solve(
 
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
-    check_target(json_file)
     check_picture(plot)
+    check_outputs([case], {"--json": json_file, "--plot": plot})
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
     if json_file is not None:
