@@ -18,10 +18,10 @@ def codegen(
     precision: Annotated[str, typer.Option(help="double is the only one.")] = "double",
 ) -> None:
     """Write F and its derivatives as C for embedding."""
-    from ..case.reader import find_case, load_case
+    from ..case.reader import case_text, find_case, load_case
     from ..embedding.codegen import generate_c
     from ..errors import InputError
-    from ..output.files import check_folder, check_outputs, read_text, write_folder
+    from ..output.files import check_folder, check_outputs, write_folder
 
     if language != "c":
         raise InputError(f"--language {language}: only c is generated")
@@ -33,7 +33,7 @@ def codegen(
     loaded, path = load_case(case), find_case(case)
     if not force:
         check_folder(out)
-    files = generate_c(loaded, read_text(str(path)))
+    files = generate_c(loaded, case_text(case))
     for name in files if Path(out).is_dir() else ():
         check_outputs([path], {"--out": str(Path(out) / name)})
     write_folder(out, files, force=force)

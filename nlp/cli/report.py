@@ -21,13 +21,13 @@ def report(
     jobs: Jobs = None,
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
-    from ..case.reader import find_case, load_case
-    from ..output.files import read_text, write_text
+    from ..case.reader import case_text, load_case
+    from ..output.files import write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
     loaded = load_case(case)
-    text = read_text(str(find_case(case)))
+    text = case_text(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs([case], {"--out": out})
     check_library("plotly", "reports")

@@ -26,9 +26,13 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
+    from ..interruption import Milestone, answer_after
     from ..results.result import result_of
     from .progress import solve_with_progress
 
+    # With --certify, an interrupt would leave the proof undone, and the answer would look like a refused one.
+    if not certify:
+        answer_after(Milestone.START)
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     check_picture(plot)

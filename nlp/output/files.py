@@ -11,11 +11,14 @@ from itertools import combinations
 from pathlib import Path
 
 from ..errors import InputError
+from ..interruption import WRITING
 
 #: Name of the file that lists what was written into a folder; only a folder with it is written into again.
 MANIFEST = "screwsynth-files.txt"
 #: Permission to write for anybody.
 _WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+#: Largest file that is read, bytes: above every proof that fits into memory as a tree; a device has no end.
+LARGEST_FILE = 256 * 2**20
 _MANIFEST_HEAD = "# Written by screwsynth, which may replace these files:"
 
 
@@ -70,7 +73,7 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
         folder.mkdir(parents=True, exist_ok=True)
         listed = sorted({*files, *(name for name in _written_before(folder) or () if (folder / name).exists())})
         every = {**files, MANIFEST: "\n".join([_MANIFEST_HEAD, *listed]) + "\n"}
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
+        with WRITING, tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
             for name, text in every.items():
                 (Path(waiting) / name).write_text(text, encoding="utf-8")
             for name in every:
@@ -152,19 +155,30 @@ def read_text(source: str) -> str:
     """Read the text of a file.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: it cannot be read, is too large, or is no UTF-8 text.
     """
     try:
-        return Path(source).read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: is no text") from None
+        with Path(source).open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         fault = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise InputError(f"{source}: cannot be read: {fault}") from None
+    if len(content) > LARGEST_FILE:
+        raise InputError(f"{source}: cannot be read: it is larger than {LARGEST_FILE // 2**20} MB")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: is no text") from None
 
 
 def _replace(path: Path, content: bytes) -> None:
     """Put a complete file in the place of an older one, or of none."""
+    with WRITING:
+        _write_and_rename(path, content)
+
+
+def _write_and_rename(path: Path, content: bytes) -> None:
+    """Write a temporary file and give it the name of the result."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -63,6 +63,13 @@ def motion_words(motion: MotionData, units: Units) -> str:
 def headline(result: SolveResult) -> Line:
     """Return F, or the status of a solve without an answer."""
     robot = result.robot
+    if result.status is Status.INTERRUPTED:
+        best = (
+            ""
+            if result.reached is None or result.reached.F is None
+            else f": best F so far = {number(result.reached.F)}"
+        )
+        return Line(f"interrupted{best}", tone=Tone.NO_ANSWER)
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
