@@ -36,10 +36,13 @@ class UncoveredError(ScrewsynthError):
 
     Args:
         operation: the operation, in words for people.
+        limit: dotted key of the case's limit whose expressions hold it; None where it is the robot's, or not known.
     """
 
-    def __init__(self, operation: str) -> None:
-        super().__init__(f"no bound can be proved: the robot's expressions hold {operation}, which has no rule")
+    def __init__(self, operation: str, limit: str | None = None) -> None:
+        self.operation, self.limit = operation, limit
+        where = "the robot's expressions" if limit is None else f"the expressions of the limit {limit}"
+        super().__init__(f"no bound can be proved: {where} hold {operation}, which has no rule")
 
 
 class CaseError(InputError):
