@@ -68,9 +68,15 @@ class CaseError(InputError):
         return CaseError(self.key, self.fault, self.value, source)
 
 
+#: Spaces of typography that Python does not call printable: without a break, thin, and as wide as a character.
+_SPACES = "\u00a0\u2009\u202f\u3000"
+
+
 def one_line(text: str) -> str:
-    """Return a text with line breaks and other control characters as escape sequences."""
-    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
+    """Return a text with line breaks, control characters and marks of direction as escape sequences."""
+    return "".join(
+        char if char.isprintable() or char in _SPACES else char.encode("unicode_escape").decode() for char in text
+    )
 
 
 def listing(names: Iterable[str]) -> str:

@@ -165,6 +165,8 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
         if name not in case.parameters:
             raise CaseError(key, f"is missing: {parameter.description}, {_allowed_form(parameter)}")
         given = case.parameters[name]
+        if isinstance(given, str | bytes):  # a sequence too, but of no numbers
+            check_real(given, key)
         values = tuple(given) if isinstance(given, Sequence) else (given,)
         if len(values) != len(parameter.typical):
             raise CaseError(key, f"must be {_allowed_form(parameter)}")

@@ -20,7 +20,7 @@ def codegen(
     """Write F and its derivatives as C for embedding."""
     from ..case.reader import case_text, find_case, load_case
     from ..embedding.codegen import generate_c
-    from ..errors import InputError
+    from ..errors import InputError, one_line
     from ..output.files import check_folder, check_outputs, write_folder
 
     if language != "c":
@@ -37,4 +37,4 @@ def codegen(
     for name in files if Path(out).is_dir() else ():
         check_outputs([path], {"--out": str(Path(out) / name)})
     write_folder(out, files, force=force)
-    typer.echo(f"{len(files)} files in {out}: make -C {out} test")
+    typer.echo(f"{len(files)} files in {one_line(out)}: make -C {one_line(out)} test")

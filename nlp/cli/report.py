@@ -22,7 +22,7 @@ def report(
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
     from ..case.reader import case_text, load_case
-    from ..errors import UncoveredError
+    from ..errors import UncoveredError, one_line
     from ..output.files import write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
@@ -49,5 +49,5 @@ def report(
     check = check_case(case, {case: result}) if loaded.published else None
     write_text(out, page_of(report_of(text, solution, result, check, refusal)))
     if out != "-":
-        typer.echo(f"{out}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
+        typer.echo(f"{one_line(out)}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)
