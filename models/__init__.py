@@ -1,7 +1,7 @@
 """Symbolic robots, and the screw algebra in which they are written."""
 
 from .arrays import FloatArray, frozen_array, frozen_vector
-from .catalog import RobotFunction, UnknownModelError, model_names, robot_function
+from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
 from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
 from .instance import (
@@ -41,6 +41,7 @@ from .three_upu import three_upu
 from .wrench import Wrench, WrenchKind, couple_about, force_along
 
 __all__ = [
+    "AmbiguousModelError",
     "AxisAngle",
     "Body",
     "Circle",

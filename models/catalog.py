@@ -9,15 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 from .hexapod import hexapod
 from .model import Model
 from .stewart_gough import stewart_gough
 from .three_upu import three_upu
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
 
 class UnknownModelError(KeyError):
     """Error of a name that no robot has."""
+
+
+class AmbiguousModelError(LookupError):
+    """Error of a name that robots of several packages have."""
 
 
 RobotFunction = Callable[..., Model]
@@ -31,9 +39,7 @@ SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
 
 def model_names() -> tuple[str, ...]:
     """Return the names of all robots on this machine, the shipped ones first, without importing any robot."""
-    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs do not need it
-
-    return (*SHIPPED, *sorted({point.name for point in entry_points(group=GROUP)} - set(SHIPPED)))
+    return (*SHIPPED, *sorted({offer.point.name for offer in _offers()} - set(SHIPPED)))
 
 
 def robot_function(name: str) -> RobotFunction:
@@ -44,12 +50,40 @@ def robot_function(name: str) -> RobotFunction:
 
     Raises:
         UnknownModelError: no robot has that name.
+        AmbiguousModelError: several other packages have a robot of that name.
     """
     if name in SHIPPED:
         return SHIPPED[name]
-    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and most runs do not need it
+    offers = {offer.package: offer.point for offer in _offers() if offer.point.name == name}
+    if not offers:
+        raise UnknownModelError(name)
+    if len(offers) > 1:
+        raise AmbiguousModelError(f"the packages {' and '.join(sorted(offers))} offer it; uninstall all but one")
+    (point,) = offers.values()
+    function: RobotFunction = point.load()
+    return function
 
-    for point in entry_points(group=GROUP, name=name):
-        function: RobotFunction = point.load()
-        return function
-    raise UnknownModelError(name)
+
+class _Offer(NamedTuple):
+    """A robot of another package."""
+
+    package: str
+    point: EntryPoint
+
+
+def _offers() -> list[_Offer]:
+    """Return the robots of other packages; a package whose list of entry points cannot be read offers none."""
+    from importlib.metadata import distributions  # noqa: PLC0415 - slow to import, and most runs do not need it
+
+    offers: list[_Offer] = []
+    seen: set[str] = set()
+    for distribution in distributions():
+        try:
+            points = [point for point in distribution.entry_points if point.group == GROUP]
+            package = distribution.name if points else ""  # slow to read
+        except Exception:  # noqa: S112 - another package's files may be broken in any way
+            continue
+        if package not in seen:  # the first on the path is the one that is imported
+            offers += [_Offer(package or "a package without a name", point) for point in points]
+            seen.update([package] if points else [])
+    return offers

@@ -36,10 +36,13 @@ class UncoveredError(ScrewsynthError):
 
     Args:
         operation: the operation, in words for people.
+        limit: dotted key of the case's limit whose expressions hold it; None where it is the robot's, or not known.
     """
 
-    def __init__(self, operation: str) -> None:
-        super().__init__(f"no bound can be proved: the robot's expressions hold {operation}, which has no rule")
+    def __init__(self, operation: str, limit: str | None = None) -> None:
+        self.operation, self.limit = operation, limit
+        where = "the robot's expressions" if limit is None else f"the expressions of the limit {limit}"
+        super().__init__(f"no bound can be proved: {where} hold {operation}, which has no rule")
 
 
 class CaseError(InputError):
@@ -65,9 +68,15 @@ class CaseError(InputError):
         return CaseError(self.key, self.fault, self.value, source)
 
 
+#: Spaces of typography that Python does not call printable: without a break, thin, and as wide as a character.
+_SPACES = "\u00a0\u2009\u202f\u3000"
+
+
 def one_line(text: str) -> str:
-    """Return a text with line breaks and other control characters as escape sequences."""
-    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
+    """Return a text with line breaks, control characters and marks of direction as escape sequences."""
+    return "".join(
+        char if char.isprintable() or char in _SPACES else char.encode("unicode_escape").decode() for char in text
+    )
 
 
 def listing(names: Iterable[str]) -> str:

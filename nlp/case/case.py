@@ -16,7 +16,7 @@ import numpy as np
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ..errors import CaseError, nearest
 from ..units import Units
-from .checks import check_direction, check_value, check_vector
+from .checks import check_direction, check_real, check_reals, check_value, check_vector
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
 from .names import parameter_name, pose_prefixes
@@ -86,7 +86,7 @@ class Case:
         store(self, "tasks", _check_tasks(self))
         self.limits.check(self.as_limited)
         _check_tolerance(self)
-        if not 1 / LARGEST <= self.characteristic_length <= LARGEST:
+        if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
     def components(self, name: str) -> tuple[Value, ...]:
@@ -165,6 +165,8 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
         if name not in case.parameters:
             raise CaseError(key, f"is missing: {parameter.description}, {_allowed_form(parameter)}")
         given = case.parameters[name]
+        if isinstance(given, str | bytes):  # a sequence too, but of no numbers
+            check_real(given, key)
         values = tuple(given) if isinstance(given, Sequence) else (given,)
         if len(values) != len(parameter.typical):
             raise CaseError(key, f"must be {_allowed_form(parameter)}")
@@ -271,7 +273,7 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
     tasks = []
     for index, task in enumerate(case.tasks):
         key = f"task[{index}]"
-        twist = np.array(task.twist, dtype=np.float64)
+        twist = check_reals(task.twist, f"{key}.twist")
         if twist.shape != (6,) or not np.isfinite(twist).all():
             raise CaseError(f"{key}.twist", "must be six finite numbers")
         size = float(np.abs(twist).max())
@@ -280,10 +282,11 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
         if not 1 / LARGEST <= size <= LARGEST:
             fault = f"has a largest component of {size:g}, which must be between {1 / LARGEST:g} and {LARGEST:g}"
             raise CaseError(f"{key}.twist", fault)
-        if not (math.isfinite(task.weight) and task.weight > 0):
+        weight = check_real(task.weight, f"{key}.weight")
+        if not (math.isfinite(weight) and weight > 0):
             raise CaseError(f"{key}.weight", "must be positive", task.weight)
         point = None if task.point is None else frozen_array(check_vector(task.point, f"{key}.point"), (3,))
-        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, float(task.weight), point))
+        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, weight, point))
     names = [task.name for task in tasks]
     for index, name in enumerate(names):
         if name in names[:index]:
@@ -300,7 +303,7 @@ def _check_tolerance(case: Case) -> None:
     tolerance = case.joint_centre_tolerance
     if tolerance is None:
         return
-    if not 0 < tolerance <= LARGEST:
+    if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
     if not case.model.built or case.model.unknowns:
         raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def check_value(
 
 def _check_number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:
     """Return a number; the arguments and errors are those of :func:`check_value`."""
-    number = float(value)
+    number = check_real(value, key)
     if not math.isfinite(number):
         raise CaseError(key, "must be finite", number)
     check_size(number, key)
@@ -69,6 +69,27 @@ def _check_number(value: float, key: str, dimension: Dimension, units: Units, do
             allowed = f"at most {most}"
         raise CaseError(key, f"must be {allowed}", units.shown(number, dimension))
     return min(max(number, lower), upper)
+
+
+def check_real(value: object, key: str) -> float:
+    """Return a number as a float; text, truth values and what is no number are refused.
+
+    Args:
+        value: the number.
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: it is no number.
+    """
+    is_number = hasattr(value, "__float__") and not isinstance(value, bool | np.bool_ | str | bytes)
+    try:
+        return float(value) if is_number else _refuse_number(value, key)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return _refuse_number(value, key)
+
+
+def _refuse_number(value: object, key: str) -> NoReturn:
+    raise CaseError(key, f"must be a number, got {type(value).__name__} {value!r:.60}") from None
 
 
 def check_size(number: float, key: str) -> None:
@@ -95,10 +116,29 @@ def check_vector(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
     Raises:
         CaseError: they are not three finite numbers.
     """
-    vector: FloatArray = np.array(values, dtype=np.float64)
+    vector = check_reals(values, key)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise CaseError(key, "must be three finite numbers")
     return vector
+
+
+def check_reals(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
+    """Return numbers as an array; text, truth values and what is no number are refused.
+
+    Args:
+        values: the numbers, in any shape.
+        key: their dotted key, for messages.
+
+    Raises:
+        CaseError: one is no number, or they have no common shape.
+    """
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        raise CaseError(key, "must be numbers in rows of one length") from None
+    parts = values if isinstance(values, list | tuple) and given.ndim == 1 else given.ravel().tolist()
+    numbers = [check_real(part, f"{key}[{index}]" if given.ndim == 1 else key) for index, part in enumerate(parts)]
+    return np.array(numbers, dtype=np.float64).reshape(given.shape)
 
 
 def check_direction(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:

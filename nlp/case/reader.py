@@ -24,6 +24,8 @@ from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable,
 from .settings import Expectation, ExpectedValue, Published, Search
 from .task import Method, Sense, Task, unit_twist
 
+#: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
+_LARGEST_FILE = 4 * 2**20
 _SHIPPED = Path(cases.__file__).parent
 
 
@@ -80,18 +82,36 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
     Raises:
         InputError: the file cannot be read, or holds a fault.
     """
-    path = find_case(name)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    path, text = find_case(name), case_text(name)
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
     return case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {})
+
+
+def case_text(name: str) -> str:
+    """Return the text of a case's file; a byte order mark is left out, and line ends are those of Unix.
+
+    Args:
+        name: as for :func:`load_case`.
+
+    Raises:
+        InputError: the file cannot be read, is too large, or is no UTF-8 text.
+    """
+    path = find_case(name)
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if len(content) > _LARGEST_FILE:
+        raise InputError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def case_from_tables(tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None) -> Case:

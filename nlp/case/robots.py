@@ -7,9 +7,9 @@ import typing
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, PydanticSchemaGenerationError, TypeAdapter, ValidationError
 
-from ...models import Model, RobotFunction, UnknownModelError, model_names, robot_function
+from ...models import AmbiguousModelError, Model, RobotFunction, UnknownModelError, model_names, robot_function
 from ..errors import CaseError, listing, nearest
 from .schema import RobotTable
 from .starter import toml_value
@@ -35,6 +35,8 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
         try:
             adapter = TypeAdapter(hints.get(key, Any), config=ConfigDict(strict=True, allow_inf_nan=False))
             adapter.validate_python(value)
+        except PydanticSchemaGenerationError as error:
+            raise _error(name, function, f"the type of its option {key!r} cannot be checked") from error
         except ValidationError as error:
             fault = error.errors()[0]["msg"].replace("Input should be", "must be")
             raise CaseError(f"robot.{key}", fault, value) from None
@@ -43,7 +45,7 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
             raise CaseError(f"robot.{key}", f"is missing: {name!r} needs it")
     try:
         model = function(**options)
-    except Exception as error:  # another package's function may raise any exception
+    except (Exception, SystemExit) as error:  # another package's function may raise any exception
         raise _error(name, function, f"{type(error).__name__}: {error}") from error
     if not isinstance(model, Model):
         raise _error(name, function, f"it returned a {type(model).__name__}, not a Model")
@@ -116,7 +118,9 @@ def _find_function(name: str) -> RobotFunction:
         function = robot_function(name)
     except UnknownModelError:
         raise CaseError("robot.model", f"no such robot; {nearest(name, model_names())}", name) from None
-    except Exception as error:  # importing another package may raise anything
+    except AmbiguousModelError as error:
+        raise CaseError("robot.model", f"is ambiguous: {error}", name) from None
+    except (Exception, SystemExit) as error:  # importing another package may raise anything
         raise CaseError("robot.model", f"cannot be used: {type(error).__name__}: {error}", name) from error
     if not callable(function) or isinstance(function, Model):
         raise CaseError("robot.model", f"cannot be used: its entry point is a {type(function).__name__}", name)

@@ -19,7 +19,7 @@ class Search:
             needs a C compiler, and a second or two the first time.
 
     Raises:
-        CaseError: a number is too small.
+        CaseError: a number is not whole, or too small.
     """
 
     starts: int = 32
@@ -33,6 +33,8 @@ class Search:
             ("seed", self.seed, 0),
             ("max_iterations", self.max_iterations, 1),
         ):
+            if isinstance(value, bool) or not hasattr(value, "__index__"):
+                raise CaseError(f"solve.{key}", f"must be a whole number, got {value!r:.60}")
             if value < least:
                 raise CaseError(f"solve.{key}", f"must be at least {least}", value)
 

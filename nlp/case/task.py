@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ...models import FloatArray, screw_from_axis
 from ..errors import CaseError
-from .checks import check_direction, check_size, check_vector
+from .checks import check_direction, check_real, check_size, check_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -87,6 +87,7 @@ def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | N
     direction = check_direction(axis, f"{key}.axis")
     if pitch is None:
         raise CaseError(f"{key}.pitch", "is missing: a number, 0 for a rotation, inf for a translation")
+    pitch = check_real(pitch, f"{key}.pitch")
     if pitch == math.inf:
         return screw_from_axis(direction, (0.0, 0.0, 0.0), pitch)
     if not math.isfinite(pitch):

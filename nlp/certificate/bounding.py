@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...models import FloatArray
+from ..errors import UncoveredError
 
 #: Rounds of the coordinate-wise searches for multipliers and for a tangent point: any result of them gives a bound.
 _MULTIPLIER_ROUNDS = 8
@@ -48,7 +49,23 @@ def search_tape(form: StandardForm) -> Tape:
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+    try:
+        return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+    except UncoveredError as error:
+        raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def _uncovered_limit(form: StandardForm) -> str | None:
+    """Return the key of the limit whose expressions hold an operation without a rule; None where the robot's do."""
+    keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
+    whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
+    for k, key in enumerate(whose):
+        row = form.expressions[k]
+        try:
+            compile_tape(ca.Function("row", [form.x], [row, ca.densify(ca.jacobian(row, form.x)).T]))
+        except UncoveredError:
+            return None if key is None else f"limits.{key}"
+    return None
 
 
 @dataclass(eq=False)

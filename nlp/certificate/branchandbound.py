@@ -22,6 +22,7 @@ from ...models import FloatArray, frozen_array
 from ..case.task import Sense
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
+from ..interruption import Milestone, is_requested, reached
 from ..program.nlp import Nlp
 from .certificate import Certificate, CertificateStatus
 from .engines import Engine, engine_for
@@ -202,7 +203,10 @@ class _Search:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         turn = 0
+        reached(Milestone.BOUND)
         while self.opened.count:
+            if is_requested():
+                return "interrupted"
             if self._has_counterexample():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began

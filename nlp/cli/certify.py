@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
+from .options import CaseName, Jobs, JsonFile, check_outputs, console, write_json
 
 
 def certify(
@@ -24,20 +24,21 @@ def certify(
     json_file: JsonFile = None,
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
-    from ..case.reader import find_case, load_case
+    from ..case.reader import case_text, load_case
     from ..errors import InputError
-    from ..output.files import read_text, write_text
+    from ..interruption import Milestone, answer_after
+    from ..output.files import write_text
     from ..results.certified import certified_of
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 
     try:
+        answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":
             raise InputError("standard output can take one of --json - and --proof - only")
         loaded = load_case(case)
-        for target in (json_file, proof):
-            check_target(target)
+        check_outputs([case], {"--json": json_file, "--proof": proof})
         certified = certify_with_progress(
             loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
         )
@@ -45,7 +46,7 @@ def certify(
         raise InputError(f"--{error}") from None
     result = certified_of(certified)
     if proof is not None and certified.tree is not None:
-        write_text(proof, proof_of(certified, read_text(str(find_case(case)))).as_text())
+        write_text(proof, proof_of(certified, case_text(case)).as_text())
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):

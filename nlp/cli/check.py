@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonFile, check_target, console, write_json
+from .options import JsonFile, check_outputs, console, write_json
 
 
 def check(
@@ -18,6 +18,7 @@ def check(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
 ) -> None:
     """Hold cases to their expected and published values."""
+    from ..case.reader import shipped_cases
     from ..errors import InputError
     from ..output.checks import checks_as_junit, checks_as_markdown
     from ..output.files import write_text
@@ -26,8 +27,7 @@ def check(
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
         raise InputError("standard output can take one of --json -, --junit - and --markdown only")
-    for target in (json_file, junit):
-        check_target(target)
+    check_outputs(cases or shipped_cases(), {"--json": json_file, "--junit": junit})
     checks = check_cases(cases)
     if json_file is not None:
         write_json(json_file, checks_of(checks))

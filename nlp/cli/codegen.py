@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,14 +13,15 @@ from .options import CaseName
 def codegen(
     case: CaseName,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
+    force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
     language: Annotated[str, typer.Option(help="c is the only one.")] = "c",
     precision: Annotated[str, typer.Option(help="double is the only one.")] = "double",
 ) -> None:
     """Write F and its derivatives as C for embedding."""
-    from ..case.reader import find_case, load_case
+    from ..case.reader import case_text, find_case, load_case
     from ..embedding.codegen import generate_c
-    from ..errors import InputError
-    from ..output.files import read_text, write_folder
+    from ..errors import InputError, one_line
+    from ..output.files import check_folder, check_outputs, write_folder
 
     if language != "c":
         raise InputError(f"--language {language}: only c is generated")
@@ -28,6 +30,11 @@ def codegen(
             f"--precision {precision}: only double is generated; in single precision, optimising over these functions "
             "was tried and fails"
         )
-    files = generate_c(load_case(case), read_text(str(find_case(case))))
-    write_folder(out, files)
-    typer.echo(f"{len(files)} files in {out}: make -C {out} test")
+    loaded, path = load_case(case), find_case(case)
+    if not force:
+        check_folder(out)
+    files = generate_c(loaded, case_text(case))
+    for name in files if Path(out).is_dir() else ():
+        check_outputs([path], {"--out": str(Path(out) / name)})
+    write_folder(out, files, force=force)
+    typer.echo(f"{len(files)} files in {one_line(out)}: make -C {one_line(out)} test")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, CsvFile, CsvTable, JsonFile, check_csv, check_target, console, write_csv, write_json
+from .options import CaseName, CsvFile, CsvTable, JsonFile, check_csv, check_outputs, console, write_csv, write_json
 
 
 def evaluate(
@@ -31,7 +31,7 @@ def evaluate(
     from ..results.evaluation import evaluation_of
 
     loaded = load_case(case, dict(_parse_setting(text) for text in settings or []))
-    check_target(json_file)
+    check_outputs([case], {"--json": json_file, "--csv": csv_file})
     check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))

@@ -9,26 +9,43 @@ import gc
 import io
 import os
 import sys
+from threading import Thread, stack_size
+from typing import TYPE_CHECKING
 
-import typer
+from ..interruption import INTERRUPTED, is_requested, listen
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from typing_extensions import Buffer
 
 #: Objects allocated between two garbage collections. Imports allocate 90,000 objects and leave no garbage: with
 #: Python's own threshold of 700 they cause 120 collections, which take 60 ms of a solve's 700.
 _GARBAGE_AFTER = 200_000
+#: Stack of the thread that works, bytes: that of a main thread, where a system gives other threads less.
+_STACK = 16 * 2**20
+#: Seconds between two looks at the working thread, where a signal does not end the wait by itself.
+_LOOK = 0.25
 
 
 def main() -> None:
     """Run the command line, and end the process without finalising the interpreter.
 
-    Every file is closed before the end. Finalising the numerical libraries takes 110 ms, of a solve's 700.
+    The work runs in a thread of its own, so that this one answers an interrupt at once: a long call into a numerical
+    library would hold it back. Every file is closed by the end. Finalising the numerical libraries takes 110 ms, of a
+    solve's 700.
     """
-    status = run()
-    try:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:  # the reader has closed the pipe
-        status = status or 1
-    os._exit(status)
+    listen()
+    _open_standard_streams()
+    ended: list[int] = []
+    stack_size(_STACK)
+    work = Thread(target=lambda: ended.append(run()), name="work", daemon=True)
+    work.start()
+    stack_size(0)
+    while work.is_alive():
+        work.join(_LOOK)
+    # Without a status, the thread ended with an error, which is shown already.
+    os._exit(ended[0] if ended else 1)
 
 
 def run() -> int:
@@ -52,15 +69,65 @@ def run() -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
+        status = _status_of(app)
+        sys.stdout.flush()
+    except ScrewsynthError as error:
+        _say(str(error))
+        status = 2
+    except KeyboardInterrupt:
+        status = INTERRUPTED
+    except BrokenPipeError:  # nobody reads any more
+        status = 1
+    except OSError as error:
+        _say(f"standard output: cannot be written: {error.strerror or error}")
+        status = 2
+    finally:
+        gc.set_threshold(*thresholds)
+    return INTERRUPTED if is_requested() else status
+
+
+def _status_of(app: Callable[[], object]) -> int:
+    """Run the commands and return the exit status that they end with."""
+    try:
         app()
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else 0
-    except ScrewsynthError as error:
-        typer.echo(f"screwsynth: {error}", err=True)
-        return 2
-    except KeyboardInterrupt:
-        typer.echo("screwsynth: interrupted", err=True)
-        return 130
-    finally:
-        gc.set_threshold(*thresholds)
     return 0
+
+
+def _say(sentence: str) -> None:
+    """Write a sentence to standard error; where that is closed or full, the exit status says enough."""
+    try:
+        sys.stderr.write(f"screwsynth: {sentence}\n")
+        sys.stderr.flush()
+    except OSError:
+        pass
+
+
+class _Lenient(io.FileIO):
+    """A file that loses what cannot be written."""
+
+    def write(self, content: Buffer) -> int:
+        """Write bytes, or lose them."""
+        try:
+            return super().write(content)
+        except OSError:
+            return memoryview(content).nbytes
+
+
+def _open_standard_streams() -> None:
+    """Open closed standard streams, and make standard error one that never fails.
+
+    A file that is opened later would otherwise become a standard stream. Writing to a closed standard output is an
+    error, as for a full one; what is written to a closed standard error is lost.
+    """
+    for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, flags)
+    if sys.stdout is None:
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(io.FileIO(1, "w", closefd=False)), encoding="utf-8")
+    encoding = "utf-8" if sys.stderr is None else sys.stderr.encoding
+    raw = io.BufferedWriter(_Lenient(2, "w", closefd=False))
+    sys.stderr = io.TextIOWrapper(raw, encoding=encoding, errors="backslashreplace", line_buffering=True)

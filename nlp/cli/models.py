@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import PlotFile, check_picture, console
+from .options import PlotFile, check_outputs, check_picture, console
 
 
 def models(
@@ -21,6 +21,7 @@ def models(
     from ..results.robotwording import model_words, models_table
 
     check_picture(plot)
+    check_outputs([], {"--plot": plot})
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from rich.console import Console
 
@@ -32,29 +32,32 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed instead of the case'
 Jobs = Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")]
 
 
-def check_target(target: str | None) -> None:
-    """Refuse a file that cannot be written, before the work begins.
+def check_outputs(cases: Iterable[str], outputs: Mapping[str, str | None]) -> None:
+    """Refuse outputs that cannot be written, that are a case file, or that are each other, before the work begins.
+
+    Args:
+        cases: names of the cases that are read.
+        outputs: files to write, by the option that names them; None where it is not given.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: an output is refused.
     """
-    from ..output.files import check_target as check
+    from ..case.reader import find_case
+    from ..output.files import check_outputs as check
 
-    if target is not None:
-        check(target)
+    check([find_case(each) for each in cases], outputs)
 
 
 def check_picture(target: str | None) -> None:
-    """Refuse a picture that cannot be drawn or written, before the work begins.
+    """Refuse a picture that cannot be drawn, before the work begins.
 
     Raises:
-        InputError: the name's ending is no picture's, Matplotlib is not installed, or the file cannot be written.
+        InputError: its ending is no picture's, or Matplotlib is not installed.
     """
     if target is not None:
         from ..output.pictures.requirements import check_picture as check
 
         check(target)
-        check_target(target)
 
 
 def write_json(target: str, result: JsonObject) -> None:
@@ -94,7 +97,6 @@ def check_csv(target: str | None, table: str | None, json_file: str | None, case
     names = table_names(case, at_point=at_point)
     if table is not None and table not in names:
         raise InputError(f"--table {table}: must be one of {listing(names)}")
-    check_target(target)
 
 
 def write_csv(target: str, tables: Iterable[TextTable], name: str | None) -> None:

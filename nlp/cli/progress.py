@@ -47,11 +47,13 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
     from rich.markup import escape
     from rich.progress import Progress
 
+    from ..errors import one_line
+
     with Progress(console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("starts", total=None)
 
         def show(name: str, done: int, total: int, best: float | None) -> None:
-            label = "starts" if len(case.tasks) == 1 else escape(name)
+            label = "starts" if len(case.tasks) == 1 else escape(one_line(name))
             best_text = "" if best is None else f", best {best:.7g}"
             bar.update(line, completed=done, total=total, description=f"{label}{best_text}")
 
@@ -74,12 +76,16 @@ def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN
     from rich.markup import escape
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
+    from ..errors import one_line
+
     columns = SpinnerColumn(), TextColumn("{task.description}")
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("solving for an incumbent", total=None)
 
         def show(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
-            text = f"{escape(name)}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+            text = (
+                f"{escape(one_line(name))}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+            )
             bar.update(line, description=f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
 
         def progress_of(name: str) -> Callable[[float, float, float, int, int], None]:

@@ -17,8 +17,8 @@ from .options import (
     Seed,
     Starts,
     check_csv,
+    check_outputs,
     check_picture,
-    check_target,
     console,
     write_csv,
     write_json,
@@ -43,14 +43,18 @@ def solve(
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
+    from ..interruption import Milestone, answer_after
     from ..results.result import result_of
     from .progress import solve_with_progress
 
+    # With --certify, an interrupt would leave the proof undone, and the answer would look like a refused one.
+    if not certify:
+        answer_after(Milestone.START)
     loaded = load_case(case)
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
-    check_target(json_file)
     check_csv(csv_file, table, json_file, loaded, at_point=False)
     check_picture(plot)
+    check_outputs([case], {"--json": json_file, "--plot": plot, "--csv": csv_file})
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
     if json_file is not None:

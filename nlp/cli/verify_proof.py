@@ -19,6 +19,7 @@ def verify_proof(
     from ..case.reader import case_from_tables, load_case
     from ..certificate.proof import ProofError, read_proof
     from ..certificate.proofcheck import check_proof
+    from ..errors import one_line
     from ..output.files import read_text
     from ..solver.certified import program_of
 
@@ -40,5 +41,5 @@ def verify_proof(
     what = "there is no feasible point"
     if given.bound is not None:
         what = f"F is at most {given.bound:.10g}" if nlp.sign < 0 else f"F is at least {-given.bound:.10g}"
-    typer.echo(f"holds: {what} within the limits of {loaded.name}")
+    typer.echo(f"holds: {what} within the limits of {one_line(loaded.name)}")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from ...models import FloatArray
+from ..errors import one_line
 
 
 def identifier(name: str) -> str:
@@ -43,8 +44,8 @@ def matrix_table(declaration: str, rows: Iterable[FloatArray]) -> str:
 
 
 def comment_text(text: str) -> str:
-    """Return a text that neither ends a C comment nor begins another line."""
-    return re.sub(r"\s+", " ", text).replace("*/", "* /").replace("/*", "/ *")
+    """Return a text that neither ends a C comment nor begins another line; control characters are escaped."""
+    return one_line(re.sub(r"\s+", " ", text)).replace("*/", "* /").replace("/*", "/ *")
 
 
 def _string_literal(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from ..errors import one_line
 from ..results.checkwording import published_words, reproduction_table
 from ..results.regression import CaseCheck
 from ..results.text import Line, TextTable
@@ -14,7 +15,7 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
     """Return the checks as JUnit XML: a suite for each case, a test for each number."""
     root = ElementTree.Element("testsuites", name="screwsynth check")
     for check in checks:
-        suite = ElementTree.SubElement(root, "testsuite", name=check.name, time=f"{check.seconds:.3f}")
+        suite = ElementTree.SubElement(root, "testsuite", name=one_line(check.name), time=f"{check.seconds:.3f}")
         failures = 0
         for row in check.expected:
             fault = "" if row.passed else f"computed {row.computed}, expected {row.expected} within {row.tolerance}"
@@ -30,9 +31,9 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
 
 def _add_test(suite: ElementTree.Element, case: str, name: str, fault: str) -> int:
     """Add a test to a suite, failed where there is a fault; return the number of failures, 0 or 1."""
-    test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
+    test = ElementTree.SubElement(suite, "testcase", classname=one_line(case), name=one_line(name))
     if fault:
-        ElementTree.SubElement(test, "failure", message=fault)
+        ElementTree.SubElement(test, "failure", message=one_line(fault))
     return 1 if fault else 0
 
 
@@ -50,4 +51,4 @@ def markdown(table: TextTable) -> str:
 def _row(cells: Sequence[str | Line]) -> str:
     """Return a row of a Markdown table."""
     texts = (cell.words if isinstance(cell, Line) else cell for cell in cells)
-    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
+    return "| " + " | ".join(one_line(text).replace("|", "\\|") for text in texts) + " |"

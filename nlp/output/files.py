@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import combinations
 from pathlib import Path
 
 from ..errors import InputError
+from ..interruption import WRITING
+
+#: Name of the file that lists what was written into a folder; only a folder with it is written into again.
+MANIFEST = "screwsynth-files.txt"
+#: Permission to write for anybody.
+_WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+#: Largest file that is read, bytes: above every proof that fits into memory as a tree; a device has no end.
+LARGEST_FILE = 256 * 2**20
+_MANIFEST_HEAD = "# Written by screwsynth, which may replace these files:"
 
 
 def write_text(target: str, text: str) -> None:
@@ -41,24 +52,86 @@ def write_bytes(target: str, content: bytes) -> None:
         raise _cannot_be_written(target, error) from None
 
 
-def write_folder(target: str, files: Mapping[str, str]) -> None:
+def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
     """Write texts by file name into a folder, which is made when missing.
 
-    All files are complete before the first appears under its name; other files in the folder stay.
+    All of them are complete before the first appears under its name; other files in the folder stay. A manifest in the
+    folder lists what was written.
+
+    Args:
+        target: the folder.
+        files: texts by file name.
+        force: write also over files that were not written here.
 
     Raises:
-        InputError: the folder cannot be made or written.
+        InputError: the folder cannot be made or written, or writing would replace files of another origin.
     """
+    if not force:
+        check_folder(target, files)
     folder = Path(target)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
-            for name, text in files.items():
+        listed = sorted({*files, *(name for name in _written_before(folder) or () if (folder / name).exists())})
+        every = {**files, MANIFEST: "\n".join([_MANIFEST_HEAD, *listed]) + "\n"}
+        with WRITING, tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
+            for name, text in every.items():
                 (Path(waiting) / name).write_text(text, encoding="utf-8")
-            for name in files:
+            for name in every:
                 (Path(waiting) / name).replace(folder / name)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
+
+
+def check_folder(target: str, files: Iterable[str] = ()) -> None:
+    """Refuse a folder that holds files of another origin, before the work begins.
+
+    Args:
+        target: the folder; one that is missing or empty may be written.
+        files: names of the files to write, where they are known.
+
+    Raises:
+        InputError: the folder has no manifest, a file to write is not in it, or the target is no folder.
+    """
+    folder = Path(target)
+    try:
+        if not folder.exists():
+            return
+        if not folder.is_dir():
+            raise InputError(f"{target}: cannot be written: it is a file, not a folder")
+        written = _written_before(folder)
+        present = sorted(each.name for each in folder.iterdir())
+    except OSError as error:
+        raise _cannot_be_written(target, error) from None
+    foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
+    if foreign:
+        raise InputError(
+            f"{target}: holds {foreign[0]}, which screwsynth did not write: choose an empty or a new folder, or --force"
+        )
+
+
+def check_outputs(inputs: Iterable[str | Path], outputs: Mapping[str, str | None]) -> None:
+    """Refuse outputs that cannot be written, that are an input, or that are each other, before the work begins.
+
+    Links are resolved first. Pipes and devices take any number of outputs.
+
+    Args:
+        inputs: files that are read.
+        outputs: files to write by the option that names them; None and ``-`` are left out.
+
+    Raises:
+        InputError: an output is refused.
+    """
+    chosen = {option: Path(target) for option, target in outputs.items() if target not in (None, "-") and target}
+    for target in outputs.values():
+        if target is not None:
+            check_target(target)
+    read = [Path(each) for each in inputs]
+    for option, path in chosen.items():
+        if any(_is_same_file(path, each) for each in read):
+            raise InputError(f"{option} {path}: is the case file, which would be lost; choose another name")
+    for (option, path), (other, second) in combinations(chosen.items(), 2):
+        if _is_same_file(path, second):
+            raise InputError(f"{option} {path}: is the file of {other} too; choose another name")
 
 
 def check_target(target: str) -> None:
@@ -82,19 +155,30 @@ def read_text(source: str) -> str:
     """Read the text of a file.
 
     Raises:
-        InputError: the file cannot be read.
+        InputError: it cannot be read, is too large, or is no UTF-8 text.
     """
     try:
-        return Path(source).read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: is no text") from None
+        with Path(source).open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         fault = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise InputError(f"{source}: cannot be read: {fault}") from None
+    if len(content) > LARGEST_FILE:
+        raise InputError(f"{source}: cannot be read: it is larger than {LARGEST_FILE // 2**20} MB")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: is no text") from None
 
 
 def _replace(path: Path, content: bytes) -> None:
     """Put a complete file in the place of an older one, or of none."""
+    with WRITING:
+        _write_and_rename(path, content)
+
+
+def _write_and_rename(path: Path, content: bytes) -> None:
+    """Write a temporary file and give it the name of the result."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -113,10 +197,34 @@ def _cannot_be_written(target: str, error: OSError) -> InputError:
     return InputError(f"{target}: cannot be written: {error.strerror or error}")
 
 
+def _written_before(folder: Path) -> list[str] | None:
+    """Return the names in a folder's manifest; None where it has none."""
+    try:
+        head, *names = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
+    except (FileNotFoundError, ValueError):  # a text that is no manifest, or an empty one
+        return None
+    return names if head == _MANIFEST_HEAD else None
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    """Return whether two names are of one file or of one file to come; a pipe or device is never the same."""
+    try:
+        first, second = one.resolve(), other.resolve()
+        if first.exists() and second.exists():
+            return first.is_file() and first.samefile(second)
+    except (OSError, RuntimeError):  # such as a circle of links
+        return False
+    return first == second
+
+
 def _fault(path: Path) -> str:
     """Return the reason why a file cannot be written; empty where it can."""
     if path.is_dir():
         return "it is a folder"
     if not path.parent.is_dir():
         return f"{path.parent} is no folder"
-    return "" if os.access(path.parent, os.W_OK) else f"no permission in {path.parent}"
+    # The user root may write any file, and means a file without permission to write as little as others do.
+    if path.is_file() and not (os.access(path, os.W_OK) and path.stat().st_mode & _WRITABLE):
+        return "it is read-only"
+    folder = path.resolve().parent
+    return "" if os.access(folder, os.W_OK) else f"no permission in {folder}"

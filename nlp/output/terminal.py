@@ -8,6 +8,7 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
+from ..errors import one_line
 from ..results.text import Line, TextTable, Tone
 
 _LABEL = "dim"
@@ -33,13 +34,19 @@ def show(console: Console, items: Iterable[Line | TextTable]) -> None:
             console.print(line)
 
 
+def _header(text: str) -> str:
+    """Return a header with its second line, the unit; line breaks within either are escaped."""
+    name, line_break, unit = text.partition("\n")
+    return f"{one_line(name)}{line_break}{one_line(unit)}"
+
+
 def _text(line: Line) -> Text:
-    """Return a line with its label dim and its text in the style of its tone."""
+    """Return a line; the words of a case are escaped, so that they cannot control the terminal."""
     style = _STYLES[line.tone]
     if not (line.label or line.before or line.after):
-        return Text(line.text, style=style)
-    label = [(f"{line.label}  ", _LABEL)] if line.label else []
-    return Text.assemble(*label, line.before, (line.text, style), line.after)
+        return Text(one_line(line.text), style=style)
+    label = [(f"{one_line(line.label)}  ", _LABEL)] if line.label else []
+    return Text.assemble(*label, one_line(line.before), (one_line(line.text), style), one_line(line.after))
 
 
 def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
@@ -49,11 +56,11 @@ def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
     """
     shown = table.rows[: len(table.rows) - table.folded]
     columns = [
-        _Column(header, [_plain(row[k]) for row in shown], [_style(row[k]) for row in shown])
+        _Column(_header(header), [_plain(row[k]) for row in shown], [_style(row[k]) for row in shown])
         for k, header in enumerate(table.headers)
     ]
     if table.title:
-        yield Text(table.title, style=_LABEL)
+        yield Text(one_line(table.title), style=_LABEL)
     for part in _parts(columns, width):
         yield from _part_lines(part, len(shown), width)
     if table.folded:
@@ -170,7 +177,7 @@ def _pieces(word: str, width: int) -> Iterator[str]:
 
 
 def _plain(cell: str | Line) -> str:
-    return cell.words if isinstance(cell, Line) else str(cell)
+    return one_line(cell.words if isinstance(cell, Line) else str(cell))
 
 
 def _style(cell: str | Line) -> str:

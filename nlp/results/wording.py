@@ -114,6 +114,13 @@ def headline(result: SolveResult, case: Case | None = None) -> Line:
         case: the case; None where the tone does not matter.
     """
     robot = result.robot
+    if result.status is Status.INTERRUPTED:
+        best = (
+            ""
+            if result.reached is None or result.reached.F is None
+            else f": best F so far = {number(result.reached.F)}"
+        )
+        return Line(f"interrupted{best}", tone=Tone.NO_ANSWER)
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several

@@ -15,6 +15,7 @@ from ..errors import EvaluationError
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
+from ..interruption import Milestone, is_requested, reached
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit, formulate_relaxation, relaxation_point, relaxed_limits
 from ..program.sampling import starting_points
@@ -130,6 +131,8 @@ def solve_program(
     # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it need not
     # count as converged: a feasible point is enough.
     feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
+    if is_requested():
+        return replace(solution, status=Status.INTERRUPTED, seconds=time.perf_counter() - began)
     if not feasible:
         return replace(solution, seconds=time.perf_counter() - began)
     least = min(feasible, key=lambda start: start.F)
@@ -158,9 +161,15 @@ def _search(
     for start in search_from(nlp, points, search, jobs, solver):
         done.append(start)
         if start.status is StartStatus.CONVERGED and (best is None or nlp.sign * start.F < nlp.sign * best):
+            if best is None:
+                examine(nlp, start.x)  # what this compiles is at hand when the search is interrupted
             best = start.F
+        reached(Milestone.START)
         if progress is not None:
             progress(len(done), len(points), best)
+    interrupted = is_requested()
+    if not done:  # interrupted before the first start was done
+        return _at_the_start(nlp, search, began)
     starts, optima = _distinct_optima(nlp, done)
     better = _find_better_start(nlp, starts, optima)
     if optima and better is None:
@@ -169,7 +178,7 @@ def _search(
         x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
     return ProgramSolution(
-        status=_status(evidence, bool(optima) and better is None),
+        status=Status.INTERRUPTED if interrupted else _status(evidence, bool(optima) and better is None),
         nlp=nlp,
         x=frozen_array(x, (nlp.n,)),
         state=state_or_none(nlp, x),
@@ -179,6 +188,13 @@ def _search(
         seed=search.seed,
         seconds=time.perf_counter() - began,
     )
+
+
+def _at_the_start(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
+    """Return the outcome of a search that was interrupted before a start was done: the first starting point."""
+    x, seconds = frozen_array(nlp.start, (nlp.n,)), time.perf_counter() - began
+    state, evidence = state_or_none(nlp, x), examine(nlp, x)
+    return ProgramSolution(Status.INTERRUPTED, nlp, x, state, evidence, (), (), search.seed, seconds)
 
 
 def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:

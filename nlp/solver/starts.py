@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from queue import SimpleQueue
 
@@ -18,6 +18,7 @@ import numpy as np
 from ...models import FloatArray
 from ..case.settings import Search
 from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers
+from ..interruption import is_requested
 from ..program.nlp import Nlp
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
@@ -38,6 +39,10 @@ SAME_POINT = 1e-4
 _SAME_F = 1e-6
 #: Starts for each thread: with fewer, building another solver takes longer than the thread saves.
 _STARTS_PER_JOB = 12
+
+
+#: Seconds between two looks at whether the work is requested to stop.
+_LOOK = 0.05
 
 
 class StartStatus(enum.Enum):
@@ -92,7 +97,7 @@ def search_from(
         solver: the local solver.
 
     Yields:
-        One start for each point, in their order.
+        One start for each point, in their order; those that are done, where the work is requested to stop.
 
     Raises:
         InputError: the objective is to be compiled, and cannot be.
@@ -110,13 +115,31 @@ def search_from(
             idle.put(local_search)
 
     known: list[Start] = []
-    with ThreadPoolExecutor(threads) as pool:
-        for found in map(search_one, points) if threads == 1 else pool.map(search_one, points):
+    # The searches run in threads of their own also where there is one: this one sees at once when it is to stop.
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for future in [pool.submit(search_one, point) for point in points]:
+            found = _wait_for(future)
+            if found is None:
+                return
             same = _known_optimum(nlp, found.x, known) if found.reason is StopReason.SUCCEEDED else None
             start = judge(nlp, found) if same is None else replace(same, iterations=found.iterations)
             if same is None and start.status is StartStatus.CONVERGED:
                 known.append(start)
             yield start
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _wait_for(future: Future[SolverResult]) -> SolverResult | None:
+    """Return where a search stopped, or None when it is requested to stop earlier."""
+    while not is_requested():
+        try:
+            return future.result(timeout=_LOOK)
+        except TimeoutError:
+            if future.done():
+                return future.result()
+    return None
 
 
 def _known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:

@@ -14,6 +14,7 @@ class Status(enum.Enum):
     SADDLE = "saddle"
     NOT_CONVERGED = "not converged"
     INFEASIBLE = "infeasible"
+    INTERRUPTED = "interrupted"
 
     @property
     def is_answer(self) -> bool:

@@ -9,6 +9,7 @@ a tree a CasADi expression.
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Literal, NamedTuple, TypeAlias
@@ -21,6 +22,8 @@ from ...errors import nearest
 #: A text is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
 LONGEST = 400
 _DEEPEST = 40
+#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
+_LARGEST_POWER = 100
 
 _FUNCTIONS: dict[str, Callable[[SX], SX]] = {"sqrt": ca.sqrt, "sin": ca.sin, "cos": ca.cos, "abs": ca.fabs}
 _OPERATIONS: dict[str, Callable[[SX, SX], SX]] = {
@@ -29,6 +32,19 @@ _OPERATIONS: dict[str, Callable[[SX, SX], SX]] = {
     "*": lambda a, b: a * b,
     "/": lambda a, b: a / b,
     "^": lambda a, b: a**b,
+}
+_CONSTANT_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "abs": abs,
+}
+_CONSTANT_OPERATIONS: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": operator.pow,
 }
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*(?:\.[^\W\d]\w*)*)|(?P<sign>>=|<=|==|[-+*/^()]))"
@@ -104,6 +120,8 @@ def parse(text: str, names: Collection[str]) -> Relation:
     last = reader.next()
     if last.kind != "end":
         raise reader.wrong(last, "expected an operator or the end")
+    for side in (left, right):
+        _constant(side)
     sign: Literal[">=", "<=", "=="] = ">=" if token.text == ">=" else "<=" if token.text == "<=" else "=="
     return Relation(left, sign, right)
 
@@ -130,6 +148,52 @@ def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
             return expression(left, values, angle) ** int(power)
         case Operation(sign, left, right):
             return _OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle))
+
+
+def _constant(tree: Tree) -> float | None:
+    """Return the value of a tree without names; None for a tree with names.
+
+    Raises:
+        SentenceError: a part without names has no finite value, or a constant power is too large.
+    """
+    match tree:
+        case Number(value):
+            return value
+        case Name():
+            return None
+        case Call(function, argument):
+            inner = _constant(argument)
+            if inner is None:
+                return None
+            return _finite(lambda: -inner if function == "-" else _CONSTANT_FUNCTIONS[function](inner), function)
+        case Operation(sign, left, right):
+            first, second = _constant(left), _constant(right)
+            if sign == "^" and second is not None and abs(second) > _LARGEST_POWER:
+                raise SentenceError(f"has the power {second:g}, which must be at most {_LARGEST_POWER} in size")
+            if sign == "/" and second == 0:
+                raise SentenceError("divides by zero")
+            if first is None or second is None:
+                return None
+            return _finite(lambda: _CONSTANT_OPERATIONS[sign](first, second), sign)
+
+
+def _finite(compute: Callable[[], float], sign: str) -> float:
+    """Return a computed constant.
+
+    Args:
+        compute: computes it.
+        sign: function or operation, for the message.
+
+    Raises:
+        SentenceError: it is not a finite number.
+    """
+    try:
+        value = compute()
+    except (ArithmeticError, ValueError):
+        value = math.nan
+    if isinstance(value, complex) or not math.isfinite(value):
+        raise SentenceError(f"has a constant part, of {sign!r}, without a finite value")
+    return value
 
 
 class _Reader:

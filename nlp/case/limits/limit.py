@@ -19,6 +19,7 @@ from casadi import SX
 from ....models import Dimension, Model, RobotInstance
 from ...errors import CaseError
 from ...units import Units
+from ..checks import check_real
 from .constraint import BoundedConstraint
 
 if TYPE_CHECKING:
@@ -91,6 +92,8 @@ class LimitedCase(NamedTuple):
         Raises:
             CaseError: the number is not finite, not above ``above``, or larger than ``most``.
         """
+        if value is not None:
+            value = check_real(value, f"limits.{key}")
         if value is None or (math.isfinite(value) and above < value <= most):
             return
         allowed = f"above {self.units.text(above, dimension)}" if math.isfinite(above) else "finite"

@@ -63,6 +63,8 @@ def certificate_section(report: Report) -> Markup:
     else:
         found.append(("", result.certificate))
     parts: list[Markup] = []
+    if report.refusal:
+        parts.append(tag("p", f"Refused: {report.refusal}.", class_="warning"))
     for name, certificate in found:
         if certificate is None:
             continue

@@ -66,6 +66,7 @@ class Report:
         combined: the solution of the program that combines several tasks; None without such a program.
         check: published and expected numbers beside the computed; None where the case has none.
         is_answer: whether the point is an answer.
+        refusal: why no certificate that was asked for can be given; empty without one.
     """
 
     case: Case
@@ -75,6 +76,7 @@ class Report:
     combined: ProgramSolution | None
     check: CaseCheck | None
     is_answer: bool
+    refusal: str
 
     def as_data(self) -> dict[str, Any]:
         """Return the data of the page's script, as JSON's own types."""
@@ -85,7 +87,9 @@ class Report:
         }
 
 
-def report_of(text: str, solution: Solution, result: CaseResult, check: CaseCheck | None = None) -> Report:
+def report_of(
+    text: str, solution: Solution, result: CaseResult, check: CaseCheck | None = None, refusal: str = ""
+) -> Report:
     """Return the content of a page about a solved case; nothing is solved here.
 
     Args:
@@ -93,6 +97,7 @@ def report_of(text: str, solution: Solution, result: CaseResult, check: CaseChec
         solution: the solve.
         result: of that solve, with its certificates.
         check: published and expected numbers beside the computed; None where the case has none.
+        refusal: why no certificate that was asked for can be given; empty without one.
     """
     is_answer = solution.status.is_answer
     combined = None if solution.combination is None else solution.combination.combined
@@ -100,7 +105,7 @@ def report_of(text: str, solution: Solution, result: CaseResult, check: CaseChec
         _part(outcome.own.nlp, solution.x, outcome.state, outcome.own, j, len(solution.outcomes), is_answer)
         for j, outcome in enumerate(solution.outcomes)
     )
-    return Report(solution.case, text, result, parts, combined, check, is_answer)
+    return Report(solution.case, text, result, parts, combined, check, is_answer, refusal)
 
 
 def _part(

@@ -1,0 +1,81 @@
+"""Requests to stop at once, such as by Ctrl-C, and the work that answers them itself.
+
+A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
+requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
+Python's own ``KeyboardInterrupt``.
+"""
+
+from __future__ import annotations
+
+import enum
+import os
+import signal
+import sys
+from threading import Event, Lock
+from types import FrameType
+
+#: Exit status of an interrupted command, by the convention of shells: 128 and the number of the signal.
+INTERRUPTED = 130
+#: Seconds that interrupted work may take to show what it has, and that a file may take to be complete.
+_TO_SHOW = 5.0
+_TO_WRITE = 0.5
+#: Ends the line of progress and shows the cursor, which that line hides.
+_CLEAR = "\r\x1b[K\x1b[?25h"
+
+
+class Milestone(enum.Enum):
+    """Progress of the work from which on there is something to show."""
+
+    START = "a start of a search is done"
+    BOUND = "the search of the whole box has begun"
+
+
+#: Held while a file is written, so that none is left half written.
+WRITING = Lock()
+_awaited: set[Milestone] = set()
+_answers = Event()
+_requested = Event()
+
+
+def answer_after(milestone: Milestone) -> None:
+    """Declare that requests after a milestone are answered by the work, which shows what it has."""
+    _awaited.add(milestone)
+
+
+def reached(milestone: Milestone) -> None:
+    """Declare that a milestone is reached."""
+    if milestone in _awaited:
+        _answers.set()
+
+
+def is_requested() -> bool:
+    """Return whether the work is requested to stop."""
+    return _requested.is_set()
+
+
+def listen() -> None:
+    """Listen to interrupts from now on; a process that was started without them, as in the background, stays so."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _on_interrupt)
+
+
+def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
+    """Request the work to stop, where it can answer; end the process otherwise, and at a second request."""
+    if not _answers.is_set() or _requested.is_set():
+        leave()
+    _requested.set()
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, lambda *_: leave())
+        signal.setitimer(signal.ITIMER_REAL, _TO_SHOW)
+
+
+def leave() -> None:
+    """End the process with a newline on standard error, once a file that is being written is complete."""
+    WRITING.acquire(timeout=_TO_WRITE)
+    try:
+        # Only a bar of progress hides the cursor.
+        is_shown = "rich.progress" in sys.modules and os.isatty(2)
+        os.write(2, f"{_CLEAR if is_shown else ''}\n".encode())
+    except OSError:  # nobody reads any more
+        pass
+    os._exit(INTERRUPTED)

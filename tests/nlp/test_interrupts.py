@@ -1,0 +1,110 @@
+"""Ctrl-C in a pseudo-terminal: at any moment, at the first time, at once."""
+
+import os
+import pty
+import re
+import select
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+# Eight poses of a hexapod with twelve free numbers and an actuator: long set-up, long starts.
+_ANGLES = [-35, 25, 85, 95, 155, 215]
+CASE = "\n".join(
+    [
+        '[units]\nlength = "mm"\n[robot]\nmodel = "hexapod"\n[robot.parameters]',
+        *(f"base_{k + 1} = [{{ min = {90 + k}, max = {110 + k} }}, {(-1) ** k * 40 + k}, 0]" for k in range(6)),
+        *(f"platform_{k + 1} = [{{ min = {40 + k}, max = {60 + k} }}, {(-1) ** k * 50 - k}, 0]" for k in range(6)),
+        *(f"[[pose]]\nposition = [{10 * k}, {-5 * k}, {300 + 6 * k}]" for k in range(8)),
+        "[limits]\nleg_length = { min = 100, max = 500 }",
+        '[[task]]\nsense = "max"\naxis = [0, 1, 2]\npoint = [0, 0, 300]\npitch = 2',
+        "[solve]\nstarts = 3000",
+    ]
+)
+#: Seconds from the key to the end of the process, on a busy machine.
+_AT_ONCE = 1.0
+
+
+class Ended(NamedTuple):
+    """The exit status, the seconds from the key to the end, and what the terminal showed."""
+
+    status: int
+    seconds: float
+    shown: str
+
+
+def interrupted(after: float | str, *arguments: str) -> Ended:
+    """Run a command in a pseudo-terminal and press Ctrl-C after so many seconds, or once a text is shown."""
+    child, terminal = pty.fork()
+    if child == 0:
+        os.environ["COLUMNS"] = "100"
+        os.execv(sys.executable, [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments])  # noqa: S606
+    shown, pressed, began = b"", 0.0, time.monotonic()
+    while True:
+        ready, _, _ = select.select([terminal], [], [], 0.01)
+        now = time.monotonic()
+        if ready:
+            try:
+                part = os.read(terminal, 65536)
+            except OSError:
+                part = b""
+            if not part:
+                break
+            shown += part
+        is_time = after.encode() in shown if isinstance(after, str) else now - began >= after
+        if not pressed and is_time:
+            os.write(terminal, b"\x03")
+            pressed = now
+        if now - began > 120:
+            os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    os.close(terminal)
+    assert pressed, f"the command ended before the key was pressed: {shown!r}"
+    return Ended(os.waitstatus_to_exitcode(status), time.monotonic() - pressed, shown.decode())
+
+
+def plain(shown: str) -> str:
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown).replace("^C", "")
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> str:
+    path = tmp_path / "eight.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0.15, 0.3, 0.5, 0.7, 0.9, 1.1, 1.4, 1.8, 2.2, 2.6, 3.5])
+@pytest.mark.parametrize("command", ["solve", "report", "certify", "check"])
+def test_at_any_moment(command: str, after: float, case: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    ended = interrupted(after, command, case, *(["--out", str(page)] if command == "report" else []))
+    assert ended.status == 130, ended
+    assert ended.seconds <= _AT_ONCE, ended
+    assert "Traceback" not in ended.shown
+    assert "Exception" not in ended.shown
+    assert not page.exists()
+    assert [each.name for each in tmp_path.iterdir()] == ["eight.toml"]
+
+
+def test_during_imports_nothing_is_shown(case: str) -> None:
+    ended = interrupted(0.2, "solve", case)
+    assert ended.status == 130
+    assert plain(ended.shown).strip("\r\n") == ""
+
+
+def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -> None:
+    result = tmp_path / "result.json"
+    ended = interrupted(", best ", "solve", case, "--json", str(result))
+    assert ended.status == 130
+    assert ended.seconds <= _AT_ONCE, ended
+    words = plain(ended.shown)
+    for word in ("interrupted: best F so far = ", "verdict", "evidence", "base_1_x"):
+        assert word in words
+    text = result.read_text(encoding="utf-8")
+    assert '"status": "interrupted"' in text

@@ -1,0 +1,231 @@
+"""Streams, files and values that go wrong in ways of their own: a sentence and a status, never a traceback."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from screwsynth.models import model_names, robot_function, stewart_gough
+from screwsynth.models.catalog import AmbiguousModelError
+from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, build_model, load_case
+from screwsynth.nlp.case.reader import find_case
+
+Run = Callable[..., tuple[int, str, str]]
+
+TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
+PROGRAM = f"{sys.executable} -P -m screwsynth.nlp"
+
+
+def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, check=False, timeout=60)
+
+
+@pytest.mark.parametrize(
+    "arguments", ["models", "evaluate paper-4.2", "evaluate paper-4.2 --json -", "--help", "schema"]
+)
+@pytest.mark.parametrize("stream", [">/dev/full", ">&-"])
+def test_standard_output_that_takes_nothing(arguments: str, stream: str, tmp_path: Path) -> None:
+    ended = shell(f"{PROGRAM} {arguments} {stream}", tmp_path)
+    assert (ended.returncode, ended.stdout) == (2, ""), ended
+    assert len(ended.stderr.splitlines()) == 1
+    assert ended.stderr.startswith("screwsynth: standard output: cannot be written: ")
+
+
+@pytest.mark.parametrize("stream", ["2>&-", "2>/dev/full", "2>&- <&-"])
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [("models", 0), ("evaluate nothing", 2), ("solve --no-such-option", 2), ("check nothing", 2)],
+)
+def test_standard_error_that_takes_nothing(arguments: str, status: int, stream: str, tmp_path: Path) -> None:
+    ended = shell(f"{PROGRAM} {arguments} {stream}", tmp_path)
+    assert ended.returncode == status, ended
+    assert (ended.stdout == "") == (status != 0)
+
+
+def test_no_standard_stream_at_all(tmp_path: Path) -> None:
+    # The result must not end up in a file that took the place of a stream.
+    ended = shell(f"{PROGRAM} evaluate paper-4.2 --json result.json >&- 2>&- <&-", tmp_path)
+    assert ended.returncode == 2
+    assert (tmp_path / "result.json").read_text(encoding="utf-8").startswith("{")
+    assert (tmp_path / "result.json").read_text(encoding="utf-8").endswith("}\n")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs a device without an end")
+@pytest.mark.parametrize("command", ["solve", "report --out page.html", "certify", "check", "verify-proof"])
+def test_input_without_an_end(command: str, tmp_path: Path) -> None:
+    verb, *options = command.split()
+    began = time.monotonic()
+    ended = shell(" ".join([PROGRAM, verb, "/dev/zero", *options]), tmp_path)
+    assert (ended.returncode, ended.stdout) == (2, ""), ended
+    assert len(ended.stderr.splitlines()) == 1
+    assert "is larger than" in ended.stderr
+    assert time.monotonic() - began < 15
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_largest_case_file(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "case.toml"
+    for size, status in ((4 * 2**20, 0), (4 * 2**20 + 1, 2)):
+        path.write_bytes(TEXT.encode() + b"#" * (size - len(TEXT.encode())))
+        assert cli("evaluate", str(path))[0] == status
+
+
+def test_a_byte_order_mark(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "paper-4.1-helical.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
+    assert cli("evaluate", str(path)) == cli("evaluate", "paper-4.1-helical")
+    page = tmp_path / "page.html"
+    assert cli("report", str(path), "--starts", "1", "--out", str(page))[0] == 0
+    assert "\ufeff" not in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("relation", "words"),
+    [
+        ("1/0 >= x1", "divides by zero"),
+        ("x1/(2-2) >= 1", "divides by zero"),
+        ("x1^x1^x1^99999 >= 0", "99999"),
+        ("x1^-101 >= 0", "-101"),
+        ("1e200*1e200 >= x1", "without a finite value"),
+        ("sqrt(0-1) <= x1", "without a finite value"),
+        ("(0-8)^0.5 <= x1", "without a finite value"),
+        ("10^99*10^99*10^99*10^99 >= x1", "without a finite value"),
+    ],
+)
+@pytest.mark.parametrize("command", ["evaluate", "solve", "certify"])
+def test_constants_without_a_value(relation: str, words: str, command: str, tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "case.toml"
+    path.write_text(TEXT.replace("[[task]]", f'[limits]\ncustom = ["{relation}"]\n[[task]]', 1), encoding="utf-8")
+    code, out, err = cli(command, str(path))
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert "case.toml: limits.custom[0]" in err
+    assert words in err
+
+
+def test_powers_that_stay(tmp_path: Path) -> None:
+    path = tmp_path / "case.toml"
+    for relation in ("x1^100 >= 0", "x1^0.5 >= 1", "2^x1 >= 0.5", "x1^(3-1)/(4/2) >= -1e3", "-cos(30) <= x1"):
+        path.write_text(TEXT.replace("[[task]]", f'[limits]\ncustom = ["{relation}"]\n[[task]]', 1), encoding="utf-8")
+        assert load_case(str(path)).limits
+
+
+def case_with(**changed: Any) -> Case:  # noqa: ANN401 - wrong values of any type
+    screw = {"axis": [2, 2, 1], "point": [2, 3, 6], "pitch": 1, **changed.pop("screw", {})}
+    numbers = {"x1": 12, "x2": 8, "x3": 0.5, "x4": 0.1, **changed.pop("numbers", {})}
+    position = changed.pop("position", [0, 0, 40])
+    tasks = changed.pop("tasks", None) or [Task.screw("max", **screw)]
+    return Case(stewart_gough(), numbers, position, tasks, **changed)
+
+
+@pytest.mark.parametrize(
+    "wrong", [None, True, "3", b"3", 1 + 2j, [1.0, 2.0], object()], ids=lambda wrong: type(wrong).__name__
+)
+@pytest.mark.parametrize(
+    ("key", "make"),
+    [
+        (
+            "robot.parameters.x1",
+            lambda wrong: case_with(numbers={"x1": wrong if not isinstance(wrong, list) else None}),
+        ),
+        ("robot.parameters.x1", lambda wrong: case_with(numbers={"x1": Free(wrong, 14)})),
+        ("robot.parameters.x1", lambda wrong: case_with(numbers={"x1": Free(1, wrong)})),
+        ("pose.position[1]", lambda wrong: case_with(position=[0, wrong, 40])),
+        ("pose.rotation.angle", lambda wrong: case_with(rotation=Rotation(angle=wrong))),
+        ("pose.rotation.axis", lambda wrong: case_with(rotation=Rotation(axis=[0, 0, wrong]))),
+        ("task.axis", lambda wrong: case_with(screw={"axis": [0, wrong, 1]})),
+        ("task.point", lambda wrong: case_with(screw={"point": [0, wrong, 1]})),
+        ("task.pitch", lambda wrong: case_with(screw={"pitch": wrong})),
+        ("task[0].twist", lambda wrong: case_with(tasks=[Task([0, 0, wrong, 1, 0, 0])])),
+        ("task[0].weight", lambda wrong: case_with(tasks=[Task([0, 0, 1, 1, 0, 0], weight=wrong)])),
+        ("robot.characteristic_length", lambda wrong: case_with(characteristic_length=wrong)),
+        ("limits.leg_length", lambda wrong: case_with(limits=Limits(LegLength(min=wrong)))),
+        ("solve.starts", lambda wrong: Search(starts=wrong)),
+        ("solve.seed", lambda wrong: Search(seed=wrong)),
+    ],
+)
+def test_what_is_no_number_in_python(key: str, make: Callable[[object], object], wrong: object) -> None:
+    with pytest.raises(CaseError) as caught:
+        make(wrong)
+    assert str(caught.value).startswith(key)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_a_number_in_python() -> None:
+    import numpy as np  # noqa: PLC0415 - one test needs it
+
+    for number in (np.float32(12), np.int64(12), np.array(12.0), 12):
+        assert case_with(numbers={"x1": number}).parameters["x1"] == (12.0,)
+
+
+def package(folder: Path, name: str, entry_points: str, module: str) -> None:
+    info = folder / f"{name}-1.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text(entry_points, encoding="utf-8")
+    (folder / f"{name.replace('-', '_')}.py").write_text(module, encoding="utf-8")
+
+
+GOOD = """\
+import dataclasses
+from screwsynth.models import hexapod
+def robot():
+    return dataclasses.replace(hexapod(), name="NAME")
+"""
+
+
+def test_two_packages_with_one_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run) -> None:
+    for name in ("first-robots", "second-robots"):
+        points = f"[screwsynth.models]\nwalker = {name.replace('-', '_')}:robot\n"
+        package(tmp_path / name, name, points, GOOD.replace("NAME", "walker"))
+        monkeypatch.syspath_prepend(str(tmp_path / name))
+    assert "walker" in model_names()
+    with pytest.raises(AmbiguousModelError):
+        robot_function("walker")
+    with pytest.raises(CaseError, match="first-robots and second-robots"):
+        build_model("walker")
+    for arguments in (("models", "walker"), ("new", "walker")):
+        code, out, err = cli(*arguments)
+        assert (code, out, len(err.splitlines())) == (2, "", 1)
+        assert "first-robots and second-robots" in err
+    code, out, _ = cli("models")
+    assert code == 0
+    assert "first-robots" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("points", "module"),
+    [
+        ("[screwsynth.models]\nbroken = broken:robot\n", "raise SystemExit(3)"),
+        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(:"),
+        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(*, size: 'object()' = 1): raise SystemExit"),
+        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(): raise SystemExit"),
+        ("[screwsynth.models]\nbroken = no-such-thing:!\n", ""),
+        ("[screwsynth.models]\nbroken\n", ""),
+        ("[screwsynth.models\nbroken = broken:robot", ""),
+    ],
+)
+def test_a_broken_plug_in_beside_a_good_one(
+    points: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
+) -> None:
+    package(tmp_path / "broken", "broken", points, module)
+    package(tmp_path / "good", "good", "[screwsynth.models]\nwalker = good:robot\n", GOOD.replace("NAME", "walker"))
+    for name in ("broken", "good"):
+        monkeypatch.syspath_prepend(str(tmp_path / name))
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    code, out, err = cli("models")
+    assert (code, err) == (0, "")
+    assert "walker" in out
+    assert cli("models", "walker")[0] == 0
+    code, out, err = cli("models", "broken")
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    sys.modules.pop("good", None)
+
+
+def test_the_status_of_a_process_is_its_own(tmp_path: Path) -> None:
+    assert shell(f"{PROGRAM} models {os.devnull}", tmp_path).returncode == 2

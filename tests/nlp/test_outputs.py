@@ -1,0 +1,140 @@
+"""Outputs never destroy inputs, one another, or files of another origin."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import InputError
+from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.output.files import MANIFEST, write_folder
+
+Run = Callable[..., tuple[int, str, str]]
+
+TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
+# Each command with an output in the place of OUT.
+COMMANDS = [
+    ("solve", "CASE", "--starts", "1", "--json", "OUT"),
+    ("evaluate", "CASE", "--json", "OUT"),
+    ("certify", "CASE", "--starts", "1", "--json", "OUT"),
+    ("certify", "CASE", "--starts", "1", "--proof", "OUT"),
+    ("check", "CASE", "--json", "OUT"),
+    ("check", "CASE", "--junit", "OUT"),
+    ("report", "CASE", "--starts", "1", "--out", "OUT"),
+]
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    path = tmp_path / "case.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+def refused(answer: tuple[int, str, str], *words: str) -> None:
+    code, out, err = answer
+    assert (code, out, len(err.splitlines())) == (2, "", 1), answer
+    for word in words:
+        assert word in err
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("way", ["itself", "another path", "soft link", "hard link"])
+def test_an_output_that_is_the_case_file(command: tuple[str, ...], way: str, case: Path, cli: Run) -> None:
+    out = case
+    if way == "another path":
+        out = case.parent / "sub" / ".." / "case.toml"
+        (case.parent / "sub").mkdir()
+    elif way == "soft link":
+        out = case.parent / "link.toml"
+        out.symlink_to(case)
+    elif way == "hard link":
+        out = case.parent / "hard.toml"
+        os.link(case, out)
+    refused(cli(*[{"CASE": str(case), "OUT": str(out)}.get(word, word) for word in command]), "is the case file")
+    assert case.read_text(encoding="utf-8") == TEXT
+
+
+def test_a_picture_that_is_the_case_file(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "case.svg"
+    path.write_text(TEXT, encoding="utf-8")
+    refused(cli("solve", str(path), "--starts", "1", "--plot", str(path)), "--plot", "is the case file")
+    assert path.read_text(encoding="utf-8") == TEXT
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("solve", "CASE", "--starts", "1", "--json", "ONE", "--plot", "TWO"),
+        ("certify", "CASE", "--starts", "1", "--json", "ONE", "--proof", "TWO"),
+        ("check", "CASE", "--json", "ONE", "--junit", "TWO"),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("linked", [False, True])
+def test_two_outputs_in_one_file(command: tuple[str, ...], linked: bool, case: Path, cli: Run) -> None:
+    one, two = case.parent / "made.svg", case.parent / "made.svg"
+    if linked:
+        two = case.parent / "link.svg"
+        two.symlink_to(one)
+    names = {"CASE": str(case), "ONE": str(one), "TWO": str(two)}
+    refused(cli(*[names.get(word, word) for word in command]), command[-2], command[-4])
+    assert not one.exists()
+
+
+def test_a_device_takes_two_outputs(case: Path, cli: Run) -> None:
+    code, _, err = cli("check", str(case), "--json", os.devnull, "--junit", os.devnull)
+    assert (code, err) == (0, "")
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_a_file_that_is_read_only(command: tuple[str, ...], case: Path, cli: Run) -> None:
+    kept = case.parent / "kept.txt"
+    kept.write_text("kept", encoding="utf-8")
+    kept.chmod(0o444)
+    refused(cli(*[{"CASE": str(case), "OUT": str(kept)}.get(word, word) for word in command]), "read-only")
+    assert kept.read_text(encoding="utf-8") == "kept"
+
+
+def test_a_folder_of_somebody_else(case: Path, cli: Run) -> None:
+    folder = case.parent / "project"
+    folder.mkdir()
+    (folder / "Makefile").write_text("mine", encoding="utf-8")
+    link = case.parent / "link"
+    link.symlink_to(folder)
+    for target in (folder, link):
+        refused(cli("codegen", str(case), "--out", str(target)), "Makefile", "--force")
+    assert [each.name for each in folder.iterdir()] == ["Makefile"]
+    assert (folder / "Makefile").read_text(encoding="utf-8") == "mine"
+
+
+def test_codegen_over_the_folder_of_its_own_case(case: Path, cli: Run) -> None:
+    # The case file lies where the copy of the case goes.
+    refused(cli("codegen", str(case), "--out", str(case.parent), "--force"), "is the case file")
+    assert [each.name for each in case.parent.iterdir()] == ["case.toml"]
+
+
+def test_a_folder_written_before(tmp_path: Path) -> None:
+    folder = tmp_path / "made"
+    write_folder(str(folder), {"a.c": "1", "b.c": "1"})
+    write_folder(str(folder), {"a.c": "2"})
+    assert (folder / "a.c").read_text(encoding="utf-8") == "2"
+    # What was written two times ago may be replaced as well; what the user put there may not.
+    write_folder(str(folder), {"b.c": "3"})
+    (folder / "mine.c").write_text("mine", encoding="utf-8")
+    write_folder(str(folder), {"b.c": "4"})
+    with pytest.raises(InputError, match=r"mine\.c"):
+        write_folder(str(folder), {"b.c": "5", "mine.c": "5"})
+    assert (folder / "mine.c").read_text(encoding="utf-8") == "mine"
+    assert (folder / "b.c").read_text(encoding="utf-8") == "4"
+    write_folder(str(folder), {"b.c": "5", "mine.c": "5"}, force=True)
+    assert (folder / "mine.c").read_text(encoding="utf-8") == "5"
+    assert {"a.c", "b.c", "mine.c"} <= set((folder / MANIFEST).read_text(encoding="utf-8").splitlines())
+
+
+@pytest.mark.parametrize("text", ["", "something else\n"])
+def test_a_manifest_that_is_none(text: str, tmp_path: Path) -> None:
+    (tmp_path / MANIFEST).write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="did not write"):
+        write_folder(str(tmp_path), {"a.c": "1"})
