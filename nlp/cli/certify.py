@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, check_target, console, write_json
+from .options import CaseName, Jobs, JsonFile, SettingTexts, check_target, console, read_settings, write_json
 
 
 def certify(
     case: CaseName,
+    settings: SettingTexts = None,
     gap: Annotated[float, typer.Option(help="Part of the best F that the bound may be off by.")] = 1e-4,
     time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Stop then, with the bound reached.")] = None,
     above: Annotated[
@@ -24,9 +25,9 @@ def certify(
     json_file: JsonFile = None,
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
-    from ..case.reader import find_case, load_case
+    from ..case.reader import read_case
     from ..errors import InputError
-    from ..output.files import read_text, write_text
+    from ..output.files import write_text
     from ..results.certified import certified_of
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
@@ -35,7 +36,7 @@ def certify(
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":
             raise InputError("standard output can take one of --json - and --proof - only")
-        loaded = load_case(case)
+        loaded, text = read_case(case, read_settings(settings))
         for target in (json_file, proof):
             check_target(target)
         certified = certify_with_progress(
@@ -45,7 +46,7 @@ def certify(
         raise InputError(f"--{error}") from None
     result = certified_of(certified)
     if proof is not None and certified.tree is not None:
-        write_text(proof, proof_of(certified, read_text(str(find_case(case)))).as_text())
+        write_text(proof, proof_of(certified, text).as_text())
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, Starts, check_target
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, check_target, read_settings
 
 
 def report(
     case: CaseName,
     out: Annotated[str, typer.Option(metavar="FILE", help="Page to write, such as report.html; - is stdout.")],
+    settings: SettingTexts = None,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, and show the proof's way.")
     ] = False,
@@ -21,13 +22,12 @@ def report(
     jobs: Jobs = None,
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
-    from ..case.reader import find_case, load_case
-    from ..output.files import read_text, write_text
+    from ..case.reader import read_case
+    from ..output.files import write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    loaded = load_case(case)
-    text = read_text(str(find_case(case)))
+    loaded, text = read_case(case, read_settings(settings))
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_target(out)
     check_library("plotly", "reports")
@@ -38,7 +38,8 @@ def report(
 
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
-    check = check_case(case, {case: result}) if loaded.published else None
+    # The numbers in print are of the case as its file states it.
+    check = check_case(case, {case: result}) if loaded.published and not settings else None
     write_text(out, page_of(report_of(text, solution, result, check)))
     if out != "-":
         typer.echo(f"{out}: {solution.status.value}")

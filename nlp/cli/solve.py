@@ -7,11 +7,25 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, PlotFile, Seed, Starts, check_picture, check_target, console, write_json
+from .options import (
+    CaseName,
+    Jobs,
+    JsonFile,
+    PlotFile,
+    Seed,
+    SettingTexts,
+    Starts,
+    check_picture,
+    check_target,
+    console,
+    read_settings,
+    write_json,
+)
 
 
 def solve(
     case: CaseName,
+    settings: SettingTexts = None,
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
@@ -29,7 +43,7 @@ def solve(
     from ..results.result import result_of
     from .progress import solve_with_progress
 
-    loaded = load_case(case)
+    loaded = load_case(case, read_settings(settings))
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     check_target(json_file)
     check_picture(plot)
