@@ -22,17 +22,19 @@ def report(
     jobs: Jobs = None,
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
-    from ..case.reader import read_case
+    from ..case.reader import load_case, read_case
     from ..output.files import write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    loaded, text = read_case(case, read_settings(settings))
+    fixed = read_settings(settings)
+    loaded, text = read_case(case, fixed)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_target(out)
     check_library("plotly", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
+    from ..results.limitcurves import limit_curves
     from ..results.regression import check_case
     from ..results.result import result_of
 
@@ -40,7 +42,11 @@ def report(
     result = result_of(found)
     # The numbers in print are of the case as its file states it.
     check = check_case(case, {case: result}) if loaded.published and not settings else None
-    write_text(out, page_of(report_of(text, solution, result, check)))
+    page = report_of(text, solution, result, check)
+    if page.is_enclosed:
+        curves = limit_curves(solution, result, lambda name, value: load_case(case, {**fixed, name: value}), jobs)
+        page = replace(page, curves=curves)
+    write_text(out, page_of(page))
     if out != "-":
         typer.echo(f"{out}: {solution.status.value}")
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

@@ -8,12 +8,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...results.tables import MOST_OPTIMA, optimum_table
+from ...results.tradeoffwording import over_words, tradeoff_table
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
+from .curves import tradeoff_figures
 from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
+
+_ENCLOSED = (
+    "Here F is drawn over the active limits that cost most. Each point of a curve is a solve of its own, from few "
+    "starting points and from the optima beside it; the command tradeoff draws such curves more closely. Slices along "
+    "single variables would show little: most variables cannot move alone from this point without leaving a limit."
+)
 
 
 def optima(report: Report) -> Markup:
@@ -61,26 +69,39 @@ def around(report: Report) -> Markup:
                 ["One variable cannot move alone: the robot's loops would open. So there are no slices of F."]
             )
         return Markup("")
-    parts.append(
-        tag(
-            "p",
-            "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
-            + (
-                " A component of a free direction moves with the direction's others, which are scaled to unit length."
-                if report.parts[0].nlp.program.places.directions
-                else ""
-            ),
-        )
-    )
-    for part in report.parts:
-        if len(report.parts) > 1:
-            parts.append(tag("h3", f"Slices for “{part.name}”"))
-        parts.append(tag("div", *(_slice(part, each) for each in part.slices), class_="charts"))
+    if report.curves:
+        parts.append(tag("p", _ENCLOSED))
+        for curve in report.curves:
+            parts += [tag("h3", over_words(curve)), tradeoff_figures(report.case, curve)]
+            parts.append(html_table(tradeoff_table(curve), f"F over {curve.over}"))
+    parts += _slices(report)
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))
         parts.append(_maps(report, with_maps))
     return joined(parts)
+
+
+def _slices(report: Report) -> Iterator[Markup]:
+    """Yield the slices; beside curves, those of the variables that can move alone only."""
+    shown = [[each for each in part.slices if each.has_room or not report.curves] for part in report.parts]
+    if not any(shown):
+        return
+    if report.curves:
+        yield tag("h3", "Variables that can move alone")
+    yield tag(
+        "p",
+        "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
+        "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
+        + (
+            " A component of a free direction moves with the direction's others, which are scaled to unit length."
+            if report.parts[0].nlp.program.places.directions
+            else ""
+        ),
+    )
+    for part, slices in zip(report.parts, shown, strict=True):
+        if len(report.parts) > 1:
+            yield tag("h3", f"Slices for “{part.name}”")
+        yield tag("div", *(_slice(part, each) for each in slices), class_="charts")
 
 
 def _slice(part: Part, each: Slice) -> Markup:

@@ -18,6 +18,7 @@ from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
+from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution
 from ..pictures.drawing import drawing_of
@@ -65,6 +66,7 @@ class Report:
         combined: the solution of the program that brings several tasks together, where there is one.
         check: published and expected numbers beside the computed; None where the case has none.
         is_answer: whether the point is an answer.
+        curves: trade-offs over the active limits, which stand in the place of the slices; none for slices.
     """
 
     case: Case
@@ -74,6 +76,13 @@ class Report:
     combined: ProgramSolution | None
     check: CaseCheck | None
     is_answer: bool
+    curves: tuple[TradeoffResult, ...] = ()
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether most variables cannot move alone without leaving a limit: their slices show nothing but the point."""
+        slices = [each for part in self.parts for each in part.slices]
+        return bool(slices) and 2 * sum(not each.has_room for each in slices) > len(slices)
 
     def as_data(self) -> dict[str, Any]:
         """Return the data of the page's script, as JSON's own types."""
