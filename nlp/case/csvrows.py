@@ -6,7 +6,6 @@ as a spreadsheet counts it, and the column.
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -166,6 +165,8 @@ def _read_rows(file: str, folder: Path, kind: _Kind, name: str) -> tuple[list[di
         CaseError: the file cannot be read, or has a fault.
         InputError: the file is no table at all.
     """
+    import csv  # noqa: PLC0415 - most cases name no files
+
     text = _text_of(folder / file, file, name)
     first = next((line for line in text.splitlines() if line.strip()), "")
     lines = csv.reader(io.StringIO(text, newline=""), delimiter=";" if ";" in first and "," not in first else ",")

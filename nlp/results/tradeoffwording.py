@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ...models import component_names, frozen_array
@@ -22,6 +22,8 @@ def tradeoff_summary(case: Case, result: TradeoffResult) -> Iterator[Line | Text
     yield title_line(case)
     yield Line(over_words(result), label="over")
     yield tradeoff_table(result)
+    if throughout_words(result):
+        yield Line(throughout_words(result), label="active throughout")
     for line in tradeoff_words(result):
         yield Line(line, tone=Tone.CAUTION)
 
@@ -34,12 +36,14 @@ def over_words(result: TradeoffResult) -> str:
 
 
 def tradeoff_table(result: TradeoffResult) -> TextTable:
-    """Return a row for each value: F, its slope and what is active; with several tasks F of each."""
+    """Return a row for each value: F, its slope and what is active there only; with several tasks F of each."""
     several = len(result.tasks) > 1
     header = f"{result.over}\n{result.unit}" if result.unit else result.over
     per = f"slope\nF/{result.unit}" if result.unit else "slope"
     names = tuple(f"F of {name}" for name in result.tasks) if several else ()
-    headers = (header, "F" if not several else "combined F", *names, per, "status", "active")
+    throughout = _active_throughout(result)
+    last = "also active" if throughout else "active"
+    headers = (header, "F" if not several else "combined F", *names, per, "status", last)
     rows = tuple(
         (
             f"{point.value:.7g}",
@@ -47,11 +51,25 @@ def tradeoff_table(result: TradeoffResult) -> TextTable:
             *(_number(F) for F in (point.tasks if several else ())),
             "" if point.slope is None else _signed(point.slope),
             point.status.value,
-            ", ".join(point.active),
+            _listed(name for name in point.active if name not in throughout),
         )
         for point in result.points
     )
     return TextTable(headers, rows)
+
+
+def throughout_words(result: TradeoffResult) -> str:
+    """Return the bounds and limits that are active at every value with an answer; an empty text for none."""
+    return _listed(_active_throughout(result))
+
+
+def _active_throughout(result: TradeoffResult) -> list[str]:
+    sets = [point.active for point in result.points if point.status.is_answer]
+    return [name for name in sets[0] if all(name in active for active in sets)] if len(sets) > 1 else []
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.removeprefix("limits.") for name in names)
 
 
 def tradeoff_words(result: TradeoffResult) -> list[str]:

@@ -129,6 +129,7 @@ def test_values_without_an_answer(small: str, cli: Run) -> None:
     code, out, _ = cli("tradeoff", small, "--over", f"{LIMIT}=12:32:3", "--starts", "2")
     assert code == 0
     assert "infeasible at 12 cm" in out
+    assert "active throughout  leg_length.max" in out
 
 
 def test_several_tasks(cli: Run, tmp_path: Path) -> None:
@@ -241,9 +242,9 @@ def test_a_page_shows_curves_where_slices_would_show_little(tmp_path: Path, cli:
     assert cli("report", "hexapod-machining", "--starts", "4", "--out", str(page))[0] == 0
     text = page.read_text(encoding="utf-8")
     for key in ("limits.footprint.platform", "limits.footprint.base", "limits.leg_length.min"):
-        assert f"<h3>{key} from " in text
+        assert f"<caption>{key} from " in text
     assert "no point of it keeps every limit" not in text
     assert "the only one of its points within them" not in text
     # Around this point there is room.
     assert cli("report", "paper-4.1-helical", "--starts", "2", "--out", str(page))[0] == 0
-    assert "<h3>limits." not in page.read_text(encoding="utf-8")
+    assert "<caption>limits." not in page.read_text(encoding="utf-8")

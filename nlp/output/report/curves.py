@@ -3,19 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from string import Template
 
 from ...case.case import Case
 from ...results.tradeoff import TradeoffResult
-from ...results.tradeoffwording import objective_label, over_words, tradeoff_table, tradeoff_words
+from ...results.tradeoffwording import objective_label, over_words, throughout_words, tradeoff_table, tradeoff_words
 from .charts import Curve, Spot, line_chart
 from .markup import Markup, html_table, joined, paragraphs, tag
 
 
-def tradeoff_figures(case: Case, result: TradeoffResult) -> Markup:
-    """Return a chart of F over the number, one for each task."""
-    return tag("div", *(_chart(case, result, k) for k in range(len(result.tasks))), class_="charts")
+def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mapping[str, float] | None = None) -> Markup:
+    """Return charts of F over numbers, one for each number and task, side by side.
+
+    Args:
+        case: the case.
+        results: its trade-offs.
+        here: value of a number in the case that a page is about, by the number's name; marked in its chart.
+    """
+    charts = [
+        _chart(case, each, task, None if here is None else here.get(each.over))
+        for each in results
+        for task in range(len(each.tasks))
+    ]
+    return tag("div", *charts, class_="charts")
+
+
+def tradeoff_rows(result: TradeoffResult) -> Markup:
+    """Return the table of a trade-off, with what is active at all of its values in the caption."""
+    throughout = throughout_words(result)
+    more = f". Active throughout: {throughout}" if throughout else ""
+    return html_table(tradeoff_table(result), f"{over_words(result)}{more}")
 
 
 def tradeoff_page(case: Case, result: TradeoffResult) -> str:
@@ -27,9 +46,9 @@ def tradeoff_page(case: Case, result: TradeoffResult) -> str:
         [
             tag("h2", "F against the number"),
             paragraphs(["Each point is a solve of its own, with everything that is free chosen anew."]),
-            tradeoff_figures(case, result),
+            tradeoff_figures(case, [result]),
             paragraphs(f"{line}." for line in tradeoff_words(result)),
-            html_table(tradeoff_table(result), "F, its slope and what is active at each value"),
+            tradeoff_rows(result),
         ]
     )
     parts = {
@@ -47,7 +66,7 @@ def tradeoff_page(case: Case, result: TradeoffResult) -> str:
     return Template(_file("report.html.in")).substitute(parts)
 
 
-def _chart(case: Case, result: TradeoffResult, task: int) -> Markup:
+def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) -> Markup:
     values = [point.value for point in result.points]
     F = [math.nan if point.tasks[task] is None else float(point.tasks[task] or 0.0) for point in result.points]
     unit = f" {result.unit}" if result.unit else ""
@@ -62,7 +81,10 @@ def _chart(case: Case, result: TradeoffResult, task: int) -> Markup:
             words += f" {missing} of {len(values)} values have no answer."
     chart = line_chart(
         [Curve(values, F, "curve")],
-        [Spot(value, each, "other", f"{value:.6g}{unit}: F = {each:.7g}") for value, each in solved],
+        [
+            Spot(value, each, "spot" if value == here else "other", f"{value:.6g}{unit}: F = {each:.7g}")
+            for value, each in solved
+        ],
         words=words,
         labels=(f"{result.over}, {result.unit}" if result.unit else result.over, objective_label(case)),
     )

@@ -7,20 +7,22 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...results.data import SolveResult
+from ...results.parts import LimitData
 from ...results.tables import MOST_OPTIMA, optimum_table
-from ...results.tradeoffwording import over_words, tradeoff_table
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
-from .curves import tradeoff_figures
+from .curves import tradeoff_figures, tradeoff_rows
 from .markup import Markup, html_table, joined, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 
 _ENCLOSED = (
     "Here F is drawn over the active limits that cost most. Each point of a curve is a solve of its own, from few "
-    "starting points and from the optima beside it; the command tradeoff draws such curves more closely. Slices along "
-    "single variables would show little: most variables cannot move alone from this point without leaving a limit."
+    "starting points and from the optima beside it. The dot in colour is this point; the command tradeoff draws such "
+    "curves more closely. Slices along single variables would show little: most variables cannot move alone from this "
+    "point without leaving a limit."
 )
 
 
@@ -70,15 +72,18 @@ def around(report: Report) -> Markup:
             )
         return Markup("")
     if report.curves:
-        parts.append(tag("p", _ENCLOSED))
-        for curve in report.curves:
-            parts += [tag("h3", over_words(curve)), tradeoff_figures(report.case, curve)]
-            parts.append(html_table(tradeoff_table(curve), f"F over {curve.over}"))
+        here = {f"limits.{row.key}": row.limit for row in _limits(report)}
+        parts += [tag("p", _ENCLOSED), tradeoff_figures(report.case, report.curves, here)]
+        parts += [tradeoff_rows(each) for each in report.curves]
     parts += _slices(report)
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))
         parts.append(_maps(report, with_maps))
     return joined(parts)
+
+
+def _limits(report: Report) -> tuple[LimitData, ...]:
+    return report.result.limits if isinstance(report.result, SolveResult) else ()
 
 
 def _slices(report: Report) -> Iterator[Markup]:
