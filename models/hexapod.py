@@ -1,55 +1,123 @@
 """A hexapod given by twelve joint centres, any coordinate of which a case fixes or frees.
 
 Letters: ``base_i`` is the centre of leg i's base joint in the world frame, ``platform_i`` the centre of its platform
-joint in the platform frame.
+joint in the platform frame. With a symmetry some legs are given and the others are their images, in the frame of the
+base and in the frame of the platform: the numbers of the given legs move all.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
+from typing import Literal, NamedTuple, TypeAlias
 
+import casadi as ca
 from casadi import SX
 
 from .drawing import Mark, MarkKind
 from .legs import legged_platform
-from .model import Model
+from .model import Model, ModelError
 from .parts import Dimension, Leg, Parameter, PoseSymbols
 
+Symmetry: TypeAlias = Literal["none", "mirror", "threefold", "threefold-mirror"]
 
-def hexapod() -> Model:
-    """Return a robot with six legs between twelve joint centres, given by their coordinates."""
+
+class _Image(NamedTuple):
+    """A leg as the image of a given leg: a reflection in the plane y = 0 or none, then a rotation about z.
+
+    Attributes:
+        of: index of the given leg.
+        thirds: number of thirds of a turn.
+        mirrored: whether the leg is reflected first.
+    """
+
+    of: int
+    thirds: int = 0
+    mirrored: bool = False
+
+
+#: The six legs of each symmetry, in order around the plates: legs 1 and 2, 3 and 4, 5 and 6 are pairs about the
+#: azimuths 0, 120 and 240 degrees.
+_IMAGES: Mapping[str, tuple[_Image, ...]] = MappingProxyType(
+    {
+        "none": tuple(_Image(i) for i in range(6)),
+        "mirror": (
+            _Image(0),
+            _Image(0, mirrored=True),
+            _Image(2),
+            _Image(3),
+            _Image(3, mirrored=True),
+            _Image(2, mirrored=True),
+        ),
+        "threefold": tuple(_Image(i % 2, i // 2) for i in range(6)),
+        "threefold-mirror": tuple(_Image(0, i // 2, mirrored=bool(i % 2)) for i in range(6)),
+    }
+)
+
+
+def hexapod(*, symmetry: Symmetry = "none") -> Model:
+    """Return a robot with six legs between twelve joint centres, given by their coordinates.
+
+    Args:
+        symmetry: ``none``: all legs are given. ``mirror``: legs 1, 3 and 4 are given, and 2, 6 and 5 are their
+            reflections in the plane y = 0. ``threefold``: legs 1 and 2 are given, and the others are turned by 120 and
+            240 degrees about z. ``threefold-mirror``: leg 1 is given, leg 2 is its reflection, and both are turned.
+
+    Raises:
+        ModelError: there is no such symmetry.
+    """
+    if symmetry not in _IMAGES:
+        raise ModelError(f"model 'hexapod': symmetry must be one of {', '.join(_IMAGES)}, got {symmetry!r}")
     pose = PoseSymbols()
-    base, platform, legs = [], [], []
-    for i in range(6):
-        name = str(i + 1)
-        b, a = SX.sym(f"base_{name}", 3), SX.sym(f"platform_{name}", 3)
-        base.append(
-            Parameter(f"base_{name}", b, Dimension.LENGTH, f"base joint of leg {name}", _typical_joint(i, 12.0, 20))
-        )
-        platform.append(
-            Parameter(
-                f"platform_{name}", a, Dimension.LENGTH, f"platform joint of leg {name}", _typical_joint(i, 8.0, 45)
-            )
-        )
-        legs.append(Leg(name, b, a))
+    images = _IMAGES[symmetry]
+    given = sorted({image.of for image in images})
+    base, platform = (
+        {i: _joint(plate, i, radius, half_angle) for i in given}
+        for plate, radius, half_angle in (("base", 12.0, 20.0), ("platform", 8.0, 45.0))
+    )
+    legs = [
+        Leg(str(i + 1), _placed(base[image.of].symbol, image), _placed(platform[image.of].symbol, image))
+        for i, image in enumerate(images)
+    ]
     parts = legged_platform(legs, pose)
-    joints = zip((*base, *platform), parts.scene.points, strict=False)
+    points = {point.name: point for point in parts.scene.points}
+    joints = [
+        (plate[i].name, points[f"{letter}{i + 1}"]) for letter, plate in (("B", base), ("A", platform)) for i in given
+    ]
     return Model(
         name="hexapod",
         description="six legs between twelve joint centres given by their coordinates",
-        parameters=(*base, *platform),
+        options={"symmetry": symmetry} if symmetry != "none" else {},
+        parameters=(*base.values(), *platform.values()),
         pose=pose,
         home=(0.0, 0.0, 35.0),
         wrenches=parts.wrenches,
         quantities=parts.quantities,
         scene=replace(
             parts.scene,
-            marks=tuple(Mark(item.name, MarkKind.POINT, (joint.position,), joint.body) for item, joint in joints),
+            marks=tuple(Mark(name, MarkKind.POINT, (joint.position,), joint.body) for name, joint in joints),
         ),
         legs=parts.legs,
         built=parts.built,
     )
+
+
+def _joint(plate: str, i: int, radius: float, half_angle: float) -> Parameter:
+    """Return the parameter of a given joint; the arguments are those of :func:`_typical_joint`, and the plate."""
+    name = f"{plate}_{i + 1}"
+    words = f"{plate} joint of leg {i + 1}"
+    return Parameter(name, SX.sym(name, 3), Dimension.LENGTH, words, _typical_joint(i, radius, half_angle))
+
+
+def _placed(joint: SX, image: _Image) -> SX:
+    """Return the joint (3, 1) of a leg from that of the given leg."""
+    if image == _Image(image.of):
+        return joint
+    x, y, z = joint[0], -joint[1] if image.mirrored else joint[1], joint[2]
+    cosine, sine = ((1.0, 0.0), (-0.5, math.sqrt(0.75)), (-0.5, -math.sqrt(0.75)))[image.thirds]
+    return ca.vertcat(cosine * x - sine * y, sine * x + cosine * y, z) if image.thirds else ca.vertcat(x, y, z)
 
 
 def _typical_joint(i: int, radius: float, half_angle: float) -> tuple[float, float, float]:

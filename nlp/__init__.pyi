@@ -66,6 +66,7 @@ from .results.jsondata import json_data as json_data
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of
+from .results.tradeoff import tradeoff_result as tradeoff_result
 from .solver.certified import Certified as Certified
 from .solver.certified import certify as certify
 from .solver.interface import Solver as Solver
@@ -81,4 +82,7 @@ from .solver.solve import solve as solve
 from .solver.starts import Start as Start
 from .solver.starts import StartStatus as StartStatus
 from .solver.status import Status as Status
+from .solver.tradeoff import Tradeoff as Tradeoff
+from .solver.tradeoff import TradeoffPoint as TradeoffPoint
+from .solver.tradeoff import tradeoff as tradeoff
 from .units import Units as Units

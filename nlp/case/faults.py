@@ -51,11 +51,16 @@ _KINDS = {
 _FORMS = {
     "axis": "must be a list of 3 numbers",
     "point": "must be a list of 3 numbers",
+    "rpy": "must be a list of 3 numbers: roll, pitch, yaw",
+    "matrix": "must be a list of 3 rows of 3 numbers",
+    "quaternion": "must be a list of 4 numbers: w, x, y, z",
     "twist": "must be a list of 6 numbers",
     "position": "must be a list of 3, each a number or { min, max }",
     "task": "must be a list of tables: write [[task]], with two brackets",
     "published": "must be a list of tables: write [[published]], with two brackets",
 }
+#: Keys that name a file, and those of the tables that its rows become.
+_FILES = {"poses": "pose", "tasks": "task"}
 
 
 def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
@@ -71,6 +76,8 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
             sentence = str(context["fault"])
         case "literal_error":
             sentence = f"must be one of {context['expected']}"
+        case "string_type" if key in _FILES:
+            sentence = f"must be the name of a CSV file; no such key for tables, did you mean {_FILES[key]!r}?"
         case "list_type" if key in _FORMS:
             sentence = _FORMS[key]
         case "float_type":

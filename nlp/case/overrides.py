@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from ...models import component_names
 from ..errors import CaseError, nearest
@@ -13,16 +13,59 @@ from .names import parameter_name, pose_prefixes
 Settings: TypeAlias = Mapping[str, float | list[float]]
 
 
+#: Stands before the dotted key of a limit.
+_LIMITS = "limits."
+#: What a free number has.
+_ENDS = ("min", "max", "start")
+
+
 def override_number(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
     """Replace a number, or the three numbers of a point, axis or direction, in a document's tables.
 
     Args:
         tables: the document, as ``tomllib`` returns it; changed in place.
-        name: the name in the case.
+        name: the name in the case; behind the name of a free number ``.min``, ``.max`` or ``.start`` may stand; or
+            the dotted key of a limit, such as ``limits.leg_length.max``.
         value: a number, or three, in the file's units.
 
     Raises:
         CaseError: the case has no number of this name.
+    """
+    if name.startswith(_LIMITS):
+        _override_limit(tables, name, value)
+        return
+    places, rotations = _places(tables, name)
+    whole, _, end = name.rpartition(".")
+    if end in _ENDS and whole in places:
+        table, place = places[whole]
+        if not isinstance(table[place], dict):
+            raise CaseError(name, f"cannot be set: {whole} is not free")
+        table[place][end] = value
+        return
+    if name not in places:
+        raise CaseError(name, f"cannot be set; {nearest(name, [*places, *rotations])}")
+    table, place = places[name]
+    table[place] = value
+
+
+class _Places(NamedTuple):
+    """Where the numbers of a document are, and the names of those that a pose may lack.
+
+    Attributes:
+        places: table or list of each number, and the key or index within it, by the number's name.
+        rotations: names of the axis and the angle of each pose.
+    """
+
+    places: dict[str, tuple[Any, int | str]]
+    rotations: list[str]
+
+
+def _places(tables: dict[str, Any], name: str) -> _Places:
+    """Return where the numbers of a document are; a rotation that is to be set, and lacks, is made first.
+
+    Args:
+        tables: the document.
+        name: name of the number to be set.
     """
     parameters = tables.get("robot", {}).get("parameters", {})
     given = tables.setdefault("pose", {})
@@ -40,9 +83,22 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
             places.update({part: (pose["position"], index) for index, part in enumerate(names)})
         for part in ("angle", "axis"):
             rotations.append(f"{prefix}{part}")
-            if name == f"{prefix}{part}":
-                places[name] = (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part)
-    if name not in places:
-        raise CaseError(name, f"cannot be set; {nearest(name, [*places, *rotations])}")
-    table, place = places[name]
-    table[place] = value
+            if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
+                places[f"{prefix}{part}"] = (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part)
+    return _Places(places, rotations)
+
+
+def _override_limit(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace or add a number of the limits; arguments and errors are those of :func:`override_number`."""
+    first, *others = name.removeprefix(_LIMITS).split(".")
+    limits = tables.setdefault("limits", {})
+    if not first or len(others) > 1 or not all(others) or not isinstance(limits, dict):
+        raise CaseError(name, "cannot be set; write a limit and its number, such as limits.leg_length.max")
+    written = limits.get(first)
+    if isinstance(written, dict):
+        # An angle's limit alone is its largest value: { max = 45, about = "home" } and 45 have one key in results.
+        written[others[0] if others else "max"] = value
+    elif others and not (others == ["max"] and written is not None):
+        limits[first] = {others[0]: value}
+    else:
+        limits[first] = value

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ...models import Displacement, axis_from_screw, screw_displacement
+from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -72,6 +73,33 @@ class Rotation:
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
     angle: Value = 0.0
+
+    @classmethod
+    def from_rpy(cls, roll: float, pitch: float, yaw: float) -> Rotation:
+        """Return the fixed rotation ``Rz(yaw) Ry(pitch) Rx(roll)``, radians.
+
+        Raises:
+            CaseError: a number is not finite.
+        """
+        return cls(*rotation_from_rpy((roll, pitch, yaw), "rotation.rpy"))
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Rotation:
+        """Return the fixed rotation of a matrix (3, 3) that turns platform coordinates into world coordinates.
+
+        Raises:
+            CaseError: the matrix is not orthogonal, or a reflection.
+        """
+        return cls(*rotation_from_matrix(matrix, "rotation.matrix"))
+
+    @classmethod
+    def from_quaternion(cls, quaternion: ArrayLike) -> Rotation:
+        """Return the fixed rotation of a unit quaternion (4,) ``(w, x, y, z)``.
+
+        Raises:
+            CaseError: the quaternion is not unit.
+        """
+        return cls(*rotation_from_quaternion(quaternion, "rotation.quaternion"))
 
 
 #: No displacement.

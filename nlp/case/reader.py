@@ -8,21 +8,24 @@ from __future__ import annotations
 import math
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ... import cases
 from ...models import Dimension
 from ..errors import CaseError, InputError, nearest
 from ..units import Units
 from .case import Case
+from .csvrows import TableOrigins, insert_rows, names_files
 from .displacements import read_displacements
 from .limits.limits import Limits
+from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 from .overrides import Settings, override_number
 from .pose import Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
 from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
 from .settings import Expectation, ExpectedValue, Published, Search
 from .task import Method, Sense, Task, unit_twist
+from .tomltext import toml_text
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
 _LARGEST_FILE = 4 * 2**20
@@ -70,6 +73,19 @@ def _file_of(name: str) -> Path | None:
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
+class CaseFile(NamedTuple):
+    """A case as it was read from a file.
+
+    Attributes:
+        case: the case.
+        text: TOML that states this case by itself: the text of the file, unless settings change it or other files
+            belong to it.
+    """
+
+    case: Case
+    text: str
+
+
 def load_case(name: str, settings: Settings | None = None) -> Case:
     """Read a case from its file.
 
@@ -77,17 +93,25 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
         name: path of a TOML file, or the bare name of a shipped case.
         settings: numbers by name that replace those of the file, in the file's units: a parameter or one of its
             components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers. A
-            parameter with the name of a number of the pose is called ``robot.p_x`` and the like.
+            parameter with the name of a number of the pose is called ``robot.p_x`` and the like. ``p_z.max`` is an end
+            of a free number, ``limits.leg_length.max`` a number of a limit, which may be a new one.
 
     Raises:
         InputError: the file cannot be read, or holds a fault.
     """
+    return read_case(name, settings).case
+
+
+def read_case(name: str, settings: Settings | None = None) -> CaseFile:
+    """Read a case from its file, with a text that states it; arguments and errors are those of :func:`load_case`."""
     path, text = find_case(name), case_text(name)
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
-    return case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {})
+    is_whole = not settings and not names_files(tables)
+    case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
+    return CaseFile(case, text if is_whole else toml_text(tables))
 
 
 def case_text(name: str) -> str:
@@ -114,19 +138,25 @@ def case_text(name: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def case_from_tables(tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None) -> Case:
+def case_from_tables(
+    tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None, folder: Path | None = None
+) -> Case:
     """Return the case of a TOML document.
 
     Args:
-        tables: the document, as ``tomllib`` returns it; settings change it in place.
+        tables: the document, as ``tomllib`` returns it; settings and CSV files change it in place.
         name: name of the case in results.
         source: name of the document in messages.
         settings: as for :func:`load_case`.
+        folder: folder beside which the CSV files are that the document names; the current one if left out.
 
     Raises:
-        CaseError: the document holds a fault.
+        CaseError: the document, or a CSV file that it names, holds a fault.
+        InputError: a CSV file is no table at all.
     """
+    origins = TableOrigins()
     try:
+        origins = insert_rows(tables, folder or Path())
         written = parse_document(tables)
         if settings:
             for key, value in settings.items():
@@ -134,7 +164,7 @@ def case_from_tables(tables: dict[str, Any], *, name: str, source: str, settings
             written = parse_document(tables)
         return _case_of(written, name, source)
     except CaseError as error:
-        raise error.within(source) from None
+        raise (error if error.source else origins.error_in(error, source)) from None
 
 
 def _case_of(written: Document, name: str, source: str) -> Case:
@@ -155,11 +185,16 @@ def _case_of(written: Document, name: str, source: str) -> Case:
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
     poses = written.pose if isinstance(written.pose, list) else [written.pose]
     tasks = [_task(task, index) for index, task in enumerate(written.task)]
-    steps = [read_displacements(pose, tasks, units, key) for pose, key in zip(poses, _pose_keys(written), strict=True)]
+    keys = _pose_keys(written)
+    steps = [read_displacements(pose, tasks, units, key) for pose, key in zip(poses, keys, strict=True)]
     method, over_poses = _combination(written, sum(map(len, steps)))
     first, *further = [
-        Pose([_value(part, units, Dimension.LENGTH) for part in pose.position], _rotation(pose.rotation, units), moves)
-        for pose, moves in zip(poses, steps, strict=True)
+        Pose(
+            [_value(part, units, Dimension.LENGTH) for part in pose.position],
+            _rotation(pose.rotation, units, key),
+            moves,
+        )
+        for pose, moves, key in zip(poses, steps, keys, strict=True)
     ]
     search = written.solve
     return Case(
@@ -250,10 +285,30 @@ def _value(written: float | Range, units: Units, dimension: Dimension) -> Value:
     return Free(units.to_internal(written.min, dimension), units.to_internal(written.max, dimension), start)
 
 
-def _rotation(written: RotationTable | None, units: Units) -> Rotation:
-    """Return the rotation of a stated pose: none where the file states none."""
+def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotation:
+    """Return the rotation of a stated pose: none where the file states none.
+
+    Args:
+        written: its table.
+        units: the file's units.
+        pose: dotted key of the pose, for messages.
+
+    Raises:
+        CaseError: a matrix is not orthogonal, or a quaternion not unit.
+    """
     if written is None:
         return Rotation()
+    key = f"{pose}.rotation"
+    if written.rpy is not None:
+        return Rotation(
+            *rotation_from_rpy([units.to_internal(part, Dimension.ANGLE) for part in written.rpy], f"{key}.rpy")
+        )
+    if written.matrix is not None:
+        return Rotation(*rotation_from_matrix(written.matrix, f"{key}.matrix"))
+    if written.quaternion is not None:
+        return Rotation(*rotation_from_quaternion(written.quaternion, f"{key}.quaternion"))
+    if written.angle is None:
+        raise CaseError(f"{key}.angle", "is missing")
     return Rotation(written.axis, _value(written.angle, units, Dimension.ANGLE))
 
 

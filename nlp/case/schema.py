@@ -21,6 +21,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from ..errors import listing
 from ..units import Units
 from .case import Case
 from .faults import case_error
@@ -28,6 +29,12 @@ from .limits.registry import LimitsTable
 from .settings import Expectation, Published, Search
 from .table import Table, Vector
 from .task import Task
+
+#: Forms of a fixed rotation, each of which stands alone.
+_FIXED = ("rpy", "matrix", "quaternion")
+
+
+FileName = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Range(Table):
@@ -92,10 +99,40 @@ class RobotTable(Table):
 
 
 class RotationTable(Table):
-    """Rotation of the platform about an axis of the world frame."""
+    """Rotation of the platform: about an axis of the world frame, or fixed in one of three other forms."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {"required": ["angle"]},
+                {"required": ["rpy"], "properties": {"axis": False}},
+                {"required": ["matrix"], "properties": {"axis": False}},
+                {"required": ["quaternion"], "properties": {"axis": False}},
+            ]
+        }
+    )
 
     axis: Vector | None = Field(default=None, description="held axis; left out, the axis is free")
-    angle: Value = Field(description="angle, fixed or free")
+    angle: Value | None = Field(default=None, description="angle, fixed or free")
+    rpy: Vector | None = Field(default=None, description="roll, pitch, yaw: about the world's x, then y, then z")
+    matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="rows of the matrix from platform to world coordinates"
+    )
+    quaternion: Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] | None = Field(
+        default=None, description="unit quaternion w, x, y, z"
+    )
+
+    @model_validator(mode="after")
+    def _refuse_two_forms(self) -> RotationTable:
+        """Return the table, or refuse two forms of a rotation beside each other, and none."""
+        given = [form for form in (*_FIXED, "angle", "axis") if getattr(self, form) is not None]
+        if given in ([], ["axis"]):
+            fault = {"key": "angle", "fault": f"is missing: give angle, or one of {listing(_FIXED)}"}
+            raise PydanticCustomError("reason", "{fault}", fault)
+        if len(given) > 1 and given[0] in _FIXED:
+            fault = {"key": given[1], "fault": f"cannot stand beside {given[0]}; state the rotation in one way"}
+            raise PydanticCustomError("reason", "{fault}", fault)
+        return self
 
 
 class AlongTable(Table):
@@ -230,19 +267,38 @@ class PublishedTable(Table):
 class Document(Table):
     """A whole case file."""
 
-    model_config = ConfigDict(title="screwsynth case file")
+    model_config = ConfigDict(
+        title="screwsynth case file",
+        json_schema_extra={
+            "allOf": [
+                {"oneOf": [{"required": [key]}, {"required": [file]}]}
+                for key, file in (("pose", "poses"), ("task", "tasks"))
+            ]
+        },
+    )
 
     title: str = Field(default=Case.title, description="one line for people")
     units: UnitsTable = UnitsTable()
     robot: RobotTable
-    pose: Poses
-    task: Annotated[list[TaskTable], Field(min_length=1)]
+    # A document that names CSV files has their rows here by the time that it is checked.
+    pose: Poses = Field(default_factory=list)
+    task: Annotated[list[TaskTable], Field(min_length=1)] = Field(default_factory=list)
+    poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
+    tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
     solve: SolveTable = SolveTable()
     expect: ExpectTable = ExpectTable()
     published: list[PublishedTable] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _refuse_without_pose_or_task(self) -> Document:
+        """Return the document, or refuse one that states no pose or no task."""
+        for key in ("pose", "task"):
+            if key not in self.model_fields_set:
+                raise PydanticCustomError("reason", "{fault}", {"key": key, "fault": "is missing"})
+        return self
 
 
 def parse_document(tables: dict[str, Any]) -> Document:

@@ -15,6 +15,7 @@ from .new import new
 from .report import report
 from .schema import schema
 from .solve import solve
+from .tradeoff import tradeoff
 from .verify_proof import verify_proof
 
 app = typer.Typer(
@@ -28,7 +29,7 @@ app = typer.Typer(
 )
 
 # In the order in which help lists them.
-for command in (solve, report, certify, verify_proof, check, evaluate, codegen, models, schema, new):
+for command in (solve, report, tradeoff, certify, verify_proof, check, evaluate, codegen, models, schema, new):
     app.command()(command)
 
 

@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, check_outputs, console, write_json
+from .options import CaseName, Jobs, JsonFile, SettingTexts, check_outputs, console, read_settings, write_json
 
 
 def certify(
     case: CaseName,
+    settings: SettingTexts = None,
     gap: Annotated[float, typer.Option(help="Part of the best F that the bound may be off by.")] = 1e-4,
     time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Stop then, with the bound reached.")] = None,
     above: Annotated[
@@ -24,7 +25,7 @@ def certify(
     json_file: JsonFile = None,
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
-    from ..case.reader import case_text, load_case
+    from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..output.files import write_text
@@ -37,7 +38,7 @@ def certify(
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":
             raise InputError("standard output can take one of --json - and --proof - only")
-        loaded = load_case(case)
+        loaded, text = read_case(case, read_settings(settings))
         check_outputs([case], {"--json": json_file, "--proof": proof})
         certified = certify_with_progress(
             loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
@@ -46,7 +47,7 @@ def certify(
         raise InputError(f"--{error}") from None
     result = certified_of(certified)
     if proof is not None and certified.tree is not None:
-        write_text(proof, proof_of(certified, case_text(case)).as_text())
+        write_text(proof, proof_of(certified, text).as_text())
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):

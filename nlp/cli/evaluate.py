@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
-from .options import CaseName, CsvFile, CsvTable, JsonFile, check_csv, check_outputs, console, write_csv, write_json
+from .options import (
+    CaseName,
+    CsvFile,
+    CsvTable,
+    JsonFile,
+    SettingTexts,
+    check_csv,
+    check_outputs,
+    console,
+    read_settings,
+    write_csv,
+    write_json,
+)
 
 
 def evaluate(
     case: CaseName,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),
-    ] = None,
+    settings: SettingTexts = None,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
     table: CsvTable = None,
@@ -30,7 +37,7 @@ def evaluate(
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    loaded = load_case(case, dict(_parse_setting(text) for text in settings or []))
+    loaded = load_case(case, read_settings(settings))
     check_outputs([case], {"--json": json_file, "--csv": csv_file})
     check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
@@ -48,21 +55,3 @@ def evaluate(
 
         show(console(), evaluation_summary(loaded, result))
     raise typer.Exit(1 if result.violated else 0)
-
-
-def _parse_setting(text: str) -> tuple[str, float | list[float]]:
-    """Read ``NAME=NUMBER`` or ``NAME=X,Y,Z``.
-
-    Raises:
-        InputError: the text is neither.
-    """
-    from ..errors import InputError
-
-    name, equals, value = (part.strip() for part in text.partition("="))
-    try:
-        numbers = [float(part) for part in value.split(",")]
-    except ValueError:
-        numbers = []
-    if not (name and equals and numbers):
-        raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
-    return name, numbers[0] if len(numbers) == 1 else numbers

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..case.case import Case
+    from ..case.overrides import Settings
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
 
@@ -30,6 +31,33 @@ CsvTable = Annotated[
 Starts = Annotated[int | None, typer.Option(min=1, max=100_000, help="Starting points instead of the case's.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")]
+SettingTexts = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),
+]
+
+
+def read_settings(texts: list[str] | None) -> Settings:
+    """Return the numbers that ``--set`` gives, by name; the last counts where one is given twice.
+
+    Raises:
+        InputError: a text is neither ``NAME=NUMBER`` nor ``NAME=X,Y,Z``.
+    """
+    return dict(_read_setting(text) for text in texts or [])
+
+
+def _read_setting(text: str) -> tuple[str, float | list[float]]:
+    """Return the name and the number or numbers of one setting; the error is that of :func:`read_settings`."""
+    from ..errors import InputError
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    try:
+        numbers = [float(part) for part in value.split(",")]
+    except ValueError:
+        numbers = []
+    if not (name and equals and numbers):
+        raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
+    return name, numbers[0] if len(numbers) == 1 else numbers
 
 
 def check_outputs(cases: Iterable[str], outputs: Mapping[str, str | None]) -> None:

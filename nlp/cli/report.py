@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, Starts, check_outputs
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, check_outputs, read_settings
 
 
 def report(
     case: CaseName,
     out: Annotated[str, typer.Option(metavar="FILE", help="Page to write, such as report.html; - is stdout.")],
+    settings: SettingTexts = None,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, and show the proof's way.")
     ] = False,
@@ -21,19 +22,20 @@ def report(
     jobs: Jobs = None,
 ) -> None:
     """Solve a case and write a page about it: one file that opens without a network."""
-    from ..case.reader import case_text, load_case
+    from ..case.reader import load_case, read_case
     from ..errors import UncoveredError, one_line
     from ..output.files import write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    loaded = load_case(case)
-    text = case_text(case)
+    fixed = read_settings(settings)
+    loaded, text = read_case(case, fixed)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs([case], {"--out": out})
     check_library("plotly", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
+    from ..results.limitcurves import limit_curves
     from ..results.regression import check_case
     from ..results.result import result_of
 
@@ -46,8 +48,13 @@ def report(
         solution, found, _ = solve_with_progress(loaded, jobs)
         is_proved = False
     result = result_of(found)
-    check = check_case(case, {case: result}) if loaded.published else None
-    write_text(out, page_of(report_of(text, solution, result, check, refusal)))
+    # The numbers in print are of the case as its file states it.
+    check = check_case(case, {case: result}) if loaded.published and not settings else None
+    page = report_of(text, solution, result, check, refusal)
+    if page.is_enclosed:
+        curves = limit_curves(solution, result, lambda name, value: load_case(case, {**fixed, name: value}), jobs)
+        page = replace(page, curves=curves)
+    write_text(out, page_of(page))
     if out != "-":
         typer.echo(f"{one_line(out)}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
     raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)

@@ -15,11 +15,13 @@ from .options import (
     JsonFile,
     PlotFile,
     Seed,
+    SettingTexts,
     Starts,
     check_csv,
     check_outputs,
     check_picture,
     console,
+    read_settings,
     write_csv,
     write_json,
 )
@@ -27,6 +29,7 @@ from .options import (
 
 def solve(
     case: CaseName,
+    settings: SettingTexts = None,
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
@@ -50,7 +53,7 @@ def solve(
     # With --certify, an interrupt would leave the proof undone, and the answer would look like a refused one.
     if not certify:
         answer_after(Milestone.START)
-    loaded = load_case(case)
+    loaded = load_case(case, read_settings(settings))
     loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
     check_csv(csv_file, table, json_file, loaded, at_point=False)
     check_picture(plot)

@@ -14,9 +14,17 @@ from .checks import ChecksResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import JsonObject, JsonValue, Mark, Size
+from .tradeoff import TradeoffResult
 
 #: Every kind of result.
-RESULTS: tuple[type[JsonObject], ...] = (SolveResult, CombinedResult, EvaluationResult, CertifiedResult, ChecksResult)
+RESULTS: tuple[type[JsonObject], ...] = (
+    SolveResult,
+    CombinedResult,
+    EvaluationResult,
+    CertifiedResult,
+    ChecksResult,
+    TradeoffResult,
+)
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _SCALARS: dict[object, str] = {bool: "boolean", int: "integer", float: "number", str: "string", NoneType: "null"}
@@ -31,7 +39,7 @@ def result_schema() -> Schema:
     return {
         "$schema": _DIALECT,
         "title": "Result of screwsynth",
-        "description": "What --json writes of a solve (one task, or several), evaluate, certify and check.",
+        "description": "What --json writes of a solve (one task, or several), evaluate, certify, check and tradeoff.",
         "anyOf": kinds,
         "$defs": definitions,
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -47,12 +47,21 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
         ending: ``.png``, ``.svg`` or ``.pdf``.
         view: the projection; the clearest for the first drawing when left out.
     """
+    return picture_of(lambda: figure_of(drawings, view=view), ending)
+
+
+def picture_of(make: Callable[[], Figure], ending: str) -> bytes:
+    """Return the content of the picture file of any figure.
+
+    Args:
+        make: returns the figure; called with the settings of this package's pictures.
+        ending: ``.png``, ``.svg`` or ``.pdf``.
+    """
     content = io.BytesIO()
     with mpl.rc_context({**mpl.rcParamsDefault, **_SETTINGS}), warnings.catch_warnings():
         # A title may have letters that the font lacks: they show as boxes.
         warnings.simplefilter("ignore")
-        figure = figure_of(drawings, view=view)
-        figure.savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
+        make().savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
     return content.getvalue()
 
 

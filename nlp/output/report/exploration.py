@@ -9,16 +9,24 @@ import numpy as np
 
 from ...evidence.state import ZERO_F
 from ...results.data import SolveResult
-from ...results.parts import RobotData
+from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
+from .curves import tradeoff_figures, tradeoff_rows
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
+
+_ENCLOSED = (
+    "Here F is drawn over the active limits that cost most. Each point of a curve is a solve of its own, from few "
+    "starting points and from the optima beside it. The dot in colour is this point; the command tradeoff draws such "
+    "curves more closely. Slices along single variables would show little: most variables cannot move alone from this "
+    "point without leaving a limit."
+)
 
 
 def optima(report: Report) -> Markup:
@@ -74,26 +82,42 @@ def surroundings(report: Report) -> Markup:
                 ["One variable cannot move alone: the robot's loops would open. So there are no slices of F."]
             )
         return Markup("")
-    parts.append(
-        tag(
-            "p",
-            "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-            "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
-            + (
-                " A component of a free direction moves with the direction's others, which are scaled to unit length."
-                if report.parts[0].nlp.program.places.directions
-                else ""
-            ),
-        )
-    )
-    for part in report.parts:
-        if len(report.parts) > 1:
-            parts.append(tag("h3", f"Slices for “{part.name}”"))
-        parts.append(tag("div", *(_slice(part, each) for each in part.slices), class_="charts"))
+    if report.curves:
+        here = {f"limits.{row.key}": row.limit for row in _limits(report)}
+        parts += [tag("p", _ENCLOSED), tradeoff_figures(report.case, report.curves, here)]
+        parts += [tradeoff_rows(each) for each in report.curves]
+    parts += _slices(report)
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))
         parts.append(_maps(report, with_maps))
     return join_markup(parts)
+
+
+def _limits(report: Report) -> tuple[LimitData, ...]:
+    return report.result.limits if isinstance(report.result, SolveResult) else ()
+
+
+def _slices(report: Report) -> Iterator[Markup]:
+    """Yield the slices; beside curves, those of the variables that can move alone only."""
+    shown = [[each for each in part.slices if each.has_room or not report.curves] for part in report.parts]
+    if not any(shown):
+        return
+    if report.curves:
+        yield tag("h3", "Variables that can move alone")
+    yield tag(
+        "p",
+        "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
+        "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
+        + (
+            " A component of a free direction moves with the direction's others, which are scaled to unit length."
+            if report.parts[0].nlp.program.places.directions
+            else ""
+        ),
+    )
+    for part, slices in zip(report.parts, shown, strict=True):
+        if len(report.parts) > 1:
+            yield tag("h3", f"Slices for “{part.name}”")
+        yield tag("div", *(_slice(part, each) for each in slices), class_="charts")
 
 
 def _slice(part: Part, each: Slice) -> Markup:

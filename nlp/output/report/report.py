@@ -19,6 +19,7 @@ from ...results.data import CaseResult
 from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
 from ...results.rounding import number
+from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution
 from ..pictures.drawing import drawing_of
@@ -67,6 +68,7 @@ class Report:
         check: published and expected numbers beside the computed; None where the case has none.
         is_answer: whether the point is an answer.
         refusal: why no certificate that was asked for can be given; empty without one.
+        curves: trade-offs over the active limits, which stand in the place of the slices; none for slices.
     """
 
     case: Case
@@ -76,7 +78,14 @@ class Report:
     combined: ProgramSolution | None
     check: CaseCheck | None
     is_answer: bool
-    refusal: str
+    refusal: str = ""
+    curves: tuple[TradeoffResult, ...] = ()
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether most variables cannot move alone without leaving a limit: their slices show nothing but the point."""
+        slices = [each for part in self.parts for each in part.slices]
+        return bool(slices) and 2 * sum(not each.has_room for each in slices) > len(slices)
 
     def as_data(self) -> dict[str, Any]:
         """Return the data of the page's script, as JSON's own types."""

@@ -42,6 +42,11 @@ class Slice:
     F: FloatArray
     inside: FloatArray
 
+    @property
+    def has_room(self) -> bool:
+        """Whether the line lies within every constraint at more than one point."""
+        return bool(self.inside.sum() > 1)
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:

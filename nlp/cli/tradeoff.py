@@ -1,0 +1,137 @@
+"""The command ``tradeoff``."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from .options import (
+    CaseName,
+    Jobs,
+    JsonFile,
+    PlotFile,
+    Seed,
+    SettingTexts,
+    Starts,
+    check_outputs,
+    check_picture,
+    console,
+    read_settings,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+#: Largest number of values.
+_MOST = 200
+
+
+def tradeoff(
+    case: CaseName,
+    over: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=FIRST:LAST:COUNT", help="The number to vary, such as limits.leg_length.max=28:40:13."
+        ),
+    ],
+    settings: SettingTexts = None,
+    starts: Starts = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the curve as CSV.")] = None,
+    plot: PlotFile = None,
+    page: Annotated[str | None, typer.Option("--page", metavar="FILE", help="Write the curve as an HTML page.")] = None,
+) -> None:
+    """Solve again along one limit or number, and show F against it."""
+    from ..case.reader import load_case
+    from ..errors import InputError
+    from ..output.files import write_bytes, write_text
+    from ..results.tradeoff import tradeoff_result
+    from ..results.tradeoffwording import tradeoff_csv, tradeoff_summary
+    from ..solver.status import Status
+    from ..solver.tradeoff import tradeoff as solve_along
+
+    name, values = _read_range(over)
+    fixed = read_settings(settings)
+    if [json_file, csv_file, page].count("-") > 1:
+        raise InputError("standard output can take one of --json -, --csv - and --page - only")
+    check_picture(plot)
+    check_outputs([case], {"--json": json_file, "--csv": csv_file, "--page": page, "--plot": plot})
+    found = solve_along(
+        lambda value: load_case(case, {**fixed, name: value}),
+        values,
+        name=name,
+        starts=starts,
+        seed=seed,
+        jobs=jobs,
+        progress=_progress() if sys.stderr.isatty() else None,
+    )
+    loaded, result = found.points[0].solution.case, tradeoff_result(found)
+    if json_file is not None:
+        write_json(json_file, result)
+    if csv_file is not None:
+        write_text(csv_file, tradeoff_csv(result))
+    if page is not None:
+        from ..output.report.curves import tradeoff_page
+
+        write_text(page, tradeoff_page(loaded, result))
+    if plot is not None:
+        from ..output.pictures.curves import tradeoff_picture
+        from ..output.pictures.requirements import ending_of
+
+        write_bytes(plot, tradeoff_picture(loaded, result, ending_of(plot)))
+    if "-" not in (json_file, csv_file, page):
+        from ..output.terminal import show
+
+        show(console(), tradeoff_summary(loaded, result))
+    statuses = [point.status for point in result.points]
+    is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
+    raise typer.Exit(0 if is_done and any(status.is_answer for status in statuses) else 1)
+
+
+class _Range(NamedTuple):
+    """Name of a number, and its values."""
+
+    name: str
+    values: list[float]
+
+
+def _read_range(text: str) -> _Range:
+    """Read ``NAME=FIRST:LAST:COUNT``.
+
+    Raises:
+        InputError: it is something else, the ends are equal or not finite, or there are too few or too many values.
+    """
+    import math
+
+    from ..errors import InputError
+
+    name, _, ends = (part.strip() for part in text.partition("="))
+    parts = ends.split(":")
+    try:
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except (ValueError, IndexError):
+        count = 0
+    if not (name and len(parts) == 3 and count):
+        raise InputError(f"--over {text}: must be NAME=FIRST:LAST:COUNT, such as limits.leg_length.max=28:40:13")
+    if not (math.isfinite(first) and math.isfinite(last) and first != last):
+        raise InputError(f"--over {text}: FIRST and LAST must be finite and differ")
+    if not 2 <= count <= _MOST:
+        raise InputError(f"--over {text}: COUNT must be between 2 and {_MOST}")
+    # Exact at both ends.
+    values = [(first * (count - 1 - k) + last * k) / (count - 1) for k in range(count)]
+    return _Range(name, [first, *values[1:-1], last])
+
+
+def _progress() -> Callable[[int, int], None]:
+    """Return a function that writes how far the solves are, on one line of standard error."""
+
+    def show(done: int, total: int) -> None:
+        sys.stderr.write(f"\r{done} of {total} values solved" if done < total else "\r\033[K")
+        sys.stderr.flush()
+
+    return show

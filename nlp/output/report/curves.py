@@ -1,0 +1,95 @@
+"""Trade-off curves as HTML: within the page about a case, and as a page of their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from string import Template
+
+from ...case.case import Case
+from ...results.tradeoff import TradeoffResult
+from ...results.tradeoffwording import objective_label, over_words, throughout_words, tradeoff_table, tradeoff_words
+from .charts import Curve, Spot, line_chart
+from .markup import Markup, html_table, join_markup, paragraphs, tag
+
+
+def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mapping[str, float] | None = None) -> Markup:
+    """Return charts of F over numbers, one for each number and task, side by side.
+
+    Args:
+        case: the case.
+        results: its trade-offs.
+        here: value of a number in the case that a page is about, by the number's name; marked in its chart.
+    """
+    charts = [
+        _chart(case, each, task, None if here is None else here.get(each.over))
+        for each in results
+        for task in range(len(each.tasks))
+    ]
+    return tag("div", *charts, class_="charts")
+
+
+def tradeoff_rows(result: TradeoffResult) -> Markup:
+    """Return the table of a trade-off, with what is active at all of its values in the caption."""
+    throughout = throughout_words(result)
+    more = f". Active throughout: {throughout}" if throughout else ""
+    return html_table(tradeoff_table(result), f"{over_words(result)}{more}")
+
+
+def tradeoff_page(case: Case, result: TradeoffResult) -> str:
+    """Return a whole page about a trade-off, which opens without a network and needs no script."""
+    title = case.title or case.name
+    solved = [point for point in result.points if point.status.is_answer]
+    answer = f"{len(solved)} of {len(result.points)} values have an answer"
+    body = join_markup(
+        [
+            tag("h2", "F against the number"),
+            paragraphs(["Each point is a solve of its own, with everything that is free chosen anew."]),
+            tradeoff_figures(case, [result]),
+            paragraphs(f"{line}." for line in tradeoff_words(result)),
+            tradeoff_rows(result),
+        ]
+    )
+    parts = {
+        "title": tag("title", f"{title} - trade-off - screwsynth"),
+        "heading": tag("h1", title),
+        "subtitle": tag("p", f"{case.name}, robot {case.model.name}: {over_words(result)}", class_="subtitle"),
+        "answer": tag("div", paragraphs([answer]), class_="answer" if solved else "answer none", id="answer"),
+        "contents": "",
+        "body": tag("section", body),
+        "style": Markup(_file("style.css")),
+        "script": "",
+        "data": "{}",
+        "plotly": "",
+    }
+    return Template(_file("report.html.in")).substitute(parts)
+
+
+def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) -> Markup:
+    values = [point.value for point in result.points]
+    F = [math.nan if point.tasks[task] is None else float(point.tasks[task] or 0.0) for point in result.points]
+    unit = f" {result.unit}" if result.unit else ""
+    name = f"{result.tasks[task]}: " if len(result.tasks) > 1 else ""
+    solved = [(value, each) for value, each in zip(values, F, strict=True) if math.isfinite(each)]
+    words = f"{name}no value of {result.over} from {values[0]:.5g} to {values[-1]:.5g}{unit} has an answer."
+    if solved:
+        (first, F_first), (last, F_last) = solved[0], solved[-1]
+        words = f"{name}F is {F_first:.6g} at {result.over} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
+        missing = len(values) - len(solved)
+        if missing:
+            words += f" {missing} of {len(values)} values have no answer."
+    chart = line_chart(
+        [Curve(values, F, "curve")],
+        [
+            Spot(value, each, "spot" if value == here else "other", f"{value:.6g}{unit}: F = {each:.7g}")
+            for value, each in solved
+        ],
+        words=words,
+        labels=(f"{result.over}, {result.unit}" if result.unit else result.over, objective_label(case)),
+    )
+    return tag("figure", chart, tag("figcaption", words))
+
+
+def _file(name: str) -> str:
+    return (files("screwsynth.nlp.output.report") / "page" / name).read_text(encoding="utf-8")

@@ -1,0 +1,159 @@
+"""Trade-off curves as a result: the types, and how they are made."""
+
+from collections.abc import Mapping
+
+from ..case.case import Case
+from ..case.task import Sense
+from ..solver.solution import Solution
+from ..solver.status import Status
+from ..solver.tradeoff import Tradeoff, TradeoffPoint
+from .data import CaseResult, CombinedResult, SolveResult
+from .jsondata import Inline, JsonObject, Vector, finite_or_none
+from .parts import HeadData, LimitData, PoseData, RobotData, VersionsData
+from .point import head_data, versions
+from .result import result_of
+
+#: Stands before the dotted key of a limit.
+_LIMITS = "limits."
+
+
+class TradeoffPointData(JsonObject):
+    """The optimum at one value of the number.
+
+    Attributes:
+        value: of the number.
+        status: of the solve.
+        F: objective; with several tasks the value of their combination, null for an average; null without an answer.
+        slope: derivative of F by the number; null where it is not known.
+        tasks: F of each task at the point; null without an answer.
+        active: bounds and limits that the point lies on.
+        parameters: dimensions by name; null without an answer.
+        pose: of the platform, the first that the case states; null without an answer.
+    """
+
+    value: float
+    status: Status
+    F: float | None
+    slope: float | None
+    tasks: tuple[float | None, ...]
+    active: tuple[str, ...]
+    parameters: Mapping[str, float | Vector] | None
+    pose: PoseData | None
+
+
+class TradeoffResult(JsonObject):
+    """Result of a trade-off: the optimum of a case over values of one of its numbers.
+
+    Attributes:
+        head: the case.
+        over: name of the number.
+        unit: of the number; empty for a plain number.
+        senses: of each task.
+        tasks: name of each task.
+        points: one for each value.
+        seed: of the starting points.
+        versions: of the programs.
+        seconds: wall time.
+    """
+
+    head: Inline[HeadData]
+    over: str
+    unit: str
+    senses: tuple[Sense, ...]
+    tasks: tuple[str, ...]
+    points: tuple[TradeoffPointData, ...]
+    seed: int
+    versions: VersionsData
+    seconds: float
+
+
+def tradeoff_result(found: Tradeoff) -> TradeoffResult:
+    """Return a trade-off as a result."""
+    case = found.points[0].solution.case
+    results = [result_of(point.solution) for point in found.points]
+    return TradeoffResult(
+        head=head_data(case),
+        over=found.name,
+        unit=_unit(found.name, case, results),
+        senses=tuple(task.sense for task in case.tasks),
+        tasks=tuple(task.name for task in case.tasks),
+        points=tuple(_point(found.name, point, result) for point, result in zip(found.points, results, strict=True)),
+        seed=found.points[0].solution.seed,
+        versions=versions(),
+        seconds=found.seconds,
+    )
+
+
+def _unit(name: str, case: Case, results: list[CaseResult]) -> str:
+    """Return the unit of a number by its name."""
+    if name.startswith(_LIMITS):
+        rows = (row for result in results for row in _limits(result) if _is_key(name, row.key))
+        return next((row.unit for row in rows), "")
+    whole, _, end = name.rpartition(".")
+    own = whole if end in ("min", "max", "start") else name
+    if own.endswith("angle") and own not in case.scalars:
+        return case.units.angle  # about a free axis
+    return case.units.label(case.scalars[own]) if own in case.scalars else ""
+
+
+def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPointData:
+    is_answer = result.status.is_answer
+    robot = _robot(result) if is_answer else None
+    return TradeoffPointData(
+        value=point.value,
+        status=result.status,
+        F=_value(result) if is_answer else None,
+        slope=_slope(name, result) if is_answer else None,
+        tasks=tuple(finite_or_none(each.F) if is_answer else None for each in point.solution.outcomes),
+        active=_active(point.solution, result) if is_answer else (),
+        parameters=None if robot is None else robot.parameters,
+        pose=None if robot is None else robot.pose,
+    )
+
+
+def _value(result: CaseResult) -> float | None:
+    return result.combined.value if isinstance(result, CombinedResult) else result.F
+
+
+def _robot(result: CaseResult) -> RobotData | None:
+    if isinstance(result, SolveResult):
+        return result.robot
+    return None if result.combined.point is None else result.combined.point.robot
+
+
+def _limits(result: CaseResult) -> tuple[LimitData, ...]:
+    if isinstance(result, SolveResult):
+        return result.limits
+    return () if result.combined.point is None else result.combined.point.limits or ()
+
+
+def _is_key(name: str, key: str) -> bool:
+    """Return whether a setting's name is that of a limit's number, whose key may leave out ``max``."""
+    dotted = name.removeprefix(_LIMITS)
+    return dotted in (key, f"{key}.max") or f"{dotted}.max" == key
+
+
+def _slope(name: str, result: CaseResult) -> float | None:
+    """Return the derivative of F by the number: a limit's cost, or the sensitivity to a fixed number."""
+    if name.startswith(_LIMITS):
+        return next((row.cost for row in _limits(result) if _is_key(name, row.key)), None)
+    if not isinstance(result, SolveResult):
+        return None
+    whole, _, end = name.rpartition(".")
+    if end in ("min", "max") and result.optimality is not None:
+        # A multiplier is an improvement by relaxing the bound: upwards for a largest value, downwards for a smallest.
+        sign = (1 if end == "max" else -1) * (1 if result.sense is Sense.MAX else -1)
+        sides = (side for side in result.optimality.active if (side.name, side.bound) == (whole, end))
+        return next((sign * side.multiplier for side in sides), None)
+    return next((row.derivative for row in result.sensitivity or () if row.name == name), None)
+
+
+def _active(solution: Solution, result: CaseResult) -> tuple[str, ...]:
+    """Return the names of the active bounds, and the keys of the active limits."""
+    keys = tuple(f"{_LIMITS}{row.key}" for row in _limits(result) if row.active)
+    own = solution.decided_by
+    if own is None or own.evidence is None:
+        return keys
+    variables = {variable.name for variable in own.nlp.program.variables}
+    sides = ((side.name, side.bound) for side in own.evidence.active if side.name in variables)
+    return (*(f"{name}.{bound}" if bound in ("min", "max") else name for name, bound in sides), *keys)

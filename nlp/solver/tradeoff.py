@@ -1,0 +1,128 @@
+"""Trade-off curves: the optimum of a case as a function of one of its numbers, one solve for each value.
+
+Neighbours on a curve help each other. The search at each value starts from the optimum at the value before it as well
+as from the case's starting points; a second pass, backwards, tries the optimum at the value behind it. So a better
+family of optima that one solve found is followed to the others.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from ...models import FloatArray
+from ..case.case import Case
+from ..case.settings import Search
+from ..errors import InputError
+from ..program.formulation import formulate_each
+from .compromise import solution_of_one_task
+from .multistart import ProgramSolution, solve_program
+from .solution import Solution
+from .solve import solve_programs
+
+#: A neighbour's optimum counts as better from this part of the objective's scale on: less is rounding.
+_BETTER = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TradeoffPoint:
+    """The optimum at one value.
+
+    Attributes:
+        value: of the number, in the case's unit.
+        solution: of the case with this value; its status says whether it is an answer.
+    """
+
+    value: float
+    solution: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class Tradeoff:
+    """Optima of a case over values of one of its numbers.
+
+    Attributes:
+        name: of the number, such as ``limits.leg_length.max``.
+        points: one for each value, in order.
+        seconds: wall time.
+    """
+
+    name: str
+    points: tuple[TradeoffPoint, ...]
+    seconds: float
+
+
+def tradeoff(
+    case_at: Callable[[float], Case],
+    values: Sequence[float],
+    *,
+    name: str = "number",
+    starts: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    first: Sequence[FloatArray] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Tradeoff:
+    """Solve a case again for each value of one of its numbers.
+
+    Args:
+        case_at: returns the case with a value of the number; all of its cases have the same free numbers. For a case
+            file it is ``lambda value: load_case(file, {name: value})``.
+        values: values of the number, in the case's unit, at least one.
+        name: of the number.
+        starts: number of starting points instead of the case's.
+        seed: seed instead of the case's.
+        jobs: number of threads; the result does not depend on it.
+        first: points (n,) to start from at every value.
+        progress: called after each solve of the first pass with the numbers of solves done and of all.
+
+    Raises:
+        CaseError: a value is not allowed; nothing has been solved by then.
+        InputError: there is no value.
+    """
+    began = time.perf_counter()
+    if not values:
+        raise InputError("a trade-off needs at least one value")
+    cases = [case_at(value) for value in values]
+    solutions: list[Solution] = []
+    for done, case in enumerate(cases, 1):
+        before = solutions[-1:] and _start_from(solutions[-1])
+        solutions.append(_solve(case, case.search.but(starts, seed), [*first, *before], jobs))
+        if progress is not None:
+            progress(done, len(cases))
+    for k in range(len(cases) - 2, -1, -1):
+        solutions[k] = _improved(solutions[k], solutions[k + 1], cases[k].search.but(starts, seed), jobs)
+    points = tuple(TradeoffPoint(float(value), found) for value, found in zip(values, solutions, strict=True))
+    return Tradeoff(name, points, time.perf_counter() - began)
+
+
+def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | None) -> Solution:
+    """Solve a case; one with a single task also from the first points that fit its program."""
+    nlps = formulate_each(case)
+    if len(nlps) > 1:
+        return solve_programs(case, nlps, search, jobs=jobs)
+    fitting = [x for x in first if x.size == nlps[0].n]
+    return solution_of_one_task(case, solve_program(nlps[0], search, first=fitting, jobs=jobs))
+
+
+def _start_from(solution: Solution) -> list[FloatArray]:
+    """Return the point of an answer with variables, for its neighbours to start from."""
+    return [solution.x] if solution.status.is_answer and solution.x.size else []
+
+
+def _improved(solution: Solution, neighbour: Solution, search: Search, jobs: int | None) -> Solution:
+    """Return a solution, or a better one that a search from its neighbour's point finds."""
+    own = solution.outcomes[0].own
+    first = [x for x in _start_from(neighbour) if x.size == own.nlp.n]
+    if solution.combination is not None or not first:
+        return solution
+    tried = solve_program(own.nlp, replace(search, starts=1), first=first, jobs=1)
+    if not tried.status.is_answer or (solution.status.is_answer and not _is_better(tried, own)):
+        return solution
+    again = solve_program(own.nlp, search, first=[*first, tried.x], jobs=jobs)
+    return solution_of_one_task(solution.case, again)
+
+
+def _is_better(one: ProgramSolution, other: ProgramSolution) -> bool:
+    return one.nlp.sign * (other.F - one.F) > _BETTER * one.nlp.objective_scale

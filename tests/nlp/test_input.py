@@ -1,0 +1,333 @@
+"""Numbers and files that a case takes beside its own text: ``--set``, CSV files, forms of rotations."""
+
+import json
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import screwsynth.cases
+from screwsynth.models import model_names
+from screwsynth.nlp import CaseError, InputError, Rotation, load_case, shipped_cases
+from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp.case.tomltext import toml_text
+
+CASES = Path(screwsynth.cases.__file__).parent
+Run = Callable[..., tuple[int, str, str]]
+
+HEAD = """
+[units]
+length = "mm"
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = { min = 10, max = 12 }
+x2 = 8
+x3 = 20
+x4 = 8
+"""
+POSE = "[pose]\nposition = [1, 2, 30]\nrotation = {}\n"
+TASK = '[[task]]\nsense = "max"\naxis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n'
+
+
+def written(folder: Path, text: str, name: str = "case.toml") -> str:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def rotated(folder: Path, rotation: str) -> str:
+    return written(folder, HEAD + POSE.replace("{}", f"{{ {rotation} }}") + TASK)
+
+
+def data(cli: Run, *arguments: str) -> dict[str, Any]:
+    code, out, err = cli(*arguments, "--json", "-")
+    assert (code, err) == (0, "")
+    found: dict[str, Any] = json.loads(out)
+    return found
+
+
+def turn(axis: str, degrees: float) -> np.ndarray:
+    """A rotation about a coordinate axis, written out."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    matrices = {
+        "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+        "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+        "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+    }
+    return np.array(matrices[axis])
+
+
+# --set
+
+
+def test_solve_with_settings_solves_the_edited_case(tmp_path: Path, cli: Run) -> None:
+    text = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8")
+    path = written(tmp_path, text, "original.toml")
+    settings = ("--set", "x1=11", "--set", "p_z.max=45", "--set", "limits.leg_length.max=50", "--set", "angle.max=20")
+    found = data(cli, "solve", path, "--starts", "3", *settings, "--set", "angle.min=-20")
+    for old, new in (
+        ("x1 = 12", "x1 = 11"),
+        ("{ min = 20, max = 50 }", "{ min = 20, max = 45 }"),
+        ("{ min = -30, max = 30 }", "{ min = -20, max = 20 }"),
+        ("[[task]]", "[limits]\nleg_length = { max = 50 }\n[[task]]"),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    other = data(cli, "solve", written(tmp_path, text, "edited.toml"), "--starts", "3")
+    assert found["F"] == other["F"]
+    assert found["pose"] == other["pose"]
+    assert found["limits"][0]["limit"] == 50
+    assert found["parameters"]["x1"] == 11
+
+
+def test_a_proof_with_settings_is_of_the_case_with_them(tmp_path: Path, cli: Run) -> None:
+    proof = str(tmp_path / "set.proof")
+    code, _, err = cli("certify", "paper-4.1-helical", "--set", "p_z=40", "--starts", "2", "--proof", proof)
+    assert (code, err) == (0, "")
+    code, out, _ = cli("verify-proof", proof)
+    assert code == 0
+    best = data(cli, "solve", "paper-4.1-helical", "--set", "p_z=40", "--starts", "4")["F"]
+    bound = float(out.split("F is at most ")[1].split(" ")[0])
+    assert best <= bound <= best * (1 + 2e-4)
+    # The case as the file has it is another one.
+    assert cli("verify-proof", proof, "paper-4.1-helical")[0] != 0
+
+
+def test_pages_and_c_carry_the_case_with_its_settings(tmp_path: Path, cli: Run) -> None:
+    case = written(tmp_path, (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8"))
+    folder = tmp_path / "c"
+    assert cli("codegen", case, "--set", "x1=10.5", "--out", str(folder))[0] == 0
+    assert tomllib.loads((folder / "case.toml").read_text(encoding="utf-8"))["robot"]["parameters"]["x1"] == 10.5
+    pytest.importorskip("plotly")
+    page = tmp_path / "page.html"
+    assert cli("report", case, "--set", "x1=10.5", "--starts", "2", "--out", str(page))[0] == 0
+    text = page.read_text(encoding="utf-8")
+    assert "x1 = 10.5" in text
+    assert "Published and computed" not in text, "the numbers in print are of another case"
+
+
+@pytest.mark.parametrize("command", ["solve", "certify", "report", "codegen", "evaluate"])
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("y=1", "cannot be set"),
+        ("x1.min=1", "x1 is not free"),
+        ("limits.leg_lenght.max=1", "limits.leg_lenght"),
+        ("limits.leg_length=1", "limits.leg_length"),
+        ("limits.leg_length.mx=1", "no such key"),
+        ("limits.=1", "cannot be set"),
+        ("limits.leg_length.max=-1", "above 0 cm"),
+    ],
+)
+def test_settings_that_are_refused(command: str, setting: str, words: str, tmp_path: Path, cli: Run) -> None:
+    target = ("--out", str(tmp_path / "out")) if command in ("report", "codegen") else ()
+    code, out, err = cli(command, "paper-4.1-helical", "--set", setting, *target)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cone_about_home_keeps_what_it_is_about() -> None:
+    case = load_case("hexapod-machining", {"limits.base_joint_angle": 12.0, "limits.platform_joint_angle.max": 13.0})
+    limits = {limit.name: limit for limit in case.limits}
+    for name, largest in (("base_joint_angle", 12), ("platform_joint_angle", 13)):
+        assert limits[name].max == pytest.approx(math.radians(largest))  # type: ignore[attr-defined]
+        assert limits[name].about is not None  # type: ignore[attr-defined]
+
+
+def test_the_text_of_tables_reads_as_the_same_tables(cli: Run) -> None:
+    texts = [(CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()]
+    texts += [cli("new", name)[1] for name in model_names()]
+    texts.append(
+        'a = inf\nb = [-inf, "q\\"\\u0007\\u007f", []]\n["odd key"]\nc = { "x y" = [{ d = true }, 1e-300] }\ne = {}\n'
+    )
+    for text in texts:
+        tables = tomllib.loads(text)
+        assert tomllib.loads(toml_text(tables)) == tables
+
+
+# CSV files
+
+
+def test_poses_and_tasks_from_csv_files_are_those_of_tables(tmp_path: Path, cli: Run) -> None:
+    (tmp_path / "far").mkdir()
+    written(
+        tmp_path, "x, y, z, roll, pitch, yaw\n1, 2, 30, 0, 0, 5\n\n-1,2,31,3,-4,5\n0,0,29,,,\n", "far/trajectory.csv"
+    )
+    written(
+        tmp_path,
+        "sense;name;axis_x;axis_y;axis_z;point_x;point_y;point_z;pitch;weight\n"
+        "max;;2;2;1;2;3;6;1;2\nmin;lift;0;0;1;;;;inf;\n",
+        "tasks.csv",
+    )
+    files = 'poses = "far/trajectory.csv"\ntasks = "tasks.csv"\n'
+    found = data(cli, "evaluate", written(tmp_path, files + HEAD))
+    poses = "".join(
+        f"[[pose]]\nposition = {place}\n{rotation}\n"
+        for place, rotation in (
+            ([1, 2, 30], "rotation = { axis = [0, 0, 1], angle = 5 }"),
+            ([-1, 2, 31], "rotation = { rpy = [3, -4, 5] }"),
+            ([0, 0, 29], ""),
+        )
+    )
+    tasks = f'{TASK}weight = 2\n[[task]]\nname = "lift"\nsense = "min"\naxis = [0, 0, 1]\npitch = inf\n'
+    other = data(cli, "evaluate", written(tmp_path, HEAD + poses + tasks, "tables.toml"))
+    assert len(found["poses"]) == 3
+    assert [task["name"] for task in found["tasks"]] == ["task 1", "lift"]
+    for result in (found, other):
+        del result["case"], result["versions"]
+    assert np.allclose(found["F"], other["F"], rtol=1e-14, atol=0)
+    for one, two in zip(found["poses"], other["poses"], strict=True):
+        assert np.allclose(one["jacobian"], two["jacobian"], rtol=0, atol=1e-14)
+        assert np.allclose(one["pose"]["rotation_matrix"], two["pose"]["rotation_matrix"], rtol=0, atol=1e-15)
+    # A row's number can be set, and the text that goes with the case needs no other file.
+    text = read_case(str(tmp_path / "case.toml"), {"pose2_p_x": 7.0}).text
+    alone = load_case(written(tmp_path, text, "alone.toml"))
+    assert [pose.position[0] for pose in alone.poses] == [1, 7, 0]
+    assert [task.weight for task in alone.tasks] == [2, 1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x,y,z\n1,2,30\n\n1,2,abc\n", ("trajectory.csv: row 4, column z", '"abc"', "must be a number")),
+        ("x,y,z\n1,,30\n", ("row 2, column y", "is empty")),
+        ("x,y,z\n1,inf,30\n", ("row 2, column y = inf", "finite")),
+        ("x,y,z\n1,2,30\n1e40,2,3\n", ("row 3, column x = 1e+40", "at most 1e+30")),
+        ("x,y,z,angle\n1,2,30,400\n", ("row 2, column angle = 400", "at most 179 deg")),
+        ("x,y,z,qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,30,1,1,0,0\n", ("row 3, columns qw, qx, qy, qz", "unit quaternion")),
+        ("x,y,z,axis_x,axis_y,axis_z\n1,2,30,0,0,1\n", ("row 2", "angle", "missing")),
+        ("x,y,z\n1,2\n", ("row 2", "must have 3 cells, got 2")),
+        ("x,y\n1,2\n", ("row 1", "column z missing")),
+        ("x,y,z,rol\n1,2,3,4\n", ("row 1", "no such column", "did you mean 'roll'?")),
+        ("x,y,z,z\n1,2,3,4\n", ("row 1", "'z' is there twice")),
+        ("x,y,z,angle,roll,pitch,yaw\n1,2,3,4,5,6,7\n", ("row 1", "'angle' cannot stand beside 'roll'")),
+        ("x,y,z\n", ("trajectory.csv", "no rows")),
+        ("", ("trajectory.csv", "no rows")),
+        ("x,y,z\n" + "1,2,3\n" * 1001, ("trajectory.csv", "1001 rows", "at most 1000")),
+        ("x,y,z\n" + " " * 4_000_001, ("poses", "larger than 4 MB")),
+        ("\0", ("trajectory.csv",)),
+    ],
+)
+def test_faults_of_a_csv_file_name_file_row_and_column(
+    text: str, words: tuple[str, ...], tmp_path: Path, cli: Run
+) -> None:
+    written(tmp_path, text, "trajectory.csv")
+    code, out, err = cli("evaluate", written(tmp_path, 'poses = "trajectory.csv"\n' + HEAD + TASK))
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    for word in words:
+        assert word in err
+
+
+def test_faults_of_a_task_row(tmp_path: Path) -> None:
+    case = written(tmp_path, 'tasks = "tasks.csv"\n' + HEAD + POSE.replace("rotation = {}", ""))
+    for text, words in (
+        ("sense,axis_x,axis_y,axis_z,pitch\nmost,0,0,1,inf\n", "row 2, column sense"),
+        ("sense,axis_x,axis_y,axis_z,pitch\nmax,0,0,1,inf\nmax,0,0,0,inf\n", "row 3, columns axis_x, axis_y, axis_z"),
+        ("sense,axis_x,axis_y,axis_z,pitch\nmax,0,0,1,2\n", "row 2, point: is missing"),
+        ("sense,omega_x,omega_y,omega_z,v_x,v_y,v_z\nmax,0,0,0,0,0,0\n", "row 2, columns omega_x"),
+        (
+            "name,sense,omega_x,omega_y,omega_z,v_x,v_y,v_z\na,max,0,0,1,0,0,0\na,max,0,0,0,1,0,0\n",
+            "row 3, column name",
+        ),
+    ):
+        written(tmp_path, text, "tasks.csv")
+        with pytest.raises(InputError, match=f"^tasks.csv: {words}"):
+            load_case(case)
+
+
+def test_a_csv_file_that_is_not_there_or_not_alone(tmp_path: Path) -> None:
+    files = 'poses = "missing.csv"\n'
+    with pytest.raises(CaseError, match=r'^case.toml: poses = "missing.csv": cannot be read: No such file'):
+        load_case(written(tmp_path, files + HEAD + TASK))
+    with pytest.raises(CaseError, match=r"^case.toml: poses = .*: cannot stand beside \[\[pose\]\]"):
+        load_case(written(tmp_path, files + HEAD + POSE + TASK))
+    (tmp_path / "missing.csv").write_bytes(b"x,y,z\n\xff")
+    with pytest.raises(CaseError, match=r"^case.toml: poses = .*: cannot be read: it is not UTF-8"):
+        load_case(written(tmp_path, files + HEAD + TASK))
+
+
+# Rotations
+
+
+@pytest.mark.parametrize("angles", [(10, 20, 30), (0, 0, 0), (90, 90, 0), (-170, 80, 179), (180, 0, 0), (400, -95, 3)])
+def test_forms_of_a_rotation_are_one_rotation(angles: tuple[float, float, float], tmp_path: Path, cli: Run) -> None:
+    roll, pitch, yaw = angles
+    expected = turn("z", yaw) @ turn("y", pitch) @ turn("x", roll)
+
+    def matrix(rotation: str) -> np.ndarray:
+        return np.array(data(cli, "evaluate", rotated(tmp_path, rotation))["pose"]["rotation_matrix"])
+
+    assert np.allclose(matrix(f"rpy = {list(angles)}"), expected, rtol=0, atol=1e-14)
+    rows = [[float(f"{part:.8f}") for part in row] for row in expected]
+    assert np.allclose(matrix(f"matrix = {rows}"), expected, rtol=0, atol=2e-8)
+    # The quaternion of the same rotation, from axis and angle of the JSON result.
+    pose = data(cli, "evaluate", rotated(tmp_path, f"rpy = {list(angles)}"))["pose"]
+    half = math.radians(pose["angle"]) / 2
+    quaternion = [math.cos(half), *(math.sin(half) * part for part in pose["axis"])]
+    for sign in (1, -1):
+        given = [sign * part for part in quaternion]
+        assert np.allclose(matrix(f"quaternion = {given}"), expected, rtol=0, atol=1e-14)
+
+
+def test_forms_of_a_rotation_in_python() -> None:
+    by_matrix = Rotation.from_matrix(turn("x", 40))
+    by_angles = Rotation.from_rpy(math.radians(40), 0, 0)
+    by_quaternion = Rotation.from_quaternion([math.cos(math.radians(20)), math.sin(math.radians(20)), 0, 0])
+    for rotation in (by_matrix, by_angles, by_quaternion):
+        assert np.allclose(np.asarray(rotation.axis, dtype=np.float64), [1, 0, 0], rtol=0, atol=1e-15)
+        assert rotation.angle == pytest.approx(math.radians(40), abs=1e-15)
+    with pytest.raises(CaseError, match="orthogonal"):
+        Rotation.from_matrix(2 * np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("rotation", "words"),
+    [
+        ("matrix = [[1, 0, 0], [0, 1, 0.001], [0, 0, 1]]", ("pose.rotation.matrix", "orthogonal", "0.001")),
+        ("matrix = [[1, 0, 0], [0, 0, 1], [0, 1, 0]]", ("pose.rotation.matrix", "reflection")),
+        ("matrix = [[1e200, 0, 0], [0, 0, 1], [0, 1, 0]]", ("pose.rotation.matrix", "orthogonal")),
+        ("matrix = [[1, 0], [0, 1]]", ("pose.rotation.matrix",)),
+        ("matrix = 3", ("pose.rotation.matrix", "3 rows")),
+        ("quaternion = [1, 0, 0, 0.01]", ("pose.rotation.quaternion", "unit", "1.00005")),
+        ("quaternion = [0, 0, 0, 0]", ("pose.rotation.quaternion", "unit")),
+        ("quaternion = [1, 0, 0]", ("pose.rotation.quaternion", "4 entries")),
+        ("rpy = [1, 2]", ("pose.rotation.rpy", "3 entries")),
+        ("rpy = [1, 2, nan]", ("pose.rotation.rpy[2]", "finite")),
+        ("rpy = [1, 2, 3], angle = 3", ("pose.rotation.angle", "cannot stand beside rpy")),
+        ("quaternion = [1, 0, 0, 0], axis = [0, 0, 1]", ("pose.rotation.axis", "cannot stand beside quaternion")),
+        ("rpy = [1, 2, 3], quaternion = [1, 0, 0, 0]", ("pose.rotation.quaternion", "cannot stand beside rpy")),
+        ("axis = [0, 0, 1]", ("pose.rotation.angle", "is missing")),
+    ],
+)
+def test_rotations_that_are_refused(rotation: str, words: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
+    code, out, err = cli("evaluate", rotated(tmp_path, rotation))
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    for word in words:
+        assert word in err
+
+
+def test_the_schema_knows_files_and_forms_of_rotations(tmp_path: Path, cli: Run) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(cli("schema")[1])
+    good = [f'poses = "a.csv"\n{HEAD}{TASK}', f'tasks = "a.csv"\n{HEAD}{POSE.replace("rotation = {}", "")}']
+    forms = "rpy = [1, 2, 3]", "matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]", "quaternion = [1, 0, 0, 0]"
+    good += [Path(rotated(tmp_path, form)).read_text(encoding="utf-8") for form in forms]
+    for text in good:
+        jsonschema.validate(tomllib.loads(text), schema)
+    bad = [HEAD + TASK, f'poses = "a.csv"\n{HEAD}{POSE}{TASK}'.replace("rotation = {}", "")]
+    bad += [
+        Path(rotated(tmp_path, f"rpy = [1, 2, 3], {more}")).read_text(encoding="utf-8")
+        for more in ("angle = 1", "axis = [0, 0, 1]")
+    ]
+    for text in bad:
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(tomllib.loads(text), schema)
