@@ -24,6 +24,7 @@ import numpy as np
 from ...models import Dimension, FloatArray, frozen_array
 from ..case.task import Sense
 from ..program.nlp import Nlp
+from ..program.pairs import with_pairs_at
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
 from .linalg import echelon_basis
 
@@ -120,6 +121,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         nlp: the program.
         x: (n,) the point.
     """
+    nlp = with_pairs_at(nlp, [x])
     at = linearise(nlp, x)
     active = at.active()
     mu, stationarity = multipliers(at, active)

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.pairs import PairFamily
 from ..case.task import Sense
+from .kernel import Kernel, single_output
 from .program import Program
 
 if TYPE_CHECKING:
@@ -20,6 +23,14 @@ if TYPE_CHECKING:
 
 #: Golden section: its multiples modulo 1 are spread evenly over the unit interval.
 _GOLDEN = 0.6180339887498949
+
+
+class PairPlace(NamedTuple):
+    """Place of a pair of values: index of its family, and of its first and its second value in the family."""
+
+    family: int
+    first: int
+    second: int
 
 
 class Evaluation(NamedTuple):
@@ -81,6 +92,10 @@ class Nlp:
             equation.
         constant_limits: limits of the case that depend on no variable and hold, so that they are no constraints of the
             program.
+        families: limits on many pairs of values. Of their pairs only those in ``pairs`` are constraints; see
+            :mod:`.pairs`.
+        pairs: family, first and second index of these pairs; their constraints are the program's last.
+        pair_count: number of constraints that these pairs have.
         size: positive size of the objective, where the objective does not consist of the robot's F.
     """
 
@@ -94,6 +109,9 @@ class Nlp:
     g_lower: FloatArray
     g_upper: FloatArray
     constant_limits: tuple[BoundedConstraint, ...] = ()
+    families: tuple[PairFamily, ...] = ()
+    pairs: tuple[PairPlace, ...] = ()
+    pair_count: int = 0
     size: float | None = None
 
     @property
@@ -142,6 +160,12 @@ class Nlp:
             limit=np.array(limits, dtype=np.float64),
             equal=np.array([side.bound == "equal" for side in sides], dtype=bool),
         )
+
+    @cached_property
+    def family_values(self) -> Kernel[FloatArray]:
+        """``(x, p)`` to the values of all families one below the other, (sum of N, 1)."""
+        values = ca.densify(ca.vertcat(*[family.values for family in self.families]))
+        return Kernel(ca.Function("family_values", [self.program.x, self.program.p], [values]), single_output)
 
     def evaluate(self, x: FloatArray) -> Evaluation:
         """Return the objective and the constraints at a point (n,)."""

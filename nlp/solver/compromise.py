@@ -32,6 +32,7 @@ from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
 from ..program.nlp import Nlp
+from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
 from .multistart import SAME_VALUE, ProgramSolution, state_or_none
@@ -98,7 +99,7 @@ def combine(
     else:
         combined = _solve_combined(case, nlps, own, points, weights, solve_one)
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
-    at = linearise(nlps[0], x)
+    at = linearise(with_pairs_at(nlps[0], [x]), x)
     violated = tuple(dict.fromkeys(at.sides[j].name for j in np.flatnonzero(at.slack < -FEASIBLE)))
     if violated and status.is_answer:
         status = Status.INFEASIBLE
