@@ -257,7 +257,7 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
         return None
     back = correct_point(nlp, away, at.active())
     step = np.asarray((back.x - at.x) / nlp.scale, dtype=np.float64)
-    keeps_F = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= 1e-11
+    keeps_F = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= max(1e-11, nlp.rounding)
     return step if keeps_F and float(np.linalg.norm(step)) > _FLAT_STEP / 3 else None
 
 

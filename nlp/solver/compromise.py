@@ -35,7 +35,7 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
-from .multistart import SAME_VALUE, ProgramSolution, state_or_none
+from .multistart import ProgramSolution, same_value, state_or_none
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
 from .status import Status
@@ -162,7 +162,7 @@ def _solve_combined(
     # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
-    floor = 1e-3 * max(nlp.objective_scale for nlp in nlps)
+    floor = 1e-3 * max(nlp.objective_size for nlp in nlps)
     nlp = formulate_worst(case, weights, best, max(ceiling, floor))
     bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
     starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
@@ -216,7 +216,7 @@ def _known_members(solution: ProgramSolution) -> list[FloatArray]:
     """Return known members of an optimal set: one of each isolated optimum, every start's point on a connected set."""
     if not solution.optima:
         return [np.array(solution.x)]
-    tolerance = SAME_VALUE * solution.nlp.objective_scale
+    tolerance = same_value(solution.nlp)
     best = solution.optima[0].F
     if _is_set(solution):
         converged = [start for start in solution.starts if start.status is StartStatus.CONVERGED]
@@ -247,7 +247,7 @@ def _nearest_member(
         points = [found.x]
         for start in found.starts:
             back = correct_point(nlp, start.x, linearise(nlp, start.x).active())
-            kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
+            kept = abs(back.F - best) <= same_value(nlp) and back.violation <= FEASIBLE
             if kept and distance(back.x) < distance(closest):
                 closest = back.x
     return closest

@@ -251,6 +251,11 @@ def _status(evidence: Evidence, converged: bool) -> Status:
     return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
 
 
+def same_value(nlp: Nlp) -> float:
+    """Return the largest difference of F between optima that have the same F."""
+    return max(SAME_VALUE, nlp.rounding) * nlp.objective_scale
+
+
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
     """Return the robot at a point, or None where its equations have no value."""
     try:
@@ -278,7 +283,7 @@ def _distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> _
     while remaining:
         phase(Phase.EVIDENCE, len(converged) - len(remaining), len(converged))
         lead = remaining[0]
-        level = [start for start in remaining if abs(start.F - lead.F) <= SAME_VALUE * nlp.objective_scale]
+        level = [start for start in remaining if abs(start.F - lead.F) <= same_value(nlp)]
         evidence = examine(nlp, lead.x)
         # The lead is the first of its level, and so of its group.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED
