@@ -182,10 +182,10 @@ class _Search:
         """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
         if self.above is None or self.incumbent.x is None:
             return False
-        return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_scale
+        return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_size
 
     def _allowed_gap(self) -> _Gap:
-        floor, value = _NEAR_ZERO * self.form.nlp.objective_scale, abs(self.incumbent.value)
+        floor, value = _NEAR_ZERO * self.form.nlp.objective_size, abs(self.incumbent.value)
         if floor < value < math.inf:
             return _Gap(self.gap * value, is_relative=True)
         return _Gap(self.gap * floor, is_relative=False)

@@ -44,7 +44,7 @@ class Incumbent:
     @property
     def was_beaten(self) -> bool:
         """Whether the search has found a better point than the one given."""
-        return self.value > self._given + _BETTER * self._form.nlp.objective_scale
+        return self.value > self._given + _BETTER * self._form.nlp.objective_size
 
     def program_point(self) -> FloatArray:
         """Return the point (n,) in the program's variables; zeros without one."""
@@ -70,7 +70,7 @@ class Incumbent:
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
             raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
-        if claimed is not None and form.sign * claimed > value + _SAME_VALUE * nlp.objective_scale:
+        if claimed is not None and form.sign * claimed > value + _SAME_VALUE * nlp.objective_size:
             raise IncumbentError(f"the incumbent is said to have F = {claimed:.10g}, but has {form.sign * value:.10g}")
         self.x, self.value, self._given = point, value, value
 

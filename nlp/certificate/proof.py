@@ -31,6 +31,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..program.nlp import Nlp
+from ..program.pairs import with_all_pairs
 
 _FORMAT = "screwsynth-proof"
 _VERSION = 1
@@ -139,6 +140,7 @@ def read_proof(text: str, source: str) -> Proof:
 
 def fingerprint(nlp: Nlp) -> str:
     """Return SHA-256 of a program's expressions, as CasADi lists their operations, and of its arguments and bounds."""
+    nlp = with_all_pairs(nlp)
     program = nlp.program
     function = ca.Function("graph", [program.x, program.p], [ca.densify(program.objective), ca.densify(program.g)])
     digest = hashlib.sha256()

@@ -20,6 +20,7 @@ from casadi import SX
 
 from ...models import FloatArray, frozen_array
 from ..program.nlp import Nlp
+from ..program.pairs import with_all_pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +106,7 @@ class _BoundedExpression(NamedTuple):
 
 def standard_form(nlp: Nlp) -> StandardForm:
     """Return the standard form of a program with at least one variable."""
+    nlp = with_all_pairs(nlp)
     program = nlp.program
     x = SX.sym("x", nlp.n)
     F, g = program.values.call([x, SX(ca.DM(nlp.arguments))])

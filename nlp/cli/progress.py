@@ -48,16 +48,20 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
     from rich.progress import Progress
 
     from ..errors import one_line
+    from ..solver.phase import Phase
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        line = bar.add_task("starts", total=None)
+        line = bar.add_task("formulating", total=None)
 
         def show(name: str, done: int, total: int, best: float | None) -> None:
             label = "starts" if len(case.tasks) == 1 else escape(one_line(name))
             best_text = "" if best is None else f", best {best:.7g}"
             bar.update(line, completed=done, total=total, description=f"{label}{best_text}")
 
-        solution = solve(case, jobs=jobs, progress=show)
+        def show_phase(phase: Phase, done: int, total: int) -> None:
+            bar.update(line, completed=done, total=total, description=phase.value)
+
+        solution = solve(case, jobs=jobs, progress=show, phase=show_phase)
     return SolveOutcome(solution, solution, True)
 
 

@@ -30,6 +30,11 @@ ACTIVE = 1e-7
 STATIONARY = 1e-7
 #: Largest distance outside a side, in scaled variables, of a feasible point.
 FEASIBLE = 1e-9
+#: Gradient of a constraint, as a part of its typical size, that counts as zero.
+_NO_GRADIENT = 1e-9
+#: Rounding error of a constraint's distance, in rounding units of its bound, and the smallest that is allowed for.
+_ROUNDINGS = 4
+_NOTABLE = 1e-10
 #: Largest number of Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a
 #: change of the active set, or an optimum where F is flatter than a parabola, takes more.
 _NEWTON_STEPS = 40
@@ -60,6 +65,8 @@ class Linearisation:
         residual: (k,) signed residual ``expression - limit``, positive outside, as the same distance.
         normals: (k, n) outward unit normals in scaled variables; for an equation, the gradient's direction.
         per_unit: (k,) change of the slack per unit by which the limit of a side is relaxed.
+        noise: (k,) rounding error of the slack, where narrow ranges make it notable; else 0.
+        rounding: rounding error of the conditions of stationarity.
     """
 
     x: FloatArray
@@ -71,13 +78,15 @@ class Linearisation:
     residual: FloatArray
     normals: FloatArray
     per_unit: FloatArray
+    noise: FloatArray
+    rounding: float
 
     @property
     def violation(self) -> float:
         """Largest distance outside a side; 0 at a feasible point, ``inf`` where the program is not defined."""
         if not (np.isfinite(self.phi) and np.isfinite(self.slack).all()):
             return float("inf")
-        return float(max(0.0, -self.slack.min(initial=0.0)))
+        return float(max(0.0, -(self.slack + self.noise).min(initial=0.0)))
 
     def active(self, tolerance: float = ACTIVE) -> tuple[int, ...]:
         """Return the indices of the active set: the sides on which, or outside of which, the point lies.
@@ -95,11 +104,17 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     rows = jacobian * scale
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     # Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
-    sizes = np.where(sizes > 1e-9, sizes, 1.0)
+    typical = np.where(nlp.row_sizes > 0, np.minimum(nlp.row_sizes, 1.0), 1.0)
+    sizes = np.where(sizes > _NO_GRADIENT * typical, sizes, typical)
     per_unit = 1 / np.concatenate([scale, sizes])[sides.place]
     residual = sides.sign * (np.concatenate([x, g.ravel()])[sides.place] - sides.limit) * per_unit
     outward = sides.sign * per_unit
     normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[sides.place]
+    # Of a constraint the value is rounded, and the variables that it depends on are.
+    steps = np.abs(normals) @ (np.abs(x) / scale)
+    noise = _ROUNDINGS * np.finfo(float).eps * (np.abs(sides.limit) * per_unit + steps)
+    noise[sides.place < nlp.n] = 0.0
+    noise = np.where(noise > _NOTABLE, noise, 0.0)
     weight = nlp.sign / nlp.objective_scale
     return Linearisation(
         x=np.asarray(x, dtype=np.float64),
@@ -111,6 +126,8 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
         residual=residual,
         normals=normals,
         per_unit=per_unit,
+        noise=noise,
+        rounding=max(nlp.rounding, float(noise.max(initial=0.0))),
     )
 
 
@@ -202,7 +219,8 @@ def correct_point(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisati
             least = least if len(active_set) == count else np.inf
             continue
         wrong = np.where(nlp.sides.equal, 0.0, mu)
-        if not error <= _CONVERGED or wrong.min(initial=0.0) >= -_CONVERGED:
+        converged = max(_CONVERGED, 4 * at.rounding)
+        if not error <= converged or wrong.min(initial=0.0) >= -converged:
             break
         active_set.remove(int(np.argmin(wrong)))
         least = np.inf

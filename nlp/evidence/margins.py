@@ -18,6 +18,7 @@ import numpy as np
 from ...models import Dimension, FloatArray
 from ..case.limits.constraint import BoundedConstraint, Constraint
 from ..program.nlp import Nlp
+from ..program.pairs import pair_constraints, tightest_pairs, with_pairs_at
 from .kkt import FEASIBLE, linearise, multipliers
 from .state import RobotState, evaluate
 
@@ -66,6 +67,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     """
     if not nlp.case.limits:
         return []
+    nlp = with_pairs_at(nlp, [x])
     at = linearise(nlp, x)
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
@@ -93,14 +95,20 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
                 cost=float(gained[j] * constraint.reading.slope(limit)) if optimal else None,
             )
         )
-    return [*rows, *_constant(nlp, x, optimal=optimal)]
+    known = set(nlp.pairs)
+    other = [item for place in tightest_pairs(nlp, x) if place not in known for item in pair_constraints(nlp, place)]
+    return [
+        *rows,
+        *_without_cost(nlp, x, other, optimal=optimal),
+        *_without_cost(nlp, x, nlp.constant_limits, optimal=optimal),
+    ]
 
 
-def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
-    """Return the margins in the limits that hold whatever is chosen: they cost nothing."""
-    if not nlp.constant_limits:
+def _without_cost(nlp: Nlp, x: FloatArray, limits: Sequence[BoundedConstraint], *, optimal: bool) -> list[Margin]:
+    """Return the margins in limits that cost nothing: they hold whatever is chosen, or are pairs that do not bind."""
+    if not limits:
         return []
-    constraints = [item.constraint for item in nlp.constant_limits]
+    constraints = [item.constraint for item in limits]
     expressions = ca.vertcat(*[constraint.expression for constraint in constraints])
     function = ca.Function("constant", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
     measured = _measured(nlp, x, constraints, function(x, nlp.arguments).full().ravel())
@@ -116,7 +124,7 @@ def _constant(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
             violated=False,
             cost=0.0 if optimal else None,
         )
-        for item, value in zip(nlp.constant_limits, measured, strict=True)
+        for item, value in zip(limits, measured, strict=True)
         for bound, key, limit in _sides(item)
     ]
 

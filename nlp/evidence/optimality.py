@@ -24,6 +24,7 @@ import numpy as np
 from ...models import Dimension, FloatArray, frozen_array
 from ..case.task import Sense
 from ..program.nlp import Nlp
+from ..program.pairs import with_pairs_at
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
 from .linalg import echelon_basis
 
@@ -120,6 +121,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         nlp: the program.
         x: (n,) the point.
     """
+    nlp = with_pairs_at(nlp, [x])
     at = linearise(nlp, x)
     active = at.active()
     mu, stationarity = multipliers(at, active)
@@ -255,7 +257,7 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
         return None
     back = correct_point(nlp, away, at.active())
     step = np.asarray((back.x - at.x) / nlp.scale, dtype=np.float64)
-    keeps_F = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= 1e-11
+    keeps_F = back.violation <= FEASIBLE and abs(back.phi - at.phi) <= max(1e-11, nlp.rounding)
     return step if keeps_F and float(np.linalg.norm(step)) > _FLAT_STEP / 3 else None
 
 

@@ -61,6 +61,7 @@ def assemble(
         g_lower=frozen_vector([item.lower for item in bounded]),
         g_upper=frozen_vector([item.upper for item in bounded]),
         constant_limits=layout.constant_limits,
+        families=layout.families,
     )
     _check_limbs(nlp)
     return nlp

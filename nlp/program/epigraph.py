@@ -74,7 +74,7 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     points = starting_points(whole, _SIZE_POINTS, 0)
     states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
     sizes = [float(state.magnitude[0, 0]) for state in states if np.isfinite(state.magnitude).all()]
-    ceiling = max([*sizes, whole.objective_scale])
+    ceiling = max([*sizes, whole.objective_size])
     epigraph = _EpigraphBuilder(layout, Free(-ceiling, _LEVEL_BOUND * ceiling, ceiling / 2), ceiling)
     for k, robot in enumerate(layout.robots):
         slack = robot.F[0] - epigraph.level if sense is Sense.MAX else epigraph.level - robot.F[0]

@@ -38,6 +38,7 @@ from ...models import (
 )
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.pairs import PairFamily
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
@@ -71,6 +72,7 @@ class Layout:
         robots: the robot at each pose.
         constraints: constraints that depend on a variable, and limits that do not hold.
         constant_limits: limits that depend on no variable and hold.
+        families: limits on many pairs, which are no constraints yet.
     """
 
     case: Case
@@ -79,6 +81,7 @@ class Layout:
     robots: tuple[RobotInstance, ...]
     constraints: tuple[BoundedConstraint, ...]
     constant_limits: tuple[BoundedConstraint, ...] = ()
+    families: tuple[PairFamily, ...] = ()
 
 
 class _StatedPoseSymbols(NamedTuple):
@@ -174,7 +177,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
             for x, y, z in [placed.places]
         ),
     )
-    return Layout(case, table, places, tuple(robots), (*constraints, *limits.varying), limits.constant)
+    return Layout(case, table, places, tuple(robots), (*constraints, *limits.varying), limits.constant, limits.families)
 
 
 def _unknown_prefixes(case: Case) -> list[str]:

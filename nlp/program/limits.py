@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
@@ -15,8 +16,12 @@ from ...models import FloatArray, RobotInstance
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..case.limits.pairs import PairFamily
 from ..case.pose import Free
 
+#: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
+#: choice among them takes half of the time already.
+_ALL_PAIRS = 3
 #: Relative difference of two limits that are the same: rounding.
 _SAME = 1e-12
 #: How well a limit that depends on fixed numbers alone must hold: they are written with a dozen digits.
@@ -29,10 +34,12 @@ class LimitConstraints(NamedTuple):
     Attributes:
         varying: those that depend on the variables, and those that do not hold.
         constant: those that hold whatever is chosen, because they depend on fixed numbers alone.
+        families: constraints on many pairs, none of which is among ``varying``.
     """
 
     varying: tuple[BoundedConstraint, ...]
     constant: tuple[BoundedConstraint, ...]
+    families: tuple[PairFamily, ...] = ()
 
 
 class ProgramNumbers(NamedTuple):
@@ -58,7 +65,10 @@ def limit_constraints(
     if not case.limits:
         return LimitConstraints((), ())
     points = _points(numbers.bounds)
-    limits = _without_repeated(list(_constraints(case, robots, named)), numbers, points)
+    few, deferred = _sorted_families(list(_families(case, robots, named)), numbers)
+    limits = _without_repeated(list(_constraints(case, robots, named, few)), numbers, points)
+    if not limits:
+        return LimitConstraints((), (), deferred)
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
     x, p = numbers.x, numbers.p
     free = ca.which_depends(expressions, x, 1, True) if numbers.bounds else [False] * len(limits)
@@ -68,11 +78,47 @@ def limit_constraints(
     for item, varies, value in zip(limits, free, values, strict=True):
         holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
         (constant if holds and not varies else varying).append(item)
-    return LimitConstraints(tuple(varying), tuple(constant))
+    return LimitConstraints(tuple(varying), tuple(constant), deferred)
 
 
-def _constraints(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[BoundedConstraint]:
-    """Yield the constraints of every limit: of both plates, of the whole design, then of one pose after the other."""
+class _SortedFamilies(NamedTuple):
+    """Pairs that are constraints from the start, and families whose pairs become constraints when they are needed."""
+
+    pairs: list[tuple[BoundedConstraint, ...]]
+    deferred: tuple[PairFamily, ...]
+
+
+def _sorted_families(families: Sequence[PairFamily], numbers: ProgramNumbers) -> _SortedFamilies:
+    """Return all pairs of few values, the tightest pair of fixed values, and the families of many values."""
+    pairs: list[tuple[BoundedConstraint, ...]] = []
+    deferred: list[PairFamily] = []
+    for family in families:
+        count = int(family.values.numel())
+        if count <= _ALL_PAIRS:
+            pairs += [family.pair(a, b) for a, b in itertools.permutations(range(count), 2)]
+        elif numbers.bounds and any(ca.which_depends(family.values, numbers.x, 1, True)):
+            deferred.append(family)
+        else:
+            function = ca.Function("values", [numbers.x, numbers.p], [ca.densify(family.values)])
+            order = np.argsort(function(0, numbers.values).full().ravel(), kind="stable")
+            pairs.append(family.pair(int(order[0]), int(order[-1])))
+    return _SortedFamilies(pairs, tuple(deferred))
+
+
+def _families(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[PairFamily]:
+    """Yield the constraints on pairs of every limit."""
+    design = Design(case.as_limited, tuple(robots), named)
+    for limit in sorted(case.limits, key=attrgetter("order")):
+        yield from limit.on_pairs(design)
+
+
+def _constraints(
+    case: Case,
+    robots: Sequence[RobotInstance],
+    named: Mapping[str, SX],
+    pairs: Sequence[tuple[BoundedConstraint, ...]],
+) -> Iterator[BoundedConstraint]:
+    """Yield the constraints of every limit: of both plates, of the whole design, of few pairs, then of each pose."""
     limits = sorted(case.limits, key=attrgetter("order"))
     legs, model = robots[0].legs, case.model
     base = Plate("base", tuple(PlateJoint(leg.name, leg.base) for leg in legs))
@@ -83,6 +129,8 @@ def _constraints(case: Case, robots: Sequence[RobotInstance], named: Mapping[str
             yield from limit.on_plate(plate)
     for limit in limits:
         yield from limit.of_design(design)
+    for pair in pairs:
+        yield from pair
     for k, robot in enumerate(robots):
         tasks = tuple(task.name for task in case.tasks[: robot.rates.shape[1]])
         pose = PosedRobot(model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "")
@@ -107,10 +155,12 @@ def _without_repeated(
     function = ca.Function("limits", [numbers.x, numbers.p], [ca.densify(ca.vertcat(*measured))])
     columns = np.column_stack([function(point, numbers.values).full().ravel() for point in points])
     kept: list[int] = []
+    alike: dict[tuple[str, str], list[int]] = {}
     for i, row in enumerate(columns):
-        like = (j for j in kept if limits[j].constraint.keys == limits[i].constraint.keys)
-        if not any(np.allclose(columns[j], row, rtol=_SAME, atol=0.0) for j in like):
+        like = alike.setdefault(constraints[i].keys, [])
+        if not np.isclose(columns[like], row, rtol=_SAME, atol=0.0).all(axis=1).any():
             kept.append(i)
+            like.append(i)
     return [limits[i] for i in kept]
 
 

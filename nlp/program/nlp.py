@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.pairs import PairFamily
 from ..case.task import Sense
+from .kernel import Kernel, single_output
 from .program import Program
 
 if TYPE_CHECKING:
@@ -20,6 +23,23 @@ if TYPE_CHECKING:
 
 #: Golden section: its multiples modulo 1 are spread evenly over the unit interval.
 _GOLDEN = 0.6180339887498949
+#: Change of the objective between the bounds, as a part of its size, below which it is scaled by the change: tolerances
+#: of 1e-7 would be more than 2e-5 of all that can be gained. Ordinary cases have 0.01 to 1.
+_NARROW = 5e-3
+#: Smallest scale of the objective, as a part of its size: smaller changes drown in the rounding of its derivatives.
+_SMALLEST_CHANGE = 1e-8
+#: Number of points at which changes are measured.
+_POINTS = 9
+#: Rounding units by which an objective is inexact, beside its size: a few for each of its operations in a row.
+_ROUNDINGS = 16
+
+
+class PairPlace(NamedTuple):
+    """Place of a pair of values: index of its family, and of its first and its second value in the family."""
+
+    family: int
+    first: int
+    second: int
 
 
 class Evaluation(NamedTuple):
@@ -81,6 +101,10 @@ class Nlp:
             equation.
         constant_limits: limits of the case that depend on no variable and hold, so that they are no constraints of the
             program.
+        families: limits on many pairs of values. Of their pairs only those in ``pairs`` are constraints; see
+            :mod:`.pairs`.
+        pairs: family, first and second index of these pairs; their constraints are the program's last.
+        pair_count: number of constraints that these pairs have.
         size: positive size of the objective, where the objective does not consist of the robot's F.
     """
 
@@ -94,6 +118,9 @@ class Nlp:
     g_lower: FloatArray
     g_upper: FloatArray
     constant_limits: tuple[BoundedConstraint, ...] = ()
+    families: tuple[PairFamily, ...] = ()
+    pairs: tuple[PairPlace, ...] = ()
+    pair_count: int = 0
     size: float | None = None
 
     @property
@@ -143,6 +170,12 @@ class Nlp:
             equal=np.array([side.bound == "equal" for side in sides], dtype=bool),
         )
 
+    @cached_property
+    def family_values(self) -> Kernel[FloatArray]:
+        """``(x, p)`` to the values of all families one below the other, (sum of N, 1)."""
+        values = ca.densify(ca.vertcat(*[family.values for family in self.families]))
+        return Kernel(ca.Function("family_values", [self.program.x, self.program.p], [values]), single_output)
+
     def evaluate(self, x: FloatArray) -> Evaluation:
         """Return the objective and the constraints at a point (n,)."""
         F, g = self.program.kernels.values(x, self.arguments)
@@ -150,6 +183,42 @@ class Nlp:
 
     @cached_property
     def objective_scale(self) -> float:
+        """Scale of the objective: its size, or, where the ranges are narrow, what it changes by between the bounds.
+
+        The change is the largest sum of its scaled derivatives at a few points.
+        """
+        size = self.objective_size
+        # A free direction runs over its whole sphere: that is never narrow.
+        if not self.n or self.size is not None or self.program.places.directions:
+            return size
+        changes = [float(np.abs(row[0]).sum()) for row in self._scaled_rows]
+        change = max((each for each in changes if np.isfinite(each)), default=size)
+        return size if change >= _NARROW * size else max(change, _SMALLEST_CHANGE * size)
+
+    @cached_property
+    def rounding(self) -> float:
+        """Rounding error of the scaled objective and of its derivatives: of order 1e-15, and more for narrow ranges."""
+        return _ROUNDINGS * float(np.finfo(float).eps) * self.objective_size / self.objective_scale
+
+    @cached_property
+    def row_sizes(self) -> FloatArray:
+        """(c,) longest gradient of each constraint in scaled variables at a few points; 0 where there is none."""
+        rows = [np.linalg.norm(each[1:], axis=1) for each in self._scaled_rows]
+        return np.asarray(np.nan_to_num(np.array(rows), nan=0.0, posinf=0.0).max(axis=0), dtype=np.float64)
+
+    @cached_property
+    def _scaled_rows(self) -> list[FloatArray]:
+        """Derivatives (1 + c, n) of objective and constraints in scaled variables, at a few points of the box."""
+        shares = [np.zeros(self.n), *(2 * self._spread(k) for k in range(1, _POINTS))]
+        found = [self.program.kernels.derivatives(self.centre + self.scale * each, self.arguments) for each in shares]
+        return [np.vstack([each.gradient.reshape(1, -1), each.jacobian]) * self.scale for each in found]
+
+    def _spread(self, k: int) -> FloatArray:
+        """Return the k-th of evenly spread points (n,), in half ranges from the middle, k >= 1."""
+        return np.asarray(np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5, dtype=np.float64)
+
+    @cached_property
+    def objective_size(self) -> float:
         """Size of the objective without cancellation at the first starting point: positive also where F is 0.
 
         Where the robot is not defined at that point, as with limbs of zero length, the size is evaluated at the first
@@ -157,7 +226,7 @@ class Nlp:
         """
         if self.size is not None:
             return self.size
-        around = (np.modf(k * _GOLDEN * np.arange(1, self.n + 1))[0] - 0.5 for k in range(1, 9))
+        around = (self._spread(k) for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
             size = float(np.max(self.program.kernels.robot_state(x, self.arguments).magnitude))
             if np.isfinite(size) and size > 0:

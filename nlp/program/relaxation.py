@@ -18,12 +18,15 @@ from casadi import SX
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.limits.constraint import Constraint, Reading
 from ..case.task import Sense
-from .nlp import Nlp
+from .nlp import Nlp, PairPlace
+from .pairs import violated_pairs, with_pairs
 from .places import Scalar
 from .sampling import starting_points
 
 #: Relaxation above which a limit counts as relaxed, as a part of the limit's number.
 RELAXED = 1e-6
+#: Difference of two relaxations that is rounding error of their limits.
+_ROUNDING = 1e-9
 #: Number of points at which the necessary relaxation of each limit is evaluated for the upper bound of t.
 _BOUND_POINTS = 32
 #: Upper bound of t, as a multiple of the largest of these necessary relaxations.
@@ -133,6 +136,9 @@ def formulate_relaxation(nlp: Nlp) -> Nlp:
         start=frozen_vector([*nlp.start, *largest]),
         g_lower=frozen_vector(lower),
         g_upper=frozen_vector(upper),
+        families=(),
+        pairs=(),
+        pair_count=0,
         size=1.0,
     )
 
@@ -149,6 +155,24 @@ def relaxation_point(nlp: Nlp, x: FloatArray) -> FloatArray:
     """
     sides = _relaxable_sides(nlp)
     return np.append(x, _necessary_relaxations(nlp, sides, _keys(sides), x))
+
+
+def unrelaxed_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
+    """Return the pairs that a program lacks, where a point of its relaxation relaxes their limits too little.
+
+    Args:
+        nlp: the original program.
+        x: (n + k,) a point of the relaxation's program.
+    """
+    missing = violated_pairs(nlp, x[: nlp.n])
+    if not missing:
+        return []
+    given = dict(zip(_keys(_relaxable_sides(nlp)), x[nlp.n :], strict=True))
+    extended = with_pairs(nlp, missing)
+    sides = _relaxable_sides(extended)
+    keys = _keys(sides)
+    needed = zip(keys, _necessary_relaxations(extended, sides, keys, x[: nlp.n]), strict=True)
+    return missing if any(t > given.get(key, 0.0) + _ROUNDING for key, t in needed) else []
 
 
 def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[RelaxedLimit, ...]:

@@ -18,6 +18,7 @@ from ..case.case import Case
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
+from ..program.pairs import with_pairs_at
 from .jsondata import Vector, matrix, vector
 from .parts import (
     SCHEMA,
@@ -218,6 +219,7 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
 
     Violations a thousand times smaller than the worst are left out: a failed solve leaves them beside the worst.
     """
+    nlp = with_pairs_at(nlp, [x])
     at, g = linearise(nlp, x), nlp.evaluate(x)[1]
     units = nlp.case.units
     rows: list[ViolationData] = []

@@ -32,9 +32,10 @@ from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
 from ..program.nlp import Nlp
+from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
-from .multistart import SAME_VALUE, ProgramSolution, state_or_none
+from .multistart import ProgramSolution, same_value, state_or_none
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
 from .status import Status
@@ -97,7 +98,7 @@ def combine(
     else:
         combined = _solve_combined(case, nlps, own, points, weights, solve_one)
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
-    at = linearise(nlps[0], x)
+    at = linearise(with_pairs_at(nlps[0], [x]), x)
     violated = tuple(dict.fromkeys(at.sides[j].name for j in np.flatnonzero(at.slack < -FEASIBLE)))
     if violated and status.is_answer:
         status = Status.INFEASIBLE
@@ -162,7 +163,7 @@ def _solve_combined(
     # No level can exceed the least of the tasks' own maxima, nor be worse than that of the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
-    floor = 1e-3 * max(nlp.objective_scale for nlp in nlps)
+    floor = 1e-3 * max(nlp.objective_size for nlp in nlps)
     nlp = formulate_worst(case, weights, best, max(ceiling, floor))
     bounded = np.clip(levels, nlp.lower[-1], nlp.upper[-1])
     starts = [np.append(x, level) for x, level in zip(first, bounded, strict=True)]
@@ -216,7 +217,7 @@ def _known_members(solution: ProgramSolution) -> list[FloatArray]:
     """Return known members of an optimal set: one of each isolated optimum, every start's point on a connected set."""
     if not solution.optima:
         return [np.array(solution.x)]
-    tolerance = SAME_VALUE * solution.nlp.objective_scale
+    tolerance = same_value(solution.nlp)
     best = solution.optima[0].F
     if _may_be_connected(solution):
         converged = [start for start in solution.starts if start.status is StartStatus.CONVERGED]
@@ -247,7 +248,7 @@ def _nearest_member(
         points = [found.x]
         for start in found.starts:
             back = correct_point(nlp, start.x, linearise(nlp, start.x).active())
-            kept = abs(back.F - best) <= SAME_VALUE * nlp.objective_scale and back.violation <= FEASIBLE
+            kept = abs(back.F - best) <= same_value(nlp) and back.violation <= FEASIBLE
             if kept and distance(back.x) < distance(closest):
                 closest = back.x
     return closest

@@ -21,6 +21,8 @@ from .interface import LocalSearch, SolverResult, StopReason
 TOLERANCE = 1e-8
 #: Number of starting points at which the size of each constraint is measured.
 _SAMPLED = 4
+#: Length of a gradient in scaled variables below which ranges are narrow: an ordinary rotation of 3 degrees has 1e-3.
+_SHORT = 1e-4
 _REASONS = {
     "Solve_Succeeded": StopReason.SUCCEEDED,
     "Maximum_Iterations_Exceeded": StopReason.ITERATION_LIMIT,
@@ -65,14 +67,15 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
 def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
     """Return (c,) typical lengths of each limit's gradient in scaled variables; divided by them, rows are of order 1.
 
-    The rows of the program's other constraints are of order 1 already: their length is 1.
+    The program's other constraints are of order 1 already, and have 1, except where narrow ranges make them small.
     """
     jacobians = [nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_SAMPLED]]
     rows = np.array(jacobians) * nlp.scale
     lengths = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
     lengths = np.where(np.isfinite(lengths), lengths, 0.0).max(axis=0, initial=0.0)
     limits = np.array([any(constraint.keys) for constraint in nlp.program.constraints], dtype=bool)
-    return np.where(limits & (lengths > 0), lengths, 1.0)
+    lengths = np.maximum(lengths, np.where(limits, 0.0, nlp.row_sizes))
+    return np.where((limits & (lengths > 0)) | ((lengths > 0) & (lengths < _SHORT)), lengths, 1.0)
 
 
 def _scaled_problem(nlp: Nlp) -> dict[str, SX]:

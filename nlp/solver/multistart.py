@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -16,11 +16,19 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
 from ..interruption import Milestone, is_requested, reached
-from ..program.nlp import Nlp
-from ..program.relaxation import RelaxedLimit, formulate_relaxation, relaxation_point, relaxed_limits
+from ..program.nlp import Nlp, PairPlace
+from ..program.pairs import violated_pairs, with_pairs, with_pairs_at
+from ..program.relaxation import (
+    RelaxedLimit,
+    formulate_relaxation,
+    relaxation_point,
+    relaxed_limits,
+    unrelaxed_pairs,
+)
 from ..program.sampling import starting_points
 from .interface import Solver
 from .ipopt import ipopt
+from .phase import Phase, PhaseProgress, no_phase
 from .starts import SAME_POINT, Start, StartStatus, search_from
 from .status import Status
 
@@ -105,6 +113,7 @@ def solve_program(
     jobs: int | None = None,
     progress: Progress | None = None,
     solver: Solver = ipopt,
+    phase: PhaseProgress = no_phase,
 ) -> ProgramSolution:
     """Solve a program; where its limits seem to contradict each other, find the smallest relaxation.
 
@@ -115,32 +124,46 @@ def solve_program(
         jobs: number of threads; the result does not depend on it. Left out, as many as there are processors and work.
         progress: called after each start.
         solver: the local solver that searches from each starting point.
+        phase: called with the phase of the solve, and how far it is.
 
     Raises:
         InputError: the objective is to be compiled, and there is no C compiler or it fails.
     """
     began = time.perf_counter()
-    solution = _search(nlp, search, first, jobs, progress, solver)
+    solution = _search(nlp, search, first, jobs, progress, solver, phase)
+    nlp = solution.nlp
     limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
     if solution.status is not Status.INFEASIBLE or not limited:
         return solution
-    elastic = formulate_relaxation(nlp)
-    points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
     few = replace(search, starts=min(search.starts, _ELASTIC_STARTS))
-    relaxed = _search(elastic, few, points, jobs, None, solver)
-    # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it need not
-    # count as converged: a feasible point is enough.
-    feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
-    if is_requested():
-        return replace(solution, status=Status.INTERRUPTED, seconds=time.perf_counter() - began)
-    if not feasible:
-        return replace(solution, seconds=time.perf_counter() - began)
-    least = min(feasible, key=lambda start: start.F)
+    missing: Sequence[PairPlace] = ()
+    while True:
+        nlp = with_pairs(nlp, missing)
+        phase(Phase.RELAXATION, 0, few.starts)
+        elastic = formulate_relaxation(nlp)
+        points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
+        relaxed = _search(elastic, few, points, jobs, _during_relaxation(phase), solver, no_phase)
+        # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it
+        # need not count as converged: a feasible point is enough.
+        feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
+        if is_requested():
+            return replace(solution, status=Status.INTERRUPTED, seconds=time.perf_counter() - began)
+        if not feasible:
+            return replace(solution, seconds=time.perf_counter() - began)
+        least = min(feasible, key=lambda start: start.F)
+        missing = unrelaxed_pairs(nlp, least.x)
+        if not missing:
+            break
     moved = relaxed_limits(nlp, least.x)
     if not moved:
         # All limits can hold at once: the first search only missed the feasible set, which this point lies in.
-        solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver)
+        solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver, phase)
     return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
+
+
+def _during_relaxation(phase: PhaseProgress) -> Progress:
+    """Return the progress of the search for the smallest relaxation."""
+    return lambda done, total, _best: phase(Phase.RELAXATION, done, total)
 
 
 def _search(
@@ -150,27 +173,39 @@ def _search(
     jobs: int | None,
     progress: Progress | None,
     solver: Solver,
+    phase: PhaseProgress,
 ) -> ProgramSolution:
-    """Search a program from the first points and from sampled ones."""
+    """Search a program from the first points and from sampled ones.
+
+    Of limits on many pairs, the program has those that the starting points violate, and gets those that the starts'
+    ends violate; such starts are repeated until none is left.
+    """
     began = time.perf_counter()
     if nlp.n == 0:
         return _evaluate_without_variables(nlp, search, began)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
-    done: list[Start] = []
-    best: float | None = None
-    for start in search_from(nlp, points, search, jobs, solver):
-        done.append(start)
-        if start.status is StartStatus.CONVERGED and (best is None or nlp.sign * start.F < nlp.sign * best):
-            if best is None:
+    nlp = with_pairs_at(nlp, points)
+    found: dict[int, Start] = {}
+    left = list(range(len(points)))
+    while left and not is_requested():
+        phase(Phase.STARTS, len(found), len(points))
+        # Interrupted searches end before the last point.
+        for k, start in zip(left, search_from(nlp, points[left], search, jobs, solver), strict=False):
+            if not found and start.status is StartStatus.CONVERGED:
                 examine(nlp, start.x)  # what this compiles is at hand when the search is interrupted
-            best = start.F
-        reached(Milestone.START)
-        if progress is not None:
-            progress(len(done), len(points), best)
+            found[k] = start
+            reached(Milestone.START)
+            if progress is not None:
+                progress(len(found), len(points), _best_value(nlp, found.values()))
+        missing = {k: violated_pairs(nlp, start.x) for k, start in found.items()}
+        nlp = with_pairs(nlp, [place for places in missing.values() for place in places])
+        left = [k for k, places in sorted(missing.items()) if places]
+        found = {k: start for k, start in found.items() if k not in left}
     interrupted = is_requested()
-    if not done:  # interrupted before the first start was done
+    if not found:  # interrupted before the first start was done
         return _at_the_start(nlp, search, began)
-    starts, optima = _distinct_optima(nlp, done)
+    done = [found[k] for k in sorted(found)]
+    starts, optima = _distinct_optima(nlp, done, phase)
     better = _find_better_start(nlp, starts, optima)
     if optima and better is None:
         x, evidence = optima[0].x, optima[0].evidence
@@ -195,6 +230,12 @@ def _at_the_start(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
     x, seconds = frozen_array(nlp.start, (nlp.n,)), time.perf_counter() - began
     state, evidence = state_or_none(nlp, x), examine(nlp, x)
     return ProgramSolution(Status.INTERRUPTED, nlp, x, state, evidence, (), (), search.seed, seconds)
+
+
+def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
+    """Return the best objective of converged starts, or None where there is none."""
+    values = [nlp.sign * start.F for start in starts if start.status is StartStatus.CONVERGED]
+    return nlp.sign * min(values) if values else None
 
 
 def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
@@ -228,6 +269,11 @@ def _status(evidence: Evidence, converged: bool) -> Status:
     return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
 
 
+def same_value(nlp: Nlp) -> float:
+    """Return the largest difference of F between optima that have the same F."""
+    return max(SAME_VALUE, nlp.rounding) * nlp.objective_scale
+
+
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
     """Return the robot at a point, or None where its equations have no value."""
     try:
@@ -243,8 +289,8 @@ class _Distinct(NamedTuple):
     optima: list[Optimum]
 
 
-def _distinct_optima(nlp: Nlp, done: Sequence[Start]) -> _Distinct:
-    """Group converged starts by value and point, and examine one point of each group.
+def _distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> _Distinct:
+    """Group converged starts by value and point, and examine one point of each group, once.
 
     Where an optimum is not isolated, all points of its F count as one set; it may have several pieces.
     """
@@ -253,8 +299,9 @@ def _distinct_optima(nlp: Nlp, done: Sequence[Start]) -> _Distinct:
     converged = [start for start in done if start.status is StartStatus.CONVERGED]
     remaining = sorted(converged, key=lambda start: nlp.sign * start.F)
     while remaining:
+        phase(Phase.EVIDENCE, len(converged) - len(remaining), len(converged))
         lead = remaining[0]
-        level = [start for start in remaining if abs(start.F - lead.F) <= SAME_VALUE * nlp.objective_scale]
+        level = [start for start in remaining if abs(start.F - lead.F) <= same_value(nlp)]
         evidence = examine(nlp, lead.x)
         # The lead is the first start of the level, and so of the first group: its evidence serves that group.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED

@@ -13,10 +13,12 @@ from ..case.settings import Search
 from ..errors import CaseError
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
+from ..program.pairs import with_shared_pairs
 from .compromise import combine, solution_of_one_task
 from .interface import Solver
 from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
+from .phase import Phase, PhaseProgress, no_phase
 from .solution import Solution
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
@@ -33,6 +35,7 @@ def solve(
     compiled: bool = False,
     progress: SolveProgress | None = None,
     solver: Solver = ipopt,
+    phase: PhaseProgress = no_phase,
 ) -> Solution:
     """Solve a case: its task, or each of several and then all of them by the method that the case names.
 
@@ -44,6 +47,7 @@ def solve(
         compiled: whether Ipopt calls the objective as compiled C.
         progress: called after each start.
         solver: the local solver that searches from each starting point.
+        phase: called with the phase of the solve, and how far it is.
 
     Raises:
         CaseError: the case contradicts itself, or has several tasks and nothing free.
@@ -51,7 +55,9 @@ def solve(
     """
     began = time.perf_counter()
     search = case.search.but(starts, seed, compiled=compiled)
-    solution = solve_programs(case, formulate_each(case), search, jobs=jobs, progress=progress, solver=solver)
+    phase(Phase.FORMULATING, 0, len(case.tasks))
+    nlps = formulate_each(case)
+    solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)
     return replace(solution, seconds=time.perf_counter() - began)
 
 
@@ -63,6 +69,7 @@ def solve_programs(
     jobs: int | None = None,
     progress: SolveProgress | None = None,
     solver: Solver = ipopt,
+    phase: PhaseProgress = no_phase,
 ) -> Solution:
     """Solve a case whose programs, one for each task, are formulated already.
 
@@ -73,6 +80,7 @@ def solve_programs(
         jobs: as for :func:`solve`.
         progress: as for :func:`solve`.
         solver: as for :func:`solve`.
+        phase: as for :func:`solve`.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
@@ -82,12 +90,14 @@ def solve_programs(
 
     def solve_one(name: str, nlp: Nlp, first: Sequence[FloatArray] = ()) -> ProgramSolution:
         after_start = None if progress is None else partial(progress, name)
-        return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver)
+        return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
     if len(nlps) > 1 and nlps[0].n == 0:
         raise CaseError("robot", "has nothing free, so there is nothing to bring together", source=case.source)
     own = [solve_one(task.name, nlp) for nlp, task in zip(nlps, case.tasks, strict=True)]
     if len(nlps) > 1:
+        pairs = [place for solution in own for place in solution.nlp.pairs]
+        nlps = with_shared_pairs(nlps, pairs)
         polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
         return replace(combine(case, nlps, own, solve_one, polish), seconds=time.perf_counter() - began)
     return solution_of_one_task(case, own[0])

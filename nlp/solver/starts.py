@@ -165,10 +165,10 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
         # A correction that makes F worse leads to another stationary point.
-        kept = corrected.phi <= raw.phi + _WORSE or raw.violation > FEASIBLE
+        kept = corrected.phi <= raw.phi + max(_WORSE, nlp.rounding) or raw.violation > FEASIBLE
         if kept and (corrected.violation, left) <= (max(at.violation, FEASIBLE), stationarity):
             at, stationarity = corrected, left
-        if kept and corrected.violation <= FEASIBLE and left <= _POLISHED:
+        if kept and corrected.violation <= FEASIBLE and left <= max(_POLISHED, corrected.rounding):
             break
     if at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED

@@ -37,7 +37,7 @@ def program_of(
         model=donor.program.model,
         places=Places(numbers=(), rotations=(), unknowns=(), twists=()),
     )
-    nlp = Nlp(
+    return Nlp(
         program=program,
         case=donor.case,
         sense=sense,
@@ -47,9 +47,8 @@ def program_of(
         start=np.array([(lower + upper) / 2 for lower, upper in bounds], dtype=float),
         g_lower=np.array([lower for _, _, lower, _ in rows], dtype=float),
         g_upper=np.array([upper for _, _, _, upper in rows], dtype=float),
+        size=1.0,  # the donor robot's size means nothing here
     )
-    nlp.__dict__["objective_scale"] = 1.0  # the donor robot's size means nothing here
-    return nlp
 
 
 def test_strict_minimum_inside() -> None:

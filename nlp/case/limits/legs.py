@@ -2,17 +2,19 @@
 
 A leg's length is limited by its square, ``min^2 <= |d|^2 <= max^2``. An actuator's limits are written by pairs of
 poses, because ``longest - shortest <= s`` means ``l_i - l_j <= s`` for all of them, and ``shortest >= e + stroke``
-means ``2 l_i - l_j >= e``. No extra unknowns are needed.
+means ``2 l_i - l_j >= e``. No extra unknowns are needed, and of many pairs only those that can bind become constraints.
 """
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Self
 
 import casadi as ca
+from casadi import SX
 from pydantic import Field, FiniteFloat
 
 from ....models import Model
@@ -21,6 +23,7 @@ from ..table import Table
 from .constraint import LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
 from .interval import IntervalLimit
 from .limit import Design, Limit, LimitedCase, PosedRobot, Written
+from .pairs import PairFamily
 from .quantity import QuantityLimit, quantity_named
 
 
@@ -90,15 +93,35 @@ class Actuator(Limit[ActuatorTable]):
             raise CaseError("limits.actuator", "must have stroke_max or dead_length")
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
-        """Return the stroke and the dead length of each leg, for each pair of poses."""
-        robots = design.robots
-        for i, leg in enumerate(robots[0].legs):
-            lengths = [ca.norm_2(robot.legs[i].span) for robot in robots]
-            for (a, shorter), (b, longer) in itertools.product(enumerate(lengths), repeat=2):
-                pair = f" limb {leg.name}" + (f" poses {a + 1} and {b + 1}" if len(robots) > 1 else "")
-                if self.stroke_max is not None and a != b:
-                    key = "actuator.stroke_max"
-                    yield bounded(f"{key}{pair}", longer - shorter, LENGTH, ("", key), upper=self.stroke_max)
-                if self.dead_length is not None and (a != b or len(robots) == 1):
-                    key = "actuator.dead_length"
-                    yield bounded(f"{key}{pair}", 2 * shorter - longer, LENGTH, (key, ""), lower=self.dead_length)
+        """Return the dead length of each leg at a single pose, where it has no stroke."""
+        if len(design.robots) == 1 and self.dead_length is not None:
+            key = "actuator.dead_length"
+            for leg in design.robots[0].legs:
+                length = ca.norm_2(leg.span)
+                yield bounded(f"{key} limb {leg.name}", length, LENGTH, (key, ""), lower=self.dead_length)
+
+    def on_pairs(self, design: Design) -> Iterator[PairFamily]:
+        """Return the stroke and the dead length of each leg, for all pairs of poses."""
+        if len(design.robots) == 1:
+            return
+        for i, leg in enumerate(design.robots[0].legs):
+            lengths = ca.vertcat(*[ca.norm_2(robot.legs[i].span) for robot in design.robots])
+            yield PairFamily(lengths, partial(self._pair, leg.name, lengths), self._slack)
+
+    def _pair(self, leg: str, lengths: SX, a: int, b: int) -> tuple[BoundedConstraint, ...]:
+        """Return the constraints on a leg, with its lengths (N, 1), that is shorter at pose ``a`` than at ``b``."""
+        where, limits = f" limb {leg} poses {a + 1} and {b + 1}", []
+        shorter, longer = lengths[a], lengths[b]
+        if self.stroke_max is not None:
+            key = "actuator.stroke_max"
+            limits.append(bounded(f"{key}{where}", longer - shorter, LENGTH, ("", key), upper=self.stroke_max))
+        if self.dead_length is not None:
+            key = "actuator.dead_length"
+            limits.append(bounded(f"{key}{where}", 2 * shorter - longer, LENGTH, (key, ""), lower=self.dead_length))
+        return tuple(limits)
+
+    def _slack(self, shorter: float, longer: float) -> float:
+        """Return the least distance to the limits of two lengths of a leg, negative outside."""
+        stroke = math.inf if self.stroke_max is None else self.stroke_max - (longer - shorter)
+        dead = math.inf if self.dead_length is None else 2 * shorter - longer - self.dead_length
+        return min(stroke, dead)

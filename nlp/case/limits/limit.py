@@ -21,6 +21,7 @@ from ...errors import CaseError
 from ...units import Units
 from ..checks import check_real
 from .constraint import BoundedConstraint
+from .pairs import PairFamily
 
 if TYPE_CHECKING:
     from ..table import Table
@@ -167,7 +168,7 @@ class Limit(abc.ABC, Generic[TableT]):
 
     A subclass is a frozen dataclass whose fields are the limit's numbers. It states the class attributes below, builds
     itself from its table, checks its numbers, and yields its constraints from those of :meth:`on_plate`,
-    :meth:`of_design` and :meth:`at_pose` that concern it.
+    :meth:`of_design`, :meth:`on_pairs` and :meth:`at_pose` that concern it.
 
     Attributes:
         key: its key in ``[limits]``; empty for a type whose limits have keys of their own.
@@ -248,6 +249,10 @@ class Limit(abc.ABC, Generic[TableT]):
 
     def of_design(self, design: Design) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - most limits have none
         """Return this limit's constraints on the case's numbers, or on several poses together."""
+        return ()
+
+    def on_pairs(self, design: Design) -> Iterable[PairFamily]:  # noqa: ARG002 - most limits have none
+        """Return this limit's constraints on all pairs of many values, such as a leg's lengths at the poses."""
         return ()
 
     def at_pose(self, pose: PosedRobot) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - some limits have none

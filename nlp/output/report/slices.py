@@ -17,6 +17,7 @@ from ...evidence.kkt import FEASIBLE
 from ...evidence.state import ZERO_F
 from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
+from ...program.pairs import with_pairs_at
 
 #: Points along a line, and along each side of a plane: odd, so that the middle of the range is among them.
 _LINE, _PLANE = 121, 41
@@ -156,6 +157,7 @@ class _Values(NamedTuple):
 
 def _values(nlp: Nlp, points: FloatArray) -> _Values:
     """Return F and the constraints' state at points (n, k)."""
+    nlp = with_pairs_at(nlp, points.T)
     epigraph = nlp.program.places.epigraph
     if epigraph is not None and len(nlp.program.robots) > 1:
         points[epigraph.level] = exact_levels(nlp, points)

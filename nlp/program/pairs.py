@@ -1,0 +1,144 @@
+"""Limits on many pairs of values, of which only those that a point would violate become constraints.
+
+A stroke over N poses limits ``N (N - 1)`` pairs of lengths for each leg. A program without some of them has a larger
+feasible set. An optimum of it that keeps every pair is therefore an optimum of the whole program too. So a solver
+searches a program with few pairs, adds those that its points violate, and searches again until there is none.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from ...models import FloatArray, frozen_vector
+from ..case.limits.constraint import BoundedConstraint
+from .nlp import Nlp, PairPlace
+from .sampling import starting_points
+
+#: Violation of a pair, as a part of the largest value of its family, above which it is no rounding of the values.
+_ROUNDING = 1e-13
+#: Relative difference of two constraints that are the same: rounding.
+_SAME = 1e-12
+#: Number of points at which constraints are compared, and one more: the first may be one that a symmetry singles out.
+_POINTS = 4
+
+
+def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
+    """Return a program with the tightest pair of each family that a point violates; the same program if it has them.
+
+    Args:
+        nlp: the program.
+        points: each (n,).
+    """
+    missing = [place for x in points for place in violated_pairs(nlp, x)] if nlp.families else []
+    return with_pairs(nlp, missing) if missing else nlp
+
+
+def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
+    """Return a program with further pairs as its last constraints; the same program where it has them all.
+
+    Two pairs of a symmetric robot may be the same function, and become one constraint.
+    """
+    known = set(nlp.pairs)
+    fresh = [place for place in dict.fromkeys(places) if place not in known]
+    if not fresh:
+        return nlp
+    added = _without_repeated(nlp, [item for place in fresh for item in pair_constraints(nlp, place)])
+    program = replace(nlp.program, constraints=(*nlp.program.constraints, *(item.constraint for item in added)))
+    return replace(
+        nlp,
+        program=program,
+        g_lower=frozen_vector([*nlp.g_lower, *(item.lower for item in added)]),
+        g_upper=frozen_vector([*nlp.g_upper, *(item.upper for item in added)]),
+        pairs=(*nlp.pairs, *fresh),
+        pair_count=nlp.pair_count + len(added),
+    )
+
+
+def with_shared_pairs(nlps: Sequence[Nlp], places: Iterable[PairPlace]) -> list[Nlp]:
+    """Return programs that share their symbols with further pairs, sharing their symbols again."""
+    first = with_pairs(nlps[0], places)
+    return [replace(first, arguments=nlp.arguments, sense=nlp.sense) for nlp in nlps]
+
+
+def with_all_pairs(nlp: Nlp) -> Nlp:
+    """Return a program with every pair of its families, in an order that does not depend on the pairs that it has."""
+    if not nlp.families:
+        return nlp
+    places = [
+        PairPlace(k, a, b)
+        for k, family in enumerate(nlp.families)
+        for a, b in itertools.permutations(range(int(family.values.numel())), 2)
+    ]
+    return nlp if list(nlp.pairs) == places else with_pairs(without_pairs(nlp), places)
+
+
+def without_pairs(nlp: Nlp) -> Nlp:
+    """Return a program without the pairs of its families."""
+    count = len(nlp.program.constraints) - nlp.pair_count
+    return replace(
+        nlp,
+        program=replace(nlp.program, constraints=nlp.program.constraints[:count]),
+        g_lower=frozen_vector(nlp.g_lower[:count]),
+        g_upper=frozen_vector(nlp.g_upper[:count]),
+        pairs=(),
+        pair_count=0,
+    )
+
+
+def tightest_pairs(nlp: Nlp, x: FloatArray) -> Iterator[PairPlace]:
+    """Yield the tightest pair of each family at a point (n,): its smallest and its largest value."""
+    for k, values in enumerate(_values(nlp, x)):
+        order = np.argsort(values, kind="stable")
+        if np.isfinite(values).all():
+            yield PairPlace(k, int(order[0]), int(order[-1]))
+
+
+def violated_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
+    """Return the tightest pair of each family that a point (n,) violates and that is no constraint of the program."""
+    if not nlp.families:
+        return []
+    values, known = _values(nlp, x), set(nlp.pairs)
+    found = []
+    for place in tightest_pairs(nlp, x):
+        least, most = (float(values[place.family][k]) for k in (place.first, place.second))
+        if place not in known and nlp.families[place.family].slack(least, most) < -_ROUNDING * abs(most):
+            found.append(place)
+    return found
+
+
+def pair_constraints(nlp: Nlp, place: PairPlace) -> tuple[BoundedConstraint, ...]:
+    """Return the constraints on one pair."""
+    return nlp.families[place.family].pair(place.first, place.second)
+
+
+def _values(nlp: Nlp, x: FloatArray) -> list[FloatArray]:
+    """Return the values (N,) of each family at a point (n,)."""
+    if not nlp.families:
+        return []
+    sizes = [int(family.values.numel()) for family in nlp.families]
+    return np.split(nlp.family_values(x, nlp.arguments).ravel(), np.cumsum(sizes)[:-1])
+
+
+def _without_repeated(nlp: Nlp, added: Sequence[BoundedConstraint]) -> list[BoundedConstraint]:
+    """Return new constraints on pairs without those that only repeat another or a pair that the program has."""
+    known = nlp.program.constraints[len(nlp.program.constraints) - nlp.pair_count :]
+    constraints = [*known, *(item.constraint for item in added)]
+    expressions = ca.densify(ca.vertcat(*[each.expression for each in constraints]))
+    function = ca.Function("pairs", [nlp.program.x, nlp.program.p], [expressions])
+    points = starting_points(nlp, _POINTS, 0)[1:]
+    rows = np.column_stack([function(x, nlp.arguments).full().ravel() for x in points])
+    alike: dict[tuple[str, str], list[int]] = {}
+    kept = []
+    for i, (each, row) in enumerate(zip(constraints, rows, strict=True)):
+        like = alike.setdefault(each.keys, [])
+        if i >= len(known) and np.isclose(rows[like], row, rtol=_SAME, atol=0.0).all(axis=1).any():
+            continue
+        like.append(i)
+        if i >= len(known):
+            kept.append(added[i - len(known)])
+    return kept
