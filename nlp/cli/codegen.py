@@ -12,22 +12,12 @@ from .options import CaseName
 def codegen(
     case: CaseName,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
-    language: Annotated[str, typer.Option(help="c is the only one.")] = "c",
-    precision: Annotated[str, typer.Option(help="double is the only one.")] = "double",
 ) -> None:
     """Write F and its derivatives as C for embedding."""
     from ..case.reader import find_case, load_case
     from ..embedding.codegen import generate_c
-    from ..errors import InputError
     from ..output.files import read_text, write_folder
 
-    if language != "c":
-        raise InputError(f"--language {language}: only c is generated")
-    if precision != "double":
-        raise InputError(
-            f"--precision {precision}: only double is generated; in single precision, optimising over these functions "
-            "was tried and fails"
-        )
     files = generate_c(load_case(case), read_text(str(find_case(case))))
     write_folder(out, files)
     typer.echo(f"{len(files)} files in {out}: make -C {out} test")
