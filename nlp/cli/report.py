@@ -31,6 +31,7 @@ def report(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_target(out)
     check_library("plotly", "reports")
+    check_library("matplotlib", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
     from ..results.regression import check_case

@@ -22,8 +22,9 @@ def report(found: Solution | Certified, *, text: str = _NO_CASE_FILE, check: Cas
         check: published and expected numbers beside the computed ones; left out, the page does not show them.
 
     Raises:
-        InputError: Plotly is not installed.
+        InputError: Plotly or Matplotlib is not installed.
     """
     check_library("plotly", "reports")
+    check_library("matplotlib", "reports")
     solution = found if isinstance(found, Solution) else found.solution
     return page_of(report_of(text, solution, result_of(found), check))
