@@ -67,11 +67,13 @@ class ModelOption(NamedTuple):
         name: the option's name.
         allowed: allowed values, in words.
         default: the default as TOML writes it; None where the option must be given.
+        choices: the allowed values where they can be listed.
     """
 
     name: str
     allowed: str
     default: str | None
+    choices: tuple[Any, ...] = ()
 
 
 def model_options(name: str) -> list[ModelOption]:
@@ -87,7 +89,7 @@ def model_options(name: str) -> list[ModelOption]:
         choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
         allowed = listing(map(toml_value, choices)) if choices else getattr(hint, "__name__", str(hint))
         default = None if option.default is option.empty else toml_value(option.default)
-        rows.append(ModelOption(key, allowed, default))
+        rows.append(ModelOption(key, allowed, default, choices))
     return rows
 
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import PlotFile, check_outputs, check_picture, console
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...models import Model
+    from ..case.robots import ModelOption
 
 
 def models(
@@ -36,8 +42,16 @@ def models(
 
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
-        draw(model, plot)
+        draw(_variants(name, model, options), plot)
     show(console(), model_words(name, model, options))
+
+
+def _variants(name: str, model: Model, options: Sequence[ModelOption]) -> list[Model]:
+    """Return the robot with each value of the first option whose values can be listed, or the robot alone."""
+    from ..case.robots import build_model
+
+    listed = next((option for option in options if option.choices), None)
+    return [model] if listed is None else [build_model(name, {listed.name: value}) for value in listed.choices]
 
 
 def _description(model: str) -> str:

@@ -33,6 +33,7 @@ def report(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs([case], {"--out": out})
     check_library("plotly", "reports")
+    check_library("matplotlib", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
     from ..results.limitcurves import limit_curves

@@ -40,12 +40,14 @@ def solve(
     csv_file: CsvFile = None,
     table: CsvTable = None,
     plot: PlotFile = None,
+    pose: Annotated[int, typer.Option(min=1, help="Pose that --plot draws, where the case has several.")] = 1,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
     ] = False,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..case.reader import load_case
+    from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..results.result import result_of
     from .progress import solve_with_progress
@@ -58,6 +60,8 @@ def solve(
     check_csv(csv_file, table, json_file, loaded, at_point=False)
     check_picture(plot)
     check_outputs([case], {"--json": json_file, "--plot": plot, "--csv": csv_file})
+    if pose > loaded.pose_count:
+        raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
     if json_file is not None:
@@ -69,7 +73,7 @@ def solve(
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 
-        draw(solution, plot)
+        draw(solution, plot, pose=pose)
     if "-" not in (json_file, csv_file):
         from ..output.terminal import show
         from ..results.summary import case_summary

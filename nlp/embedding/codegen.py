@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from ...models import Dimension, FloatArray
 from .. import __version__
@@ -24,6 +25,7 @@ from ..case.task import Sense
 from ..errors import CaseError, InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
+from ..program.program import Program
 from ..program.sampling import starting_points
 from ..solver.multistart import solve_program
 from ..solver.status import Status
@@ -40,6 +42,8 @@ _PARTS = {
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
 }
+#: Ending of the file that a case with limits on singular values needs in addition.
+_SPECTRUM = "-spectrum.c"
 #: Number of starting points in the solver's table.
 _SEEDS = 16
 #: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
@@ -48,6 +52,8 @@ _TRIALS = 30
 #: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
+#: Generated C above this size, in bytes, is announced with its reason: compilers take a minute for it.
+_LARGE = 800_000
 _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 
 
@@ -72,11 +78,34 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     nlp = formulate(case)
     staged = stage_functions(nlp.program, f"{identifier(case.name)}_CASADI")
     names = _substitutions(nlp, staged)
-    files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in _PARTS.items()}
+    parts = _PARTS | ({_SPECTRUM: "spectrum.c"} if int(names["nspectra"]) else {})
+    files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _fill_template(f"{name}.in", names)
     casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
     return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
+
+
+def size_words(case: Case, files: Mapping[str, str]) -> str:
+    """Return the size of generated C in words, and the limit that most of it is for where it is large.
+
+    Args:
+        case: the case.
+        files: text by file name, as :func:`generate_c` returns it.
+    """
+    size = sum(len(text.encode()) for name, text in files.items() if name.endswith((".c", ".h")))
+    words = f"{size / 1000:.0f} kB of C"
+    if size <= _LARGE:
+        return words
+    program = formulate(case).program
+    operations: dict[str, int] = {}
+    for constraint in program.constraints:
+        expression = SX(0) if constraint.spectral else constraint.expression
+        slopes = ca.Function("slopes", [program.x, program.p], [ca.jacobian(expression, program.x)])
+        key = next((key.partition(".")[0] for key in constraint.keys if key), constraint.name)
+        operations[key] = operations.get(key, 0) + slopes.n_instructions()
+    key = max(operations, key=lambda name: operations[name], default="F")
+    return f"{words}, most of it for {key} and its derivatives: compiling it may take a minute"
 
 
 def _fill_template(template: str, names: dict[str, str]) -> str:
@@ -86,7 +115,7 @@ def _fill_template(template: str, names: dict[str, str]) -> str:
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
     """Generate C and header, by ending; CasADi's own names in them begin with the given one."""
-    generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int"})
+    generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int", "indent": 0})
     for function in functions:
         generator.add(function)
     # CasADi writes files only.
@@ -125,6 +154,7 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
+        **_spectrum_texts(program, prefix),
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
@@ -143,6 +173,23 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "optimum_scale": f"{nlp.objective_scale:.9g}",
         "references": references,
         "operations": "\n".join(f"| `{f.name()[size:]}` | {f.n_instructions()} |" for f in functions),
+    }
+
+
+def _spectrum_texts(program: Program, prefix: str) -> dict[str, str]:
+    """Return the texts for the placeholders about limits on singular values."""
+    found = [(k, each.spectral) for k, each in enumerate(program.constraints) if each.spectral is not None]
+    row = f"| `{prefix}{_SPECTRUM}` | limits on singular values of J, with their derivatives, by loops |\n"
+    return {
+        "nspectra": str(len(found)),
+        "spectrum_lengths": ", ".join(repr(float(spectral.length)) for _, spectral in found),
+        "spectrum_places": ", ".join(str(k) for k, _ in found),
+        "spectrum_kinds": ", ".join(str(spectral.end.value) for _, spectral in found),
+        "spectrum_object": f" {prefix}-spectrum.o" if found else "",
+        "spectrum_source": f" {prefix}{_SPECTRUM}" if found else "",
+        "spectrum_row": row if found else "",
+        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
+        "limits_close": "1e-10" if found else "1e-12",
     }
 
 

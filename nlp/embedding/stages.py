@@ -44,17 +44,30 @@ def stage_functions(program: Program, prefix: str) -> StagedFunctions:
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation.
 
+    A constraint on singular values of J is 0 here. ``derivatives`` returns in addition the entries of J, row after row,
+    with their gradients; ``curvature`` takes a multiplier for each of these entries at the end and a direction, and
+    returns the Hessian's product with the direction. There is no ``limits`` then.
+
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 
     Args:
         program: the program.
         prefix: beginning of the functions' names.
     """
-    x, F, g = program.x, program.objective, program.g
+    x, F = program.x, program.objective
+    spectra = [constraint.spectral for constraint in program.constraints]
+    # The C computes estimates of eigenvalues itself, from the entries of J: unrolled they would be megabytes.
+    expressions = [SX(0) if each.spectral else each.expression for each in program.constraints]
+    g = ca.vertcat(SX(0, 1), *expressions)
+    # C is generated for one pose, and all of these constraints are on its J.
+    matrix = next((each.matrix for each in spectra if each is not None), SX(0, 0))
+    entries = ca.vec(matrix.T)
+    lifted = [entries, ca.jacobian(entries, x).T] if entries.numel() else []
     gradient = ca.gradient(F, x)
     slopes = ca.jacobian(g, x).T
-    weight, multipliers = SX.sym("weight"), SX.sym("multipliers", g.numel())
-    curvature = ca.hessian(weight * F + ca.dot(multipliers, g), x)[0]
+    weight, multipliers = SX.sym("weight"), SX.sym("multipliers", g.numel() + entries.numel())
+    lagrangian = weight * F + ca.dot(multipliers, ca.vertcat(g, entries))
+    inputs = {"curvature": [weight, multipliers]}
     outputs = {
         "F": [F],
         "F_gradient": [F, gradient],
@@ -62,11 +75,17 @@ def stage_functions(program: Program, prefix: str) -> StagedFunctions:
         "rates": [program.robot.rates],
         "limits": [g, slopes],
         "rotation": [program.robot.rotation.T],
-        "derivatives": [F, gradient, g, slopes],
-        "curvature": [curvature],
+        "derivatives": [F, gradient, g, slopes, *lifted],
+        "curvature": [] if lifted else [ca.hessian(lagrangian, x)[0]],
         "magnitude": [ca.mmax(program.robot.magnitude)],
     }
-    inputs = {"curvature": [weight, multipliers]}
+    if lifted:
+        # What ``limits`` returns is part of what ``derivatives`` returns; and the whole Hessian of J's entries would be
+        # three times as much code as its product with a direction.
+        del outputs["limits"]
+        direction = SX.sym("direction", x.numel())
+        outputs["curvature"] = [ca.jtimes(ca.gradient(lagrangian, x), x, direction)]
+        inputs["curvature"].append(direction)
     dense = {name: [ca.densify(each) for each in expressions] for name, expressions in outputs.items()}
     rest, k, prepared = _extract(program.p, [each for expressions in dense.values() for each in expressions])
     functions = {}

@@ -62,6 +62,7 @@ class Embedded:
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
         sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
+        sources += [str(folder / name) for name in files if name.endswith("-spectrum.c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
         flags = ["-std=c99", "-O2", "-shared", "-fPIC"]

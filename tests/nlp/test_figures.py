@@ -1,20 +1,37 @@
 """Pictures: what is drawn stands where the model says, in true proportion, and files come whole or not at all."""
 
 import math
+import struct
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from casadi import SX
 
-from screwsynth.models import Body, model_names
-from screwsynth.nlp import Solution, load_case, shipped_cases, solve
+from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
+from screwsynth.nlp import (
+    InputError,
+    Solution,
+    Task,
+    case_from_tables,
+    evaluate,
+    load_case,
+    plot,
+    result_of,
+    shipped_cases,
+    solve,
+)
+from screwsynth.nlp.case.case import Case
 from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.output.pictures import fonts
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
+from screwsynth.nlp.results.tables import robot_table
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -143,6 +160,205 @@ def test_words_do_not_cover_each_other() -> None:
     boxes = [text.get_window_extent() for text in figure.axes[0].texts if text.get_text()]
     for i, one in enumerate(boxes):
         assert not [other for other in boxes[i + 1 :] if one.overlaps(other)]
+
+
+def crosses_box(a: np.ndarray, b: np.ndarray, box: tuple[float, float, float, float]) -> bool:
+    """Whether a line has a point within a box: the box is cut off the line, side by side (Sutherland and Hodgman)."""
+    low, high = 0.0, 1.0
+    for axis, sign, side in ((0, 1, box[0]), (0, -1, box[2]), (1, 1, box[1]), (1, -1, box[3])):
+        start, way = sign * (a[axis] - side), sign * (b[axis] - a[axis])
+        if way > 0:
+            low = max(low, -start / way)
+        elif way < 0:
+            high = min(high, -start / way)
+        elif start < 0:
+            return False
+    return low <= high
+
+
+def distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    """Distance of a point from the straight line through two others, in the plane."""
+    (x, y), (u, v) = b - a, point - a
+    return float(abs(x * v - y * u) / np.hypot(x, y))
+
+
+def assert_labels_are_clear(robots: list[Drawing]) -> None:
+    """Every limb has one label, on no other limb and within the picture, with a line that ends on its own limb."""
+    figure = figure_of(robots)
+    figure.canvas.draw()
+    per_point = figure.dpi / 72
+    for axes, robot in zip([axes for axes in figure.axes if axes.texts], robots, strict=True):
+        limbs: dict[str, list[np.ndarray]] = {}
+        for line in axes.lines:
+            gid = str(line.get_gid())
+            if gid.startswith("limb ") and not gid.startswith(("limb edge", "limb light")):
+                limbs.setdefault(gid.removeprefix("limb "), []).append(axes.transData.transform(line.get_xydata()))
+        assert set(limbs) == {link.limb for _, _, link in robot.links if link.limb}
+        leaders = {str(line.get_gid()): axes.transData.transform(line.get_xydata()) for line in axes.lines}
+        for name, own in limbs.items():
+            (text,) = [each for each in axes.texts if each.get_text().split("\n")[0] == f"limb {name}"]
+            extent = text.get_window_extent()
+            room = 3.5 * per_point  # half of a limb's width
+            box = (extent.x0 - room, extent.y0 - room, extent.x1 + room, extent.y1 + room)
+            assert not [
+                other for other, parts in limbs.items() if other != name for a, b in parts if crosses_box(a, b, box)
+            ]
+            frame = axes.get_window_extent()
+            assert frame.x0 <= extent.x0 <= extent.x1 <= frame.x1
+            assert frame.y0 <= extent.y0 <= extent.y1 <= frame.y1
+            if f"leader {name}" in leaders:
+                start, end = leaders[f"leader {name}"]
+                away = min(distance(start, a, b) for a, b in own)
+                assert away <= 0.1
+                assert extent.x0 - 4 <= end[0] <= extent.x1 + 4
+                assert extent.y0 - 4 <= end[1] <= extent.y1 + 4
+            else:  # the label touches its own limb, or nearly
+                near = tuple(np.array(box) + 6 * per_point * np.array([-1, -1, 1, 1]))
+                assert any(crosses_box(a, b, near) for a, b in own)
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_cases() if name != "paper-4.2"])
+def test_labels_stand_on_no_other_limb(name: str) -> None:
+    assert_labels_are_clear([drawing(name)])
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
+    assert_labels_are_clear([drawing_of_model(build_model(name))])
+
+
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-max", "hexapod-machining"])
+def test_numbers_in_a_picture_are_those_of_the_table_with_units(name: str) -> None:
+    case = load_case(name)
+    solution = solve(replace(case, search=case.search.but(4, None)))
+    words = [text.get_text() for text in figure_of(drawings_of(solution)).axes[0].texts]
+    table = robot_table(case, result_of(solution).robot)  # type: ignore[union-attr, arg-type]
+    rate = table.headers.index("rate")
+    unit = f"{case.units.length}/rad"
+    for row in table.rows:
+        cells = [str(cell) for cell in row]
+        kind = "couple of limb" if "couple" in cells else "limb"
+        (label,) = [each for each in words if each.split("\n")[0] == f"{kind} {cells[0]}"]
+        number, found = label.split("\n")[1].split(" ")
+        assert found == unit
+        if number != "0":
+            assert number.replace("\N{MINUS SIGN}", "-") == cells[rate]
+        assert ":" not in label, "a name that ends in a sign must not stand before a number in one line"
+
+
+def two_links() -> Case:
+    """A limb of two links, and five limbs of one."""
+    pose = PoseSymbols()
+    p, points, links, rows = pose.position, [], [], []
+    for k in range(6):
+        angle = k * math.pi / 3
+        foot, head = (
+            [10 * math.cos(angle), 10 * math.sin(angle), 0],
+            [4 * math.cos(angle + 0.3), 4 * math.sin(angle), 0],
+        )
+        base, end = SX(foot), p + pose.rotation @ SX(head)
+        points += [Point(f"B{k}", base, Body.BASE), Point(f"A{k}", end, Body.PLATFORM)]
+        rows.append(force_along(str(k), base, end - base))
+        if k:
+            links.append(Link(f"B{k}", f"A{k}", Body.LIMB, limb=str(k)))
+    points.append(Point("K", SX([16, 0, 10]), Body.LIMB))
+    links += [Link("B0", "K", Body.LIMB, limb="0"), Link("K", "A0", Body.LIMB, limb="0")]
+    model = Model(
+        name="two-links",
+        description="a limb of two links",
+        parameters=(),
+        pose=pose,
+        home=(0.0, 0.0, 20.0),
+        wrenches=tuple(rows),
+        scene=Scene(tuple(points), tuple(links)),
+    )
+    return Case(model=model, parameters={}, position=[0, 0, 20], tasks=[Task([0, 0, 1, 1, 2, 3])])
+
+
+def test_a_limb_of_several_links_has_one_label() -> None:
+    assert_labels_are_clear(drawings_of(solve(two_links())))
+
+
+def test_letters_that_no_font_has_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fonts, "families", lambda: (fonts.FONT,))
+    assert fonts.legible("Größe, мм, Ω") == "Größe, мм, Ω"
+    assert fonts.legible("回転 about z") == "[2 letters, CJK] about z"
+    case = replace(load_case("paper-4.3"), title="机器人 3")
+    case = replace(case, search=case.search.but(2, None))
+    # A letter without a glyph is a warning, and warnings are errors here.
+    assert picture(drawings_of(solve(case)), ".png")
+    words = [text.get_text() for text in figure_of(drawings_of(solve(case))).texts]
+    assert "[3 letters, CJK] 3" in words
+
+
+def test_a_font_that_has_the_letters_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Any font beside the first one stands for an installed one with Chinese letters.
+    monkeypatch.setattr(fonts, "families", lambda: (fonts.FONT, "STIXGeneral"))
+    fonts._has.cache_clear()
+    letter = next(
+        chr(code)
+        for code in range(0x2000, 0x30000)
+        if fonts._has("STIXGeneral", chr(code)) and not fonts._has(fonts.FONT, chr(code))
+    )
+    assert fonts.legible(f"a{letter}") == f"a{letter}"
+    assert fonts.needs_other_font(f"a{letter}")
+
+
+def test_both_layouts_of_a_robot_are_drawn(tmp_path: Path, cli: Run) -> None:
+    code, _, err = cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.svg"))
+    assert (code, err) == (0, "")
+    text = (tmp_path / "robot.svg").read_text(encoding="utf-8")
+    assert "layout = aligned" in text
+    assert "layout = octahedral" in text
+    code, _, err = cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.png"))
+    wide, high = struct.unpack(">II", (tmp_path / "robot.png").read_bytes()[16:24])
+    assert wide > 1.5 * high
+
+
+POSES = """
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = { min = 5, max = 20 }
+[[pose]]
+position = [0, 0, 30]
+[[pose]]
+position = [6, 0, 33]
+[[pose]]
+position = [0, 5, 24]
+[[task]]
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+[solve]
+starts = 2
+"""
+
+
+def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run) -> None:
+    case = case_from_tables(tomllib.loads(POSES), name="poses", source="poses.toml")
+    solution = solve(case)
+    values = [evaluate(solution.nlp, solution.x, k).F for k in range(3)]
+    drawn = [drawings_of(solution, k + 1)[0] for k in range(3)]
+    for k, robot in enumerate(drawn):
+        np.testing.assert_allclose(robot.posture.position, [[0, 0, 30], [6, 0, 33], [0, 5, 24]][k], atol=1e-12)
+        assert sum(row.rate**2 for row in robot.rows) == pytest.approx(values[k], rel=1e-9)
+        assert f"pose {k + 1}, F = {values[k]:.7g} there" in robot.headline
+        assert ("the worst" in robot.headline) == (values[k] == min(values))
+    file = tmp_path / "poses.toml"
+    file.write_text(POSES, encoding="utf-8")
+    code, _, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3")
+    assert (code, err) == (0, "")
+    code, out, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4")
+    assert (code, out) == (2, "")
+    assert "--pose 4" in err
+    assert "3 poses" in err
+    with pytest.raises(InputError, match="pose 4 does not exist"):
+        plot(solution, tmp_path / "pose.png", pose=4)
 
 
 def test_the_command_line_draws(tmp_path: Path, cli: Run) -> None:

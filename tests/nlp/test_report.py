@@ -6,6 +6,8 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
+from base64 import b64decode
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -33,7 +35,7 @@ from screwsynth.models import (
     Unknown,
     force_along,
 )
-from screwsynth.nlp import Case, Task, formulate, load_case, result_of, solve
+from screwsynth.nlp import Case, Task, case_from_tables, evaluate, formulate, load_case, result_of, solve
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -325,7 +327,8 @@ def test_whatever_a_case_says_stays_text(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     found = Page((tmp_path / "evil.html").read_text(encoding="utf-8"))
     assert [attributes.get("id") for attributes, _ in found.scripts] == ["data", "plotly", None]
-    assert [a["id"] for tag, a in found.elements if tag in {"img", "b", "i"} and a] == ["view-copy"]
+    assert [a["id"] for tag, a in found.elements if tag in {"img", "b", "i"} and "id" in a] == ["view-copy"]
+    assert len([a for tag, a in found.elements if tag in {"img", "b", "i"} and a]) == 2
     assert "<" not in found.script("data")
     assert found.data["result"]["title"] == title
     assert found.data["result"]["task"]["name"] == task
@@ -374,8 +377,7 @@ def test_robots_with_loops_follow() -> None:
     for shifts in ((0.0,), (0.0, 1.0)):
         solution = solve(sliding(*shifts), starts=2)
         report = report_of("", solution, result_of(solution))
-        assert report.parts[0].view is not None
-        for frame in report.parts[0].view["frames"]:
+        for frame in report.parts[0].views[0]["frames"]:
             foot, head = np.array(frame["points"])
             np.testing.assert_allclose(head, [1 + 0.6 * frame["t"], 0, 2 + 0.8 * frame["t"]], atol=1e-9)
             np.testing.assert_allclose(foot, [head[0], 0, 0], atol=1e-9)
@@ -604,6 +606,154 @@ def test_slider_moves_the_platform(opened: Callable[[str], Any], page: Callable[
         for limb, rate, length in zip(limbs, rates, lengths, strict=True):
             found = re.findall(r"length (\S+) .*rate (\S+) ", limb["text"].replace("\N{MINUS SIGN}", "-"))
             assert [float(each) for each in found[0]] == pytest.approx([length, rate], rel=1e-5)
+
+
+FRAME = """
+const view = document.getElementById("view"), box = view.getBoundingClientRect(), scene = view._fullLayout.scene._scene;
+const annotations = view.layout.scene.annotations.map((each) => each.text);
+const params = scene.glplot.cameraParams;
+const multiply = (m, v) => [0, 1, 2, 3].map((r) => v.reduce((sum, each, k) => sum + m[r + 4 * k] * each, 0));
+const sides = ["xaxis", "yaxis", "zaxis"].map((name) => view._fullLayout.scene[name].range), scale = scene.dataScale;
+const places = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => {
+  const corner = [...sides.map((side, k) => side[(n >> k) & 1] * scale[k]), 1];
+  const clip = multiply(params.projection, multiply(params.view, multiply(params.model, corner)));
+  return [clip[0] / clip[3], clip[1] / clip[3]];
+});
+return { annotations, places, width: box.width, height: box.height };"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+def test_view_fills_its_frame_and_names_its_limbs(opened: Callable[[str], Any], case: str) -> None:
+    chrome = opened(case)
+    for width in (420, 1000, 1400):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        chrome.refresh()
+        until(lambda: chrome.execute_script("return document.documentElement.dataset.drawn === 'yes'"))
+        time.sleep(0.5)
+        found = chrome.execute_script(FRAME)
+        places = np.array(found["places"])
+        pixels = places * [found["width"] / 2, found["height"] / 2]
+        # The box of the axes is inside with room for its ticks and titles, and as large as that allows.
+        room = np.array([found["width"] / 2, found["height"] / 2]) - np.abs(pixels).max(axis=0)
+        assert room.min() >= 25, (width, room)
+        assert room.min() <= 60, (width, room)
+        limbs = [row["limb"] for row in data_of(chrome)["views"][0]["rows"]]
+        assert sorted(text.removeprefix("limb ") for text in found["annotations"]) == sorted(limbs)
+    chrome.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def data_of(chrome: Any) -> dict[str, Any]:
+    return dict(json.loads(chrome.execute_script("return document.getElementById('data').textContent")))
+
+
+WITHOUT_WEBGL = """
+const asked = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.includes("webgl") ? null : asked.call(this, kind, ...more);
+};"""
+
+
+@pytest.mark.browser
+def test_without_webgl_the_drawing_stands_there(opened: Callable[[str], Any]) -> None:
+    chrome = opened("paper-4.1-helical")
+    done = chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": WITHOUT_WEBGL})
+    try:
+        chrome.refresh()
+        until(lambda: chrome.execute_script("return document.documentElement.dataset.drawn === 'yes'"))
+        shown = [each for each in chrome.find_elements("css selector", "img.still") if each.is_displayed()]
+        assert len(shown) == 1
+        assert chrome.execute_script("return arguments[0].naturalWidth", shown[0]) > 300
+        assert "no WebGL" in chrome.find_element("class name", "flat-words").text
+        assert not chrome.find_element("id", "view").is_displayed()
+        before = chrome.execute_script(ROWS)
+        chrome.execute_script(MOVE, 0)
+        assert chrome.execute_script(ROWS) != before
+    finally:
+        chrome.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", done)
+
+
+def test_the_drawing_needs_no_script(page: Callable[..., Page]) -> None:
+    stills = [a for tag, a in page("paper-4.1-helical").elements if tag == "img" and "still" in str(a.get("class"))]
+    assert [a["class"] for a in stills] == ["still chosen"]
+    drawn = b64decode(str(stills[0]["src"]).removeprefix("data:image/svg+xml;base64,")).decode("utf-8")
+    assert drawn.startswith("<?xml")
+    assert "limb 1-" in drawn
+
+
+POSES = """
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = { min = 5, max = 20 }
+[[pose]]
+position = [0, 0, 30]
+[[pose]]
+position = [6, 0, 33]
+[[pose]]
+position = [0, 5, 24]
+[[task]]
+sense = "SENSE"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+[solve]
+starts = 2
+"""
+
+
+@pytest.mark.parametrize("sense", ["max", "min"])
+def test_page_has_every_pose_and_marks_the_worst(sense: str) -> None:
+    case = case_from_tables(tomllib.loads(POSES.replace("SENSE", sense)), name="poses", source="poses.toml")
+    solution = solve(case)
+    values = [evaluate(solution.nlp, solution.x, k).F for k in range(3)]
+    found = Page(page_of(report_of("", solution, result_of(solution))))
+    views = found.data["views"]
+    worst = values.index(min(values) if sense == "max" else max(values))
+    assert [view["pose"] for view in views] == [0, 1, 2]
+    assert [view["is_worst"] for view in views] == [k == worst for k in range(3)]
+    for view, value, at in zip(views, values, [[0, 0, 30], [6, 0, 33], [0, 5, 24]], strict=True):
+        frame = view["frames"][view["zero"]]
+        np.testing.assert_allclose(frame["position"], at, atol=1e-12)
+        assert frame["F"] == pytest.approx(value, rel=1e-9)
+    assert f"The worst: pose {worst + 1} of 3, F = {values[worst]:.7g}." in found.words
+    (slider,) = [a for tag, a in found.elements if tag == "input" and a.get("id") == "pose"]
+    assert (slider["min"], slider["max"], slider["value"]) == ("1", "3", "1")
+
+
+@pytest.mark.browser
+def test_slider_shows_each_pose(browser: Any, tmp_path: Path) -> None:
+    case = tmp_path / "poses.toml"
+    case.write_text(POSES.replace("SENSE", "max"), encoding="utf-8")
+    assert made(str(case), tmp_path / "page.html").returncode == 0
+    browser.get((tmp_path / "page.html").as_uri())
+    until(lambda: browser.execute_script("return document.documentElement.dataset.drawn === 'yes'"))
+    views = data_of(browser)["views"]
+    for k in (2, 1, 0):
+        browser.execute_script(MOVE.replace("travel", "pose"), k + 1)
+        rates = views[k]["frames"][views[k]["zero"]]["rates"]
+        np.testing.assert_allclose([number(row[2]) for row in browser.execute_script(ROWS)], rates, rtol=1e-5)
+        assert f"pose {k + 1} of 3" in browser.find_element("id", "posed").text
+    browser.find_element("id", "worst").click()
+    assert browser.find_element("id", "posed").text.endswith("the worst")
+
+
+@pytest.mark.browser
+def test_wide_tables_say_that_they_scroll(opened: Callable[[str], Any]) -> None:
+    chrome = opened("hexapod-machining")
+    hint = (
+        "return [...document.querySelectorAll('.scroll')].filter((each) => each.checkVisibility()).map((each) =>"
+        " [each.scrollWidth > each.clientWidth + 1, getComputedStyle(each, '::before').content.includes('Scroll')])"
+    )
+    size = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    rows = until(lambda: (found := chrome.execute_script(hint)) and all(wide == said for wide, said in found) and found)
+    chrome.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert any(wide for wide, _ in rows)
 
 
 @pytest.mark.browser

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,6 +49,28 @@ LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)
 SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NUMBER)
 
 
+class End(enum.Enum):
+    """Estimate of eigenvalues of ``A = J'J`` that a constraint is on."""
+
+    SMALLEST = 0
+    MINUS_RATIO = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Spectral:
+    """A constraint's expression as an estimate of eigenvalues, for those who compute the estimate themselves.
+
+    Attributes:
+        end: the smallest eigenvalue, or minus the ratio of the smallest to the largest.
+        matrix: (m, 6) rows force, then moment about the platform's origin.
+        length: by which moments are divided.
+    """
+
+    end: End
+    matrix: SX
+    length: float
+
+
 @dataclass(frozen=True, eq=False)
 class Constraint:
     """A named smooth constraint ``lower <= expression <= upper``.
@@ -63,6 +86,7 @@ class Constraint:
         pose: index of the pose that it is at.
         exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
         measure: the measured number itself, where the expression only estimates it.
+        spectral: the matrix that the expression is made from, where it estimates eigenvalues.
     """
 
     name: str
@@ -72,6 +96,7 @@ class Constraint:
     pose: int = 0
     exact: SX | None = None
     measure: JacobianMeasure | None = None
+    spectral: Spectral | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +118,7 @@ def bounded(
     upper: float | None = None,
     exact: SX | None = None,
     measure: JacobianMeasure | None = None,
+    spectral: Spectral | None = None,
 ) -> BoundedConstraint:
     """Return a constraint from the numbers of its limit as people write them.
 
@@ -105,9 +131,10 @@ def bounded(
         upper: likewise.
         exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
         measure: the measured number itself, where the expression only estimates it.
+        spectral: the matrix that the expression is made from, where it estimates eigenvalues.
     """
     return BoundedConstraint(
-        Constraint(name, expression, reading, keys, exact=exact, measure=measure),
+        Constraint(name, expression, reading, keys, exact=exact, measure=measure, spectral=spectral),
         -math.inf if lower is None else float(reading.to_value(SX(lower))),
         math.inf if upper is None else float(reading.to_value(SX(upper))),
     )
@@ -123,10 +150,21 @@ def between(
     upper: float | None = None,
     exact: SX | None = None,
     measure: JacobianMeasure | None = None,
+    spectral: Spectral | None = None,
 ) -> BoundedConstraint:
     """Return a constraint whose numbers are written as ``key.min`` and ``key.max``.
 
     The other arguments are those of :func:`bounded`.
     """
     keys = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
-    return bounded(name, expression, reading, keys, lower=lower, upper=upper, exact=exact, measure=measure)
+    return bounded(
+        name,
+        expression,
+        reading,
+        keys,
+        lower=lower,
+        upper=upper,
+        exact=exact,
+        measure=measure,
+        spectral=spectral,
+    )

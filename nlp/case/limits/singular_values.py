@@ -20,7 +20,7 @@ from pydantic import Field, FiniteFloat
 
 from ....models import Dimension, FloatArray, homogenised
 from ..table import Table
-from .constraint import SQUARED_NUMBER, BoundedConstraint, Reading, between
+from .constraint import SQUARED_NUMBER, BoundedConstraint, End, Reading, Spectral, between
 from .limit import Limit, LimitedCase, PosedRobot, Written
 from .spectrum import largest_eigenvalue, smallest_eigenvalue
 
@@ -72,13 +72,15 @@ class SmallestSingularValue(Limit[SmallestTable]):
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the smallest eigenvalue of ``J'J``."""
+        J = _homogenised(pose, self.length)
         yield between(
             f"smallest_singular_value{pose.where}",
-            smallest_eigenvalue(_gram(pose, self.length)),
+            smallest_eigenvalue(J.T @ J),
             SQUARED_NUMBER,
             "smallest_singular_value",
             lower=self.min,
             measure=partial(_smallest, self.length),
+            spectral=Spectral(End.SMALLEST, _homogenised(pose, 1.0), self.length),
         )
 
 
@@ -122,7 +124,8 @@ class ConditionNumber(Limit[ConditionTable]):
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return minus the ratio of the smallest to the largest eigenvalue of ``J'J``."""
-        gram = _gram(pose, self.length)
+        J = _homogenised(pose, self.length)
+        gram = J.T @ J
         yield between(
             f"condition_number{pose.where}",
             -smallest_eigenvalue(gram) / largest_eigenvalue(gram),
@@ -130,13 +133,13 @@ class ConditionNumber(Limit[ConditionTable]):
             "condition_number",
             upper=self.max,
             measure=partial(_condition, self.length),
+            spectral=Spectral(End.MINUS_RATIO, _homogenised(pose, 1.0), self.length),
         )
 
 
-def _gram(pose: PosedRobot, length: float) -> SX:
-    """Return ``J'J`` (6, 6) of the homogenised J."""
-    J = ca.horzcat(*homogenised(pose.robot.jacobian, pose.robot.position, length))
-    return J.T @ J
+def _homogenised(pose: PosedRobot, length: float) -> SX:
+    """Return the homogenised J (m, 6)."""
+    return ca.horzcat(*homogenised(pose.robot.jacobian, pose.robot.position, length))
 
 
 def _smallest(length: float, jacobian: FloatArray, position: FloatArray) -> float:

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from ....models import FloatArray
-from .labels import Label, place_labels
+from .labels import Label, Obstacles, place_labels
 from .view import View
 
 INK, MUTED, FAINT, RED = "#17212b", "#55616c", "#b9c1c9", "#a3250f"
@@ -36,15 +36,23 @@ class Canvas:
         self._axes = axes
         self._centre = view.project(centre)
         self._labels: list[Label] = []
-        self._covered: list[FloatArray] = []
+        self._segments: list[FloatArray] = []
+        self._owners: list[str] = []
         axes.set_axis_off()
         axes.set_aspect("equal", adjustable="box")
 
-    def line(self, points: FloatArray, name: str, **style: Any) -> Line2D:  # noqa: ANN401 - Matplotlib's own words
-        """Draw a line through points (k, 3) and keep it free of words."""
+    def line(
+        self,
+        points: FloatArray,
+        name: str,
+        *,
+        limb: str = "",
+        **style: Any,  # noqa: ANN401 - Matplotlib's own words
+    ) -> Line2D:
+        """Draw a line through points (k, 3) and keep it free of words; ``limb`` names the limb that it is part of."""
         flat = self.view.project(points)
         (line,) = self._axes.plot(flat[:, 0], flat[:, 1], gid=name, **{"solid_capstyle": "round", **style})
-        self.keep_free(points)
+        self.keep_free(points, limb)
         return line
 
     def polygon(self, points: FloatArray, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
@@ -67,28 +75,46 @@ class Canvas:
         self.keep_free(np.array([start, end]))
 
     def label(
-        self, text: str, at: FloatArray, away: FloatArray, colour: str = INK, size: float = 9.0, *, bold: bool = False
+        self,
+        text: str,
+        at: FloatArray,
+        away: FloatArray,
+        colour: str = INK,
+        size: float = 9.0,
+        *,
+        bold: bool = False,
+        limb: str = "",
     ) -> None:
-        """Ask for a word beside a point (3,), preferably in a direction (2,) on paper."""
+        """Ask for a word beside a point (3,), preferably in a direction (2,) on paper.
+
+        Args:
+            text: the word.
+            at: the point, or (k, 3) points to choose from.
+            away: the direction; zero for none.
+            colour: of the letters.
+            size: of the letters, points.
+            bold: whether they are bold.
+            limb: name of the limb that the word belongs to, whose label has a leader line; empty for none.
+        """
         length = float(np.linalg.norm(away))
-        self._labels.append(
-            Label(text, self.view.project(at), away / length if length else away, colour, size, bold, f"label {text}")
-        )
+        places = np.atleast_2d(self.view.project(at))
+        direction = away / length if length else away
+        self._labels.append(Label(text, places, direction, colour, size, bold, f"label {text}", limb))
 
     def outwards(self, at: FloatArray) -> FloatArray:
         """Return the direction (2,) on paper from the centre to a point (3,)."""
         return np.asarray(self.view.project(at) - self._centre)
 
-    def keep_free(self, points: FloatArray) -> None:
+    def keep_free(self, points: FloatArray, limb: str = "") -> None:
         """Keep a line through points (k, 3) free of words, and within the limits of the axes."""
         flat = self.view.project(points)
         for a, b in pairwise(flat):
-            self._covered.append(a + np.linspace(0, 1, 12)[:, None] * (b - a))
-        self._covered.append(flat[-1:])
+            self._segments.append(np.array([*a, *b]))
+            self._owners.append(limb)
 
     def fit_limits(self) -> None:
         """Set the limits of the axes around everything drawn, with room for words, in the proportion of the panel."""
-        flat = np.vstack(self._covered)
+        flat = np.vstack(self._segments).reshape(-1, 2)
         low, high = flat.min(axis=0), flat.max(axis=0)
         half = (high - low) / 2 + _MARGIN * float(np.max(high - low))
         panel = self._axes.get_window_extent()
@@ -100,4 +126,6 @@ class Canvas:
     def write_labels(self, renderer: RendererAgg) -> None:
         """Write the words, once the axes have their final place."""
         self._axes.apply_aspect()
-        place_labels(self._axes, renderer, self._labels, np.vstack(self._covered))
+        # Limbs stand closest together: their words get the free places first.
+        ordered = sorted(self._labels, key=lambda label: not label.owner)
+        place_labels(self._axes, renderer, ordered, Obstacles(np.vstack(self._segments), tuple(self._owners)))

@@ -23,7 +23,7 @@ from ...errors import EvaluationError
 from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from ...solver.multistart import state_or_none
+from .poses import state_at_pose
 from .posture import Linkage, Posture
 
 #: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
@@ -154,16 +154,24 @@ def drawing_of_model(model: Model) -> Drawing:
     parameters = np.array([value for item in model.parameters for value in item.typical])
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
     linkage = Linkage(model, parameters)
+    headline = ", ".join(f"{key} = {value}" for key, value in model.options.items())
     guess = linkage.posture_at(np.eye(3), np.array(model.home), middles)
     # A motion of zero length closes the loops.
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
     if home is None or not np.isfinite(home.points).all():
         raise EvaluationError(f"{model.name}: the robot cannot be put together at its typical values")
-    return _drawing_without_task(None, model, linkage, home)
+    return replace(_drawing_without_task(None, model, linkage, home), headline=headline)
 
 
 def drawing_of(
-    nlp: Nlp, x: FloatArray, state: RobotState | None, task: int = 0, *, headline: str = "", is_answer: bool = True
+    nlp: Nlp,
+    x: FloatArray,
+    state: RobotState | None,
+    task: int = 0,
+    *,
+    pose: int = 0,
+    headline: str = "",
+    is_answer: bool = True,
 ) -> Drawing:
     """Return the robot at a point of a program, with one of its case's tasks.
 
@@ -172,6 +180,7 @@ def drawing_of(
         x: (n,) the point.
         state: the robot there; None where it does not exist.
         task: index of the task in the case.
+        pose: index of the pose that the state is at.
         headline: the result in one line.
         is_answer: whether the solve answers the case.
 
@@ -181,7 +190,7 @@ def drawing_of(
     case, model = nlp.case, nlp.program.model
     if state is None:
         raise EvaluationError(f"{case.source or case.name}: the robot does not exist at the point reached: no picture")
-    linkage, posture = _posture(nlp, x, state)
+    linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]
     twist = frozen_array(chosen.twist, (6,))
     rates = reciprocal_product(posture.jacobian, twist)
@@ -196,7 +205,7 @@ def drawing_of(
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name),
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
-        reference=_reference(nlp, posture, drawing.size),
+        reference=_reference(nlp, posture, drawing.size, pose),
         headline=headline,
         is_answer=is_answer,
     )
@@ -229,24 +238,24 @@ def _motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
     )
 
 
-def _posture(nlp: Nlp, x: FloatArray, state: RobotState) -> tuple[Linkage, Posture]:
-    """Return the linkage and the posture of a program's robot at a point (n,), at its first pose."""
+def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Linkage, Posture]:
+    """Return the linkage and the posture of a program's robot at a point (n,), at one of its poses."""
     model = nlp.program.model
     parameters = np.array([value for item in model.parameters for value in state.parameters[item.name]])
-    unknowns = x[list(nlp.program.places.unknowns[0])]
+    unknowns = x[list(nlp.program.places.unknowns[pose])]
     linkage = Linkage(model, parameters, nlp.case.characteristic_length)
     return linkage, linkage.posture_at(state.rotation, state.position, unknowns)
 
 
-def _reference(nlp: Nlp, posture: Posture, size: float) -> Posture | None:
+def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | None:
     """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
     if nlp.n == 0:
         return None
     x = close_equations(nlp, nlp.start)
-    state = state_or_none(nlp, x)
+    state = state_at_pose(nlp, x, pose)
     if state is None:
         return None
-    start = _posture(nlp, x, state)[1]
+    start = _posture(nlp, x, state, pose)[1]
     is_other = np.max(np.abs(start.points - posture.points), initial=0.0) > _OTHER_POSTURE * size
     return start if is_other and np.isfinite(start.points).all() else None
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import textwrap
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -13,10 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ...units import rate_unit
 from .canvas import INK, MUTED, RED
 from .drawing import Drawing
+from .fonts import families, legible, needs_other_font
 from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
@@ -25,7 +26,6 @@ _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "screwsynth",
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
-    "font.family": "DejaVu Sans",
     "axes.unicode_minus": True,
     "savefig.dpi": 130,
     "figure.dpi": 100,
@@ -35,6 +35,8 @@ _METADATA: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "screwsynth"},
     ".pdf": {"CreationDate": None, "Creator": "screwsynth", "Producer": None},
 }
+#: So many panels stand in one row; more of them stand in rows of two.
+_ACROSS = 3
 #: Width and height of a panel, and room for the heading, the legend and the colour bar, in inches.
 _WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
 
@@ -58,10 +60,13 @@ def picture_of(make: Callable[[], Figure], ending: str) -> bytes:
         ending: ``.png``, ``.svg`` or ``.pdf``.
     """
     content = io.BytesIO()
-    with mpl.rc_context({**mpl.rcParamsDefault, **_SETTINGS}), warnings.catch_warnings():
-        # A title may have letters that the font lacks: they show as boxes.
-        warnings.simplefilter("ignore")
-        make().savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
+    settings = {**mpl.rcParamsDefault, **_SETTINGS, "font.family": list(families())}
+    with mpl.rc_context(settings):
+        figure = make()
+        if any(needs_other_font(text.get_text()) for text in figure.findobj(Text)):
+            # Fonts of this kind hold outlines that only Type 3 embeds.
+            mpl.rcParams["pdf.fonttype"] = 3
+        figure.savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
     return content.getvalue()
 
 
@@ -72,22 +77,25 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
     """
     view = view or clearest_view(drawings[0])
-    count = len(drawings)
+    across = len(drawings) if len(drawings) <= _ACROSS else 2
     side = _SIDE if drawings[0].rows else 0.2
-    width, height = count * (_WIDTH + side), _HEIGHT + _TOP + _BOTTOM
+    row_height = _HEIGHT + _TOP + _BOTTOM
+    width, height = across * (_WIDTH + side), -(-len(drawings) // across) * row_height
     figure = Figure(figsize=(width, height), facecolor="white")
     canvas = FigureCanvasAgg(figure)
     for k, drawing in enumerate(drawings):
-        left = k * (_WIDTH + side)
-        place = (left / width, _BOTTOM / height, _WIDTH / width, _HEIGHT / height)
+        left, top = k % across * (_WIDTH + side), height - k // across * row_height
+        bottom = top - row_height
+        place = (left / width, (bottom + _BOTTOM) / height, _WIDTH / width, _HEIGHT / height)
         axes = figure.add_axes(place)
         panel = Panel(axes, view, drawing)
         panel.paint()
         if drawing.rows:
-            _add_colour_bar(figure, (left + _WIDTH + 0.1) / width, 0.22, 0.16 / width, 0.5, drawing, panel.largest)
+            bar = ((left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height)
+            _add_colour_bar(figure, *bar, 0.16 / width, 0.5 * row_height / height, drawing, panel.largest)
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
-        _add_legend(figure, (left + 0.25) / width, 0.02, panel)
-        _write_heading(figure, (left + 0.25) / width, height, drawing)
+        _add_legend(figure, (left + 0.25) / width, (bottom + 0.02 * row_height) / height, panel)
+        _write_heading(figure, (left + 0.25) / width, top / height, height, drawing)
     return figure
 
 
@@ -110,11 +118,11 @@ def _heading(drawing: Drawing) -> list[_HeadingLine]:
     return lines
 
 
-def _write_heading(figure: Figure, left: float, height: float, drawing: Drawing) -> None:
-    """Write the heading above a panel; ``left`` is in parts of the figure's width, ``height`` its height in inches."""
-    top = 1 - 0.3 / height
+def _write_heading(figure: Figure, left: float, top: float, height: float, drawing: Drawing) -> None:
+    """Write the heading above a panel; the place is in parts of the figure, whose height is in inches."""
+    top -= 0.3 / height
     for text, size, colour, bold in _heading(drawing):
-        lines = textwrap.wrap(text, int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
+        lines = textwrap.wrap(legible(text), int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
         figure.text(
             left,
             top,
@@ -136,7 +144,7 @@ def _add_colour_bar(
     scale = ScalarMappable(Normalize(-largest, largest), rate_colour_map())
     bar = figure.colorbar(scale, cax=axes)
     unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
-    bar.set_label(f"rate of each limb, {unit}", color=INK, fontsize=9, parse_math=False)
+    bar.set_label(legible(f"rate of each limb, {unit}"), color=INK, fontsize=9, parse_math=False)
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.outline.set_edgecolor(MUTED)
     rates = [row.rate for row in drawing.rows]
@@ -149,7 +157,7 @@ def _add_legend(figure: Figure, left: float, bottom: float, panel: Panel) -> Non
     if entries:
         figure.legend(
             handles=[handle for handle, _ in entries],
-            labels=[text for _, text in entries],
+            labels=[legible(text) for _, text in entries],
             loc="lower left",
             bbox_to_anchor=(left, bottom),
             frameon=False,

@@ -9,20 +9,29 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 from ....models import FloatArray
+from .crossings import segments_cross, segments_in_box
+from .fonts import legible
 
 #: Distances, in points, and number of directions of the places that are tried for a word.
 _DISTANCES = (7.0, 12.0, 18.0, 26.0, 36.0)
 _DIRECTIONS = 16
-#: Room around a word, in pixels.
-_ROOM = 2.0
-#: Costs of covering another word, of covering a point that is kept free, and of a point of distance.
-_OVERLAP, _COVERED, _FAR = 50.0, 4.0, 0.12
+#: Further distances for a word with a leader line, which may stand outside of the robot.
+_LED_DISTANCES = (48.0, 64.0, 84.0, 108.0, 136.0, 168.0, 204.0)
+#: Room around a word, in pixels, and half of the width of a limb, in points.
+_ROOM, _HALF_LIMB = 2.0, 4.0
+#: Costs of covering another word, of covering a line that is kept free, and of a point of distance.
+_OVERLAP, _COVERED, _FAR = 50.0, 6.0, 0.12
+#: A word on a limb that is not its own is wrong, and a leader line across one misleads.
+_ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 6.0
 #: A word beyond the axes is cut off, which is worse than an overlap.
-_OUTSIDE = 60.0
+_OUTSIDE = 600.0
+#: A leader line is drawn where the word is farther from its place than this, in points.
+_LED = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +40,13 @@ class Label:
 
     Attributes:
         text: the word; never read as mathematics.
-        at: (2,) the place, in data coordinates.
+        at: (k, 2) one or more places to choose from, in data coordinates.
         away: (2,) the preferred direction from the place; zero for none.
         color: of the letters.
         size: of the letters, points.
         bold: whether they are bold.
         name: ``gid`` of the artist.
+        owner: name of the limb that the word belongs to; it then has a leader line.
     """
 
     text: str
@@ -46,33 +56,75 @@ class Label:
     size: float = 9.0
     bold: bool = False
     name: str = ""
+    owner: str = ""
 
 
-def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], keep_free: FloatArray) -> list[Text]:
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Straight lines that words should not cover.
+
+    Attributes:
+        segments: (k, 4) their ends, in data coordinates.
+        owners: (k,) name of the limb that each is part of; empty for none.
+    """
+
+    segments: FloatArray
+    owners: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """What is already on the paper, in pixels.
+
+    Attributes:
+        segments: (k, 4) lines.
+        owners: (k,) limb of each line; empty for none.
+        frame: left, bottom, right and top of the axes.
+        taken: boxes of the words already placed.
+        leaders: (k, 4) leader lines already placed.
+        per_point: pixels of a point.
+    """
+
+    segments: FloatArray
+    owners: FloatArray
+    frame: tuple[float, float, float, float]
+    taken: list[tuple[float, float, float, float]]
+    leaders: list[tuple[float, float, float, float]]
+    per_point: float
+
+
+def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obstacles: Obstacles) -> list[Text]:
     """Put words beside their places, one after the other, each where its cost is least.
 
     Args:
         axes: with its final limits and place.
         renderer: measures the words.
         labels: the more important first.
-        keep_free: (k, 2) points in data coordinates that words should not cover.
+        obstacles: lines that words should not cover.
     """
-    dots = axes.transData.transform(keep_free) if len(keep_free) else np.zeros((0, 2))
+    ends = axes.transData.transform(obstacles.segments.reshape(-1, 2)).reshape(-1, 4)
     frame = axes.get_window_extent(renderer)
-    inside = (frame.x0, frame.y0, frame.x1, frame.y1)
-    taken: list[tuple[float, float, float, float]] = []
+    sheet = _Sheet(
+        ends,
+        np.array(obstacles.owners, dtype=object),
+        (frame.x0, frame.y0, frame.x1, frame.y1),
+        [],
+        [],
+        float(axes.figure.dpi) / 72,
+    )
+    back = axes.transData.inverted()
     texts = []
-    per_point = float(axes.figure.dpi) / 72
     for label in labels:
         text = axes.text(
-            float(label.at[0]),
-            float(label.at[1]),
-            label.text,
+            float(label.at[0, 0]),
+            float(label.at[0, 1]),
+            legible(label.text),
             color=label.color,
             fontsize=label.size,
             fontweight="bold" if label.bold else "normal",
             ha="center",
             va="center",
+            multialignment="center",
             parse_math=False,
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
             zorder=100,
@@ -80,48 +132,93 @@ def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], kee
         )
         extent = text.get_window_extent(renderer)
         half = np.array([extent.width, extent.height]) / 2 + _ROOM
-        centre = axes.transData.transform(label.at)
-        best, least = centre, math.inf
-        for distance in _DISTANCES:
-            for step in range(_DIRECTIONS):
-                direction = np.array(
-                    [math.cos(2 * math.pi * step / _DIRECTIONS), math.sin(2 * math.pi * step / _DIRECTIONS)]
-                )
-                # The word's edge, not its middle, is that far from the place.
-                reach = min(half / np.maximum(np.abs(direction), 1e-9))
-                place = centre + direction * (distance * per_point + reach)
-                box = (*(place - half), *(place + half))
-                cost = _FAR * distance - 2.0 * float(direction @ label.away) + _cost(box, taken, dots, inside)
-                if cost < least:
-                    best, least = place, cost
-        text.set_position(tuple(axes.transData.inverted().transform(best)))
-        taken.append((*(best - half), *(best + half)))
+        place, start = _best_place(label, half, axes.transData.transform(label.at), sheet)
+        text.set_position(tuple(back.transform(place)))
+        sheet.taken.append((*(place - half), *(place + half)))
+        if label.owner:
+            end = _edge_towards(place, half, start)
+            if np.linalg.norm(end - start) > _LED * sheet.per_point:
+                sheet.leaders.append((*start, *end))
+                line = back.transform(np.array([start, end]))
+                _draw_leader(axes, line, label)
         texts.append(text)
     return texts
 
 
-def _cost(
-    box: tuple[float, ...],
-    taken: Sequence[tuple[float, ...]],
-    dots: FloatArray,
-    inside: tuple[float, float, float, float],
-) -> float:
-    """Return the cost of a word's box, in pixels: left, bottom, right, top.
+def _draw_leader(axes: Axes, line: FloatArray, label: Label) -> None:
+    """Draw a thin line (2, 2) from a place on a limb, where it has a dot, to a word."""
+    axes.add_line(
+        Line2D(
+            line[:, 0], line[:, 1], color="white", linewidth=2.6, zorder=98, solid_capstyle="butt", gid="leader edge"
+        )
+    )
+    axes.add_line(
+        Line2D(line[:, 0], line[:, 1], color=label.color, linewidth=0.8, zorder=99, gid=f"leader {label.owner}")
+    )
+    axes.plot([line[0, 0]], [line[0, 1]], marker="o", markersize=2.6, color=label.color, zorder=99, gid="leader dot")
+
+
+def _edge_towards(place: FloatArray, half: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the point (2,) of the edge of a word's box on the way from its middle to a target."""
+    way = target - place
+    part = min(half / np.maximum(np.abs(way), 1e-9))
+    return np.asarray(place + min(float(part), 1.0) * way)
+
+
+def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Sheet) -> tuple[FloatArray, FloatArray]:
+    """Return the middle (2,) of a word where its cost is least, and the place (2,) that it names there, in pixels.
 
     Args:
-        box: of the word.
-        taken: boxes of the words already placed.
-        dots: (k, 2) points that words should not cover.
-        inside: box of the axes.
+        label: the word.
+        half: (2,) half of the size of its box.
+        places: (k, 2) places to choose from.
+        sheet: what is already on the paper.
     """
+    best, at, least = places[0], places[0], math.inf
+    distances = (*_DISTANCES, *_LED_DISTANCES) if label.owner else _DISTANCES
+    for place in places:
+        for distance in distances:
+            for step in range(_DIRECTIONS):
+                angle = 2 * math.pi * step / _DIRECTIONS
+                direction = np.array([math.cos(angle), math.sin(angle)])
+                # The word's edge, not its middle, is that far from the place.
+                reach = min(half / np.maximum(np.abs(direction), 1e-9))
+                middle = place + direction * (distance * sheet.per_point + reach)
+                cost = _FAR * distance - 2.0 * float(direction @ label.away)
+                if cost < least:
+                    cost += _cost(label, middle, half, place, sheet)
+                if cost < least:
+                    best, at, least = middle, place, cost
+    return best, at
+
+
+def _cost(label: Label, middle: FloatArray, half: FloatArray, place: FloatArray, sheet: _Sheet) -> float:
+    """Return the cost of what a word at a place covers, arguments as for :func:`_best_place`."""
+    box = (*(middle - half), *(middle + half))
     cost = 0.0
-    for other in taken:
+    for other in sheet.taken:
         wide = min(box[2], other[2]) - max(box[0], other[0])
         high = min(box[3], other[3]) - max(box[1], other[1])
         if wide > 0 and high > 0:
             cost += _OVERLAP + wide * high / 10
-    within = (dots[:, 0] > box[0]) & (dots[:, 0] < box[2]) & (dots[:, 1] > box[1]) & (dots[:, 1] < box[3])
-    cost += _COVERED * int(np.count_nonzero(within))
+    inside = sheet.frame
     if box[0] < inside[0] or box[1] < inside[1] or box[2] > inside[2] or box[3] > inside[3]:
         cost += _OUTSIDE
+    limbs = sheet.owners != ""
+    room = _HALF_LIMB * sheet.per_point
+    wide_box = (box[0] - room, box[1] - room, box[2] + room, box[3] + room)
+    on_limb = segments_in_box(sheet.segments[limbs], wide_box)
+    cost += _ON_OTHER_LIMB * int(np.count_nonzero(on_limb & (sheet.owners[limbs] != label.owner)))
+    cost += _COVERED * int(np.count_nonzero(on_limb & (sheet.owners[limbs] == label.owner)))
+    cost += _COVERED * int(np.count_nonzero(segments_in_box(sheet.segments[~limbs], box)))
+    if sheet.leaders:
+        cost += _OVERLAP * int(np.count_nonzero(segments_in_box(np.array(sheet.leaders), box)))
+    if label.owner:
+        leader = np.array([*place, *_edge_towards(middle, half, place)])
+        others = sheet.segments[limbs & (sheet.owners != label.owner)]
+        cost += _LEADER_CROSSES * int(np.count_nonzero(segments_cross(others, leader)))
+        if sheet.leaders:
+            cost += _OVERLAP * int(np.count_nonzero(segments_cross(np.array(sheet.leaders), leader)))
+        for other in sheet.taken:
+            cost += _OVERLAP * int(np.count_nonzero(segments_in_box(leader[None, :], other)))
     return cost

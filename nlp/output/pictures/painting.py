@@ -12,10 +12,11 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 
 from ....models import Body, FloatArray, MarkKind, WrenchKind
+from ...units import rate_unit
 from .canvas import FAINT, INK, MUTED, RED, Canvas
 from .drawing import Drawing, Motion
 from .posture import Posture
-from .style import RATE_COLOURS, signed_text
+from .style import RATE_COLOURS, rate_text
 from .view import View, painting_order
 
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"
@@ -23,6 +24,8 @@ VELOCITY, FREE = "#6d2a8c", "#0b6b57"
 #: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
+#: Places on a limb, in parts of its length, that its label may point to.
+_ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
 #: Radius of an angle's arc, in parts of its first ray.
 _ARC = 0.72
 #: A rate below this part of the largest, and a pitch or velocity below this part of the robot's size, show as 0.
@@ -132,13 +135,19 @@ class Panel:
             line, limb = lines[index]
             colour = self._colour(rates[limb]) if rates else "#7d8a96"
             at = 10 + 20 * place / len(lines)
+            # The line of the limb itself is what no other limb's words may cover.
             self._canvas.line(line, f"limb edge {limb}", color=INK, linewidth=7.0, zorder=at)
-            self._canvas.line(line, f"limb {limb}", color=colour, linewidth=5.4, zorder=at + 0.1)
+            self._canvas.line(line, f"limb {limb}", color=colour, linewidth=5.4, zorder=at + 0.1, limb=limb)
             self._canvas.line(line, f"limb light {limb}", color="white", alpha=0.35, linewidth=1.4, zorder=at + 0.2)
-            name = limb if not rates else f"{limb}: {_rate_text(rates[limb], self.largest)}"
-            part = 0.3 if place % 2 else 0.45
-            at_limb = line[0] + part * (line[1] - line[0])
-            self._canvas.label(name, at_limb, self._canvas.outwards(at_limb), bold=True, size=9.0)
+        for limb in dict.fromkeys(limb for _, limb in lines):
+            # One label a limb, on its longest link.
+            link = max(
+                (line for line, name in lines if name == limb),
+                key=lambda ends: float(np.linalg.norm(np.ptp(ends, axis=0))),
+            )
+            places = link[0] + np.outer(_ALONG_LINK, link[1] - link[0])
+            text = f"limb {limb}" if not rates else f"limb {limb}\n{self._rate_text(rates[limb])}"
+            self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
     def _paint_joints(self) -> None:
         """Paint a circle at every point that ends a line."""
@@ -172,8 +181,8 @@ class Panel:
         if math.isinf(motion.pitch):
             self._canvas.arrow(motion.line[0], motion.line[1], name, colour, width, 47)
         else:
-            style = {"color": colour, "linewidth": width, "zorder": 8}
-            self._canvas.line(motion.line, name, **style, **({"linestyle": (0, (3, 2))} if free else {}))
+            dashes = (0, (3, 2)) if free else "solid"
+            self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
             if not free:
                 self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
                 self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
@@ -191,7 +200,7 @@ class Panel:
             return f"{motion.name} (translation)"
         if abs(motion.pitch) < _NOISE * self.drawing.size:
             return f"{motion.name} (rotation, path in purple)"
-        return f"{motion.name} (screw of pitch {motion.pitch:.4g} {unit}, path in purple)"
+        return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}, path in purple)"
 
     def _paint_couples(self) -> None:
         """Paint couples as arrows with two heads, at the points that join their limbs to the platform."""
@@ -206,8 +215,8 @@ class Panel:
             end, colour = at + _COUPLE * self.drawing.size * direction, self._colour(row.rate)
             self._canvas.arrow(at, end, f"couple {row.limb}", colour, 2.6, 50)
             self._canvas.arrow(at, at + 0.86 * (end - at), f"couple head {row.limb}", colour, 2.6, 50)
-            text = f"couple {row.limb}: {_rate_text(row.rate, self.largest)}"
-            self._canvas.label(text, end, self._canvas.outwards(end), bold=True)
+            text = f"couple of limb {row.limb}\n{self._rate_text(row.rate)}"
+            self._canvas.label(text, end, self._canvas.outwards(end), bold=True, size=8.5)
             if not any(text.startswith("couple") for _, text in self.legend):
                 handle = Line2D([], [], color=MUTED, linewidth=2.6, marker=">")
                 self.legend.append((handle, "couple that a limb applies (two heads)"))
@@ -224,7 +233,8 @@ class Panel:
             if np.linalg.norm(velocity) > 1e-6 * fastest:
                 self._canvas.arrow(at, at + factor * velocity, f"velocity {name}", VELOCITY, 1.5, 48)
         handle = Line2D([], [], color=VELOCITY, linewidth=1.5, marker=">")
-        self.legend.append((handle, f"velocity of the platform's corners, not to scale (fastest {fastest:.4g})"))
+        words = f"velocity of the platform's corners, not to scale (fastest {fastest:.4g} {self._rate_unit()})"
+        self.legend.append((handle, words))
 
     def _paint_directions(self) -> None:
         """Paint named directions, such as joints' axes."""
@@ -264,10 +274,15 @@ class Panel:
         red, green, blue, alpha = self._colours(self._scale(rate))
         return red, green, blue, alpha
 
+    def _rate_text(self, rate: float) -> str:
+        """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""
+        text = "0" if abs(rate) <= _NOISE * max(self.largest, 1e-6) else rate_text(rate)
+        return f"{text} {self._rate_unit()}".strip()
 
-def _rate_text(rate: float, largest: float) -> str:
-    """Return a rate with its sign; rounding error beside the largest rate is 0."""
-    return "0" if abs(rate) <= _NOISE * max(largest, 1e-6) else signed_text(rate)
+    def _rate_unit(self) -> str:
+        """Return the unit of rates and velocities; an empty one without a task or a case."""
+        motion, case = self.drawing.motion, self.drawing.case
+        return rate_unit(motion.twist, case.units) if motion is not None and case is not None else ""
 
 
 def _arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:

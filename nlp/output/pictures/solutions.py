@@ -4,32 +4,57 @@ from __future__ import annotations
 
 from ...case.task import Sense
 from ...solver.multistart import ProgramSolution
-from ...solver.solution import Solution
+from ...solver.solution import Solution, TaskOutcome
 from ...solver.status import Status
 from .drawing import Drawing, drawing_of
+from .poses import pose_index, states_at_poses, worst_pose
 
 
-def drawings_of(found: Solution) -> list[Drawing]:
-    """Return the robot with its task, or at the combined point with each of several tasks; at the first of its poses.
+def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
+    """Return the robot with its task, or at the combined point with each of several tasks; at one of its poses.
+
+    Args:
+        found: the solution.
+        pose: number of the pose, 1 for the first.
 
     Raises:
         EvaluationError: the robot does not exist at the point reached.
+        InputError: the case has no such pose.
     """
-    if found.combination is None:
-        headline = _headline(found.outcomes[0].own)
-        return [drawing_of(found.nlp, found.x, found.state, headline=headline, is_answer=found.status.is_answer)]
-    method = found.combination.method.value
-    drawings = []
-    for task, outcome in enumerate(found.outcomes):
-        if found.all_solved:
-            headline = f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {len(found.outcomes)} tasks"
-        else:
-            headline = f"{found.status.value}: this is not what was asked for"
-        drawing = drawing_of(
-            outcome.own.nlp, found.x, outcome.state, task, headline=headline, is_answer=found.status.is_answer
+    index = pose_index(found.outcomes[0].own.nlp, pose)
+    return [
+        drawing_of(
+            outcome.own.nlp,
+            outcome.x,
+            states_at_poses(outcome)[index],
+            task,
+            pose=index,
+            headline=_headline_of(found, outcome) + _pose_words(outcome, index),
+            is_answer=found.status.is_answer,
         )
-        drawings.append(drawing)
-    return drawings
+        for task, outcome in enumerate(found.outcomes)
+    ]
+
+
+def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
+    """Return the result for one task in one line."""
+    if found.combination is None:
+        return _headline(outcome.own)
+    if not found.all_solved:
+        return f"{found.status.value}: this is not what was asked for"
+    method, count = found.combination.method.value, len(found.outcomes)
+    return f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {count} tasks"
+
+
+def _pose_words(outcome: TaskOutcome, index: int) -> str:
+    """Return how F is combined over several poses, the pose shown and its own F; nothing for a single pose."""
+    states = states_at_poses(outcome)
+    if len(states) == 1:
+        return ""
+    state, case = states[index], outcome.own.nlp.case
+    own = "" if state is None else f", F = {state.F:.7g} there"
+    worst = ", the worst" if worst_pose(states, outcome.task.sense) == index else ""
+    return f" ({case.over_poses.value} over {len(states)} poses). Shown: pose {index + 1}{own}{worst}"
 
 
 def _headline(solution: ProgramSolution) -> str:

@@ -9,3 +9,8 @@ RATE_COLOURS = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
 def signed_text(value: float) -> str:
     """Return a number with its sign and three digits, for people."""
     return f"{value:+.3g}".replace("-", "\N{MINUS SIGN}")
+
+
+def rate_text(value: float) -> str:
+    """Return a rate with its sign and as many digits as the tables of results have."""
+    return f"{value + 0.0:+.6g}".replace("-", "\N{MINUS SIGN}")

@@ -14,8 +14,8 @@ from ..pictures.posture import Posture
 from ..pictures.style import RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
 
-#: Number of postures on each side of the posture found.
-_SIDE = 20
+#: Postures on each side of the one found, at most, at least, and in all views of a page together.
+_SIDE, _LEAST_SIDE, _SIDES = 20, 2, 80
 #: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
@@ -82,10 +82,15 @@ class FrameData(TypedDict):
 class ViewData(TypedDict):
     """Content of the 3-D view, in the case's units.
 
-    ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture found.
+    ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture found. ``task`` and ``pose`` are
+    indices, and ``is_worst`` says whether F is the worst of several poses there.
     """
 
     name: str
+    task: int
+    pose: int
+    pose_words: str
+    is_worst: bool
     headline: str
     is_answer: bool
     unit: str
@@ -120,18 +125,41 @@ class _PostureSequence(NamedTuple):
     zero: int
 
 
-def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
+class PoseView(NamedTuple):
+    """The pose and the task that a view shows.
+
+    Attributes:
+        task: index of the task.
+        pose: index of the pose.
+        poses: number of poses of the case.
+        is_worst: whether F is the worst there.
+        views: number of views of the page, which share its size.
+    """
+
+    task: int = 0
+    pose: int = 0
+    poses: int = 1
+    is_worst: bool = False
+    views: int = 1
+
+
+def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView()) -> ViewData:  # noqa: B008 - immutable
     """Return the data of the 3-D view.
 
     Args:
         drawing: the robot and its motion.
-        rates: (m,) work rates at its posture from the result, so that page and result agree to the last bit.
+        rates: (m,) work rates at its posture as the result has them, so that page and result agree to the last bit.
+        shown: the pose and the task.
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
-    postures, zero = _postures_along_motion(drawing)
+    postures, zero = _postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
     return {
         "name": "" if motion is None else motion.name,
+        "task": shown.task,
+        "pose": shown.pose,
+        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {float(rates @ rates):.7g}",
+        "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
         "unit": units.length,
@@ -158,19 +186,19 @@ def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
     }
 
 
-def _postures_along_motion(drawing: Drawing) -> _PostureSequence:
-    """Return postures along the motion of a drawing.
+def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
+    """Return postures along the motion of a drawing, at most ``count`` on each side of its own.
 
     The postures end where the robot cannot be assembled; without a motion, there is only the drawing's own posture.
     """
     if drawing.motion is None:
         return _PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
-    step = _largest_time(drawing) / _SIDE
+    step = _largest_time(drawing) / count
     sides: list[list[_TimedPosture]] = []
     for sign in (-1, 1):
         side: list[_TimedPosture] = []
         last: Posture | None = drawing.posture
-        for k in range(1, _SIDE + 1):
+        for k in range(1, count + 1):
             # The nearest posture is the best start for closing loops; without loops, no error adds up from the first.
             closes = bool(drawing.model.unknowns)
             start, t = (last, sign * step) if closes else (drawing.posture, sign * step * k)
@@ -255,7 +283,7 @@ def _motion_data(motion: Motion, units: Units) -> MotionData:
     elif abs(motion.pitch) < 1e-9:
         words = f"{motion.name}: rotation"
     else:
-        words = f"{motion.name}: screw of pitch {motion.pitch:.4g} {units.length}"
+        words = f"{motion.name}: screw of pitch {motion.pitch:.5g} {units.length}"
     return {
         "words": words,
         "twist": motion.twist.tolist(),

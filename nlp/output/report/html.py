@@ -33,8 +33,9 @@ def report(
         curves: results of trade-offs, which stand in the place of the slices.
 
     Raises:
-        InputError: Plotly is not installed.
+        InputError: Plotly or Matplotlib is not installed.
     """
     check_library("plotly", "reports")
+    check_library("matplotlib", "reports")
     solution = found if isinstance(found, Solution) else found.solution
     return page_of(replace(report_of(text, solution, result_of(found), check), curves=tuple(curves)))

@@ -13,7 +13,6 @@ import numpy as np
 
 from ....models import FloatArray
 from ...case.case import Case
-from ...evidence.state import RobotState
 from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
@@ -21,9 +20,10 @@ from ...results.regression import CaseCheck
 from ...results.rounding import number
 from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
-from ...solver.solution import Solution
-from ..pictures.drawing import drawing_of
-from .frames import ViewData, view_data
+from ...solver.solution import Solution, TaskOutcome
+from ..pictures.drawing import Drawing, drawing_of
+from ..pictures.poses import states_at_poses, worst_pose
+from .frames import PoseView, ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
 #: Largest number of maps of two variables in a report: seven free variables have 21 pairs.
@@ -39,7 +39,8 @@ class Part:
         nlp: its program.
         x: (n,) the point.
         solution: of the task by itself.
-        view: the robot there, for the 3-D view; None where it does not exist.
+        views: the robot there, for the 3-D view, at each pose where it exists.
+        drawings: the same as drawings, in the same order.
         slices: F along each variable.
         planes: F over pairs of variables.
         pairs: number of all pairs of variables.
@@ -49,7 +50,8 @@ class Part:
     nlp: Nlp
     x: FloatArray
     solution: ProgramSolution
-    view: ViewData | None
+    views: tuple[ViewData, ...]
+    drawings: tuple[Drawing, ...]
     slices: tuple[Slice, ...]
     planes: tuple[Plane, ...]
     pairs: int
@@ -91,7 +93,7 @@ class Report:
         """Return the data of the page's script, as JSON's own types."""
         return {
             "result": json_data(self.result),
-            "views": [part.view for part in self.parts if part.view is not None],
+            "views": [view for part in self.parts for view in part.views],
             "planes": [[_plane(part.nlp, part.x, plane) for plane in part.planes] for part in self.parts],
         }
 
@@ -111,19 +113,23 @@ def report_of(
     is_answer = solution.status.is_answer
     combined = None if solution.combination is None else solution.combination.combined
     parts = tuple(
-        _part(outcome.own.nlp, solution.x, outcome.state, outcome.own, j, len(solution.outcomes), is_answer)
+        _part(outcome, solution.x, j, len(solution.outcomes), is_answer=is_answer)
         for j, outcome in enumerate(solution.outcomes)
     )
     return Report(solution.case, text, result, parts, combined, check, is_answer, refusal)
 
 
-def _part(
-    nlp: Nlp, x: FloatArray, state: RobotState | None, own: ProgramSolution, task: int, tasks: int, is_answer: bool
-) -> Part:
-    """Return the part of one task, by its index, at the point (n,) of the report."""
-    view = None
-    if state is not None:
-        view = view_data(drawing_of(nlp, x, state, task, is_answer=is_answer), state.rates)
+def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answer: bool) -> Part:
+    """Return the content about one of several tasks at a point (n,)."""
+    nlp, state, own = outcome.own.nlp, outcome.state, outcome.own
+    states = states_at_poses(outcome)
+    worst, count = worst_pose(states, outcome.task.sense), len(states)
+    drawings, views = [], []
+    for k, each in enumerate(states):
+        if each is not None:
+            drawing = drawing_of(nlp, outcome.x, each, task, pose=k, is_answer=is_answer)
+            drawings.append(drawing)
+            views.append(view_data(drawing, each.rates, PoseView(task, k, count, k == worst, count * tasks)))
     can_move = state is not None and nlp.n > 0 and not has_loops(nlp)
     slices: Sequence[Slice] = slices_of(nlp, x) if can_move else []
     planes: Sequence[Plane] = planes_of(nlp, x, _PLANES // tasks) if can_move else []
@@ -133,7 +139,8 @@ def _part(
         nlp=nlp,
         x=x,
         solution=own,
-        view=view,
+        views=tuple(views),
+        drawings=tuple(drawings),
         slices=tuple(slices),
         planes=tuple(planes),
         pairs=count * (count - 1) // 2,

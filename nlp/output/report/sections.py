@@ -28,6 +28,7 @@ from .exploration import optima, surroundings
 from .frames import ViewData
 from .judgement import certificate_section, evidence_section, published_section
 from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .poseviews import drawings, pose_controls
 from .report import Report
 
 
@@ -95,7 +96,7 @@ def _case(report: Report) -> Markup:
     if case.pose_count > 1:
         lines.append(
             f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
-            "Pictures and their rates show the first."
+            "The picture and its rates begin with the first; a slider shows each."
         )
     limits = _limits_of(report)
     if limits:
@@ -109,18 +110,21 @@ def _case(report: Report) -> Markup:
 
 def _robot(report: Report) -> Markup:
     """Return the 3-D view with its controls, its legend and the rates."""
-    views = [part.view for part in report.parts if part.view is not None]
+    views = [view for part in report.parts for view in part.views]
     if not views:
         return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
     first = views[0]
     head: list[Markup] = []
     if not report.is_answer:
         head.append(tag("p", "This is what was reached, and not an optimum.", class_="warning"))
-    if len(views) > 1:
-        options = [tag("option", view["name"], value=k) for k, view in enumerate(views)]
+    if len(report.parts) > 1:
+        options = [tag("option", part.name, value=k) for k, part in enumerate(report.parts) if part.views]
         head.append(
             tag("p", tag("label", "Task: ", for_="task"), tag("select", *options, id="task"), class_="controls script")
         )
+    controls = pose_controls(views, report.case.pose_count)
+    if controls is not None:
+        head.append(controls)
     last = len(first["frames"]) - 1
     moving = tag(
         "p",
@@ -148,13 +152,14 @@ def _robot(report: Report) -> Markup:
             role="img",
             aria_label="The robot in three dimensions; the table below says the same in numbers.",
         ),
+        drawings(report),
         buttons,
         # A copy of the picture is for printing, because browsers do not print WebGL.
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
     content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
-    note = "Without a script nothing moves and the picture is missing; every number is in the tables."
+    note = "Without a script nothing moves; every number is in the tables."
     return join_markup([*content, tag("noscript", tag("p", note))])
 
 

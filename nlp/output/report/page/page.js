@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   const byId = (id) => document.getElementById(id);
   const data = JSON.parse(byId("data").textContent);
@@ -12,19 +11,11 @@
   const FACES = { base: "#c3ccd5", platform: "#a9c6de" };
   const FONT = "Arial, 'DejaVu Sans', sans-serif";
 
-  // Text of a case must not become markup in a hover label, which knows some tags.
-  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-  const shown = (value, digits = 6, signed = false) => {
-    const text = String(Number(value.toPrecision(digits)));
-    return (signed && value > 0 ? "+" : "") + text.replace(/-/g, "\u2212");
-  };
-  const plus = (a, b, factor = 1) => a.map((each, k) => each + factor * b[k]);
-  const norm = (a) => Math.hypot(...a);
-  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-
   let view = data.views[0] || null;
   let index = view ? view.zero : 0;
   let layout = null;
+  // Until the platform is moved, the box is no larger than the posture found needs.
+  let isMoved = false;
 
   // Colours and bars have the scale of the position shown, as in picture files.
   const largest = () => Math.max(...view.frames[index].rates.map(Math.abs)) || 1;
@@ -50,35 +41,13 @@
     return { type: "scatter3d", mode: "lines", name, x: axes[0], y: axes[1], z: axes[2], line: style, hoverinfo: "skip", showlegend: false, ...more };
   }
 
-  // Heads of arrows as one mesh of cones: tips, unit directions, and one length.
-  function heads(name, tips, directions, length, fill) {
-    const x = [], y = [], z = [], i = [], j = [], k = [], sides = 10;
-    const add = (point) => { x.push(point[0]); y.push(point[1]); z.push(point[2]); return x.length - 1; };
-    tips.forEach((tip, n) => {
-      const s = directions[n], other = Math.abs(s[0]) < 0.8 ? [1, 0, 0] : [0, 1, 0];
-      let a = cross(s, other);
-      a = a.map((each) => each / norm(a));
-      const b = cross(s, a), back = plus(tip, s, -length), top = add(tip), middle = add(back);
-      const rim = [];
-      for (let m = 0; m < sides; m += 1) {
-        const angle = (2 * Math.PI * m) / sides;
-        rim.push(add(plus(plus(back, a, 0.27 * length * Math.cos(angle)), b, 0.27 * length * Math.sin(angle))));
-      }
-      rim.forEach((at, m) => {
-        const next = rim[(m + 1) % sides];
-        i.push(top, middle); j.push(at, next); k.push(next, at);
-      });
-    });
-    return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
-  }
-
   function limbText(frame, limb) {
     const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
     const text = [`<b>limb ${plain(limb)}</b>`];
     if (rows.length) text.push(`length ${shown(frame.lengths[rows[0][1]])} ${plain(view.unit)}`);
     for (const [row, k] of rows) {
       const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
-      const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value, 4));
+      const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value));
       text.push(`${row.kind}: rate ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
       text.push(`wrench (${wrench.slice(0, 3).join(", ")}; ${wrench.slice(3).join(", ")})`);
     }
@@ -162,6 +131,21 @@
     return found;
   }
 
+  // Names of limbs, each on its longest link.
+  function names(frame) {
+    const found = new Map();
+    for (const { limb, ends: [a, b] } of view.links) {
+      if (limb === null) continue;
+      const way = plus(frame.points[b], frame.points[a], -1), long = norm(way);
+      if (!found.has(limb) || found.get(limb).long < long) found.set(limb, { long, start: frame.points[a], way });
+    }
+    // Each at another height, so that names of limbs side by side do not meet.
+    return [...found].map(([limb, { start, way }], k) => {
+      const [x, y, z] = plus(start, way, 0.22 + (0.56 * ((k * 2.5) % found.size)) / found.size);
+      return { x, y, z, text: (byId("view").clientWidth < 480 ? "" : "limb ") + plain(limb), showarrow: false, xanchor: "center", bgcolor: "rgba(255,255,255,0.82)", borderpad: 1, font: { color: INK, size: 11 } };
+    });
+  }
+
   // Length of an arrow for a velocity of 1; none where nothing moves.
   function speedScale() {
     const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
@@ -169,10 +153,10 @@
   }
 
   function ranges() {
-    const every = view.frames.flatMap((frame) => frame.points);
+    const shownFrames = isMoved ? view.frames : [view.frames[view.zero]], every = shownFrames.flatMap((frame) => frame.points);
     // What stands outside of the box is not drawn, so arrows count too.
     const factor = speedScale();
-    for (const frame of view.frames) {
+    for (const frame of shownFrames) {
       frame.velocities.forEach((velocity, k) => every.push(plus(frame.points[view.corners[k]], velocity, factor)));
       view.rows.forEach((row, k) => {
         if (row.kind !== "couple" || row.at === null) return;
@@ -188,7 +172,7 @@
 
   function newLayout() {
     const unit = view.unit ? `, ${plain(view.unit)}` : "";
-    const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6 });
+    const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6, ticklen: 3, tickfont: { size: 11 } });
     const [x, y, z] = ranges();
     return {
       margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: FONT, color: INK, size: 12 }, hovermode: "closest",
@@ -196,19 +180,14 @@
     };
   }
 
-  // From the side that shows most, so far that the whole box is seen: its sides have a product of 1 to the library.
-  function camera() {
-    const sides = ranges().map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
-    const wide = byId("view").clientWidth / byId("view").clientHeight;
-    const far = (0.72 * norm(sides) * Math.max(1, 0.95 / wide)) / mean;
-    const [x, y, z] = view.eye.map((each) => 1.72 * far * each);
-    return { eye: { x, y, z }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.07 * far }, projection: { type: "perspective" } };
-  }
+  // From the side that shows most, as near as the whole box with its ticks is seen.
+  const camera = () => fittedCamera(ranges(), view.eye, { width: byId("view").clientWidth, height: byId("view").clientHeight });
   const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
   function draw() {
     if (!view || !window.Plotly || !layout) return null;
     keep();
+    layout.scene.annotations = names(view.frames[index]);
     return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, config);
   }
 
@@ -240,6 +219,32 @@
     });
   }
 
+  // Views stand in order of tasks, and of poses within a task.
+  const task = () => (byId("task") ? Number(byId("task").value) : data.views[0].task);
+  const worst = () => (data.views.find((each) => each.task === task() && each.is_worst) || view).pose + 1;
+
+  function tellPose() {
+    const words = view.is_worst ? `${view.pose_words}, the worst` : view.pose_words;
+    byId("posed").textContent = words;
+    byId("pose").setAttribute("aria-valuetext", words);
+    byId("worst").disabled = view.is_worst;
+  }
+
+  function choose() {
+    const pose = byId("pose") ? Number(byId("pose").value) - 1 : 0, found = data.views.find((each) => each.task === task() && each.pose === pose);
+    if (!found) {
+      byId("posed").textContent = "The robot does not exist at this pose.";
+      return;
+    }
+    view = found;
+    byId("travel").max = view.frames.length - 1;
+    byId("travel").value = view.zero;
+    document.querySelectorAll("img.still").forEach((each) => each.classList.toggle("chosen", Number(each.dataset.view) === data.views.indexOf(view)));
+    if (byId("pose")) tellPose();
+    if (window.Plotly && layout) layout = newLayout();
+    move(view.zero);
+  }
+
   let waiting = false;
   function move(to) {
     index = to;
@@ -250,15 +255,15 @@
   }
 
   function turn(key) {
-    const eye = layout.scene.camera.eye, far = Math.hypot(eye.x, eye.y, eye.z);
-    let round = Math.atan2(eye.y, eye.x), up = Math.asin(eye.z / far), distance = far;
+    const { eye, center } = layout.scene.camera, [x, y, z] = ["x", "y", "z"].map((each) => eye[each] - center[each]), far = Math.hypot(x, y, z);
+    let round = Math.atan2(y, x), up = Math.asin(z / far), distance = far;
     if (key === "left") round -= Math.PI / 12;
     if (key === "right") round += Math.PI / 12;
     if (key === "up") up = Math.min(up + Math.PI / 18, 1.5);
     if (key === "down") up = Math.max(up - Math.PI / 18, -1.5);
     if (key === "in") distance /= 1.2;
     if (key === "out") distance *= 1.2;
-    layout.scene.camera = key === "reset" ? camera() : { ...layout.scene.camera, eye: { x: distance * Math.cos(up) * Math.cos(round), y: distance * Math.cos(up) * Math.sin(round), z: distance * Math.sin(up) } };
+    layout.scene.camera = key === "reset" ? camera() : { ...layout.scene.camera, eye: { x: center.x + distance * Math.cos(up) * Math.cos(round), y: center.y + distance * Math.cos(up) * Math.sin(round), z: center.z + distance * Math.sin(up) } };
     keep();
     window.Plotly.relayout(byId("view"), { "scene.camera": layout.scene.camera });
   }
@@ -300,18 +305,18 @@
 
   byId("copy").addEventListener("click", copy);
   if (view) {
-    byId("travel").addEventListener("input", (event) => move(Number(event.target.value)));
+    byId("travel").addEventListener("input", (event) => {
+      if (!isMoved && layout) {
+        isMoved = true;
+        layout = newLayout();
+      }
+      move(Number(event.target.value));
+    });
     document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => layout && turn(button.dataset.turn)));
     tell();
-    if (byId("task")) {
-      byId("task").addEventListener("change", (event) => {
-        view = data.views[Number(event.target.value)];
-        byId("travel").max = view.frames.length - 1;
-        byId("travel").value = view.zero;
-        if (window.Plotly) layout = newLayout();
-        move(view.zero);
-      });
-    }
+    for (const id of ["task", "pose"]) if (byId(id)) byId(id).addEventListener("input", choose);
+    if (byId("worst")) byId("worst").addEventListener("click", () => { byId("pose").value = worst(); choose(); });
+    if (byId("pose")) tellPose();
   }
   if (byId("pair")) {
     byId("pair").addEventListener("change", map);
@@ -324,6 +329,7 @@
     library.textContent = byId("plotly").textContent;
     document.head.append(library);
     try {
+      if (view && !hasWebGL()) throw new Error("no WebGL");
       if (view) {
         byId("view").textContent = "";
         layout = newLayout();
@@ -331,7 +337,8 @@
         byId("view").on("plotly_relayout", keep);
       }
     } catch {
-      byId("view").textContent = "This browser cannot draw in three dimensions. The tables have every number.";
+      layout = null;
+      document.documentElement.classList.add("flat");
     }
     if (byId("pair")) {
       byId("map").textContent = "";

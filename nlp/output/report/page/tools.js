@@ -1,0 +1,72 @@
+"use strict";
+// Where the eye stands so that a box fills its frame: Plotly's camera, whose unit makes the product of the sides 1.
+const fittedCamera = (ranges, eye, frame) => {
+  // Half of the angle of Plotly's perspective is an eighth of a half turn; ticks and titles need room, in pixels.
+  const HALF = Math.tan(Math.PI / 8), SIDE = 46, TOP = 32;
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const unit = (a) => a.map((each) => each / Math.hypot(...a));
+  const sides = ranges.map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
+  const half = sides.map((each) => each / mean / 2);
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => half.map((each, k) => ((n >> k) & 1 ? each : -each)));
+  const towards = unit(eye), right = unit(across([0, 0, 1], towards)), up = across(towards, right);
+  const wide = Math.max(0.2, 1 - (2 * SIDE) / frame.width), high = Math.max(0.2, 1 - (2 * TOP) / frame.height);
+  const shape = frame.width / frame.height;
+  let centre = [0, 0, 0], far = 10;
+  // Middle and distance depend on each other in perspective: a few rounds settle both.
+  for (let round = 0; round < 12; round += 1) {
+    const from = corners.map((corner) => corner.map((each, k) => each - centre[k]));
+    // The eye must be so far that every corner is within the frame.
+    far = Math.max(...from.map((each) => dot(each, towards) + Math.max(Math.abs(dot(each, right)) / (HALF * shape * wide), Math.abs(dot(each, up)) / (HALF * high))));
+    const seen = from.map((each) => [right, up].map((way) => dot(each, way) / (far - dot(each, towards))));
+    const middle = [0, 1].map((k) => (Math.min(...seen.map((each) => each[k])) + Math.max(...seen.map((each) => each[k]))) / 2);
+    centre = centre.map((each, k) => each + far * (middle[0] * right[k] + middle[1] * up[k]));
+  }
+  const point = (values) => ({ x: values[0], y: values[1], z: values[2] });
+  return { eye: point(centre.map((each, k) => each + far * towards[k])), up: point([0, 0, 1]), center: point(centre), projection: { type: "perspective" } };
+};
+
+// Text of a case must not become markup in a hover label, which knows some tags.
+const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+const shown = (value, digits = 6, signed = false) => {
+  const text = String(Number(value.toPrecision(digits)));
+  return (signed && value > 0 ? "+" : "") + text.replace(/-/g, "\u2212");
+};
+const plus = (a, b, factor = 1) => a.map((each, k) => each + factor * b[k]);
+const norm = (a) => Math.hypot(...a);
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+// Heads of arrows as one mesh of cones: tips, unit directions, and one length.
+function heads(name, tips, directions, length, fill) {
+  const x = [], y = [], z = [], i = [], j = [], k = [], sides = 10;
+  const add = (point) => { x.push(point[0]); y.push(point[1]); z.push(point[2]); return x.length - 1; };
+  tips.forEach((tip, n) => {
+    const s = directions[n], other = Math.abs(s[0]) < 0.8 ? [1, 0, 0] : [0, 1, 0];
+    let a = cross(s, other);
+    a = a.map((each) => each / norm(a));
+    const b = cross(s, a), back = plus(tip, s, -length), top = add(tip), middle = add(back);
+    const rim = [];
+    for (let m = 0; m < sides; m += 1) {
+      const angle = (2 * Math.PI * m) / sides;
+      rim.push(add(plus(plus(back, a, 0.27 * length * Math.cos(angle)), b, 0.27 * length * Math.sin(angle))));
+    }
+    rim.forEach((at, m) => {
+      const next = rim[(m + 1) % sides];
+      i.push(top, middle); j.push(at, next); k.push(next, at);
+    });
+  });
+  return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
+}
+
+const hasWebGL = () => {
+  try {
+    return Boolean(document.createElement("canvas").getContext("webgl"));
+  } catch {
+    return false;
+  }
+};
+
+// A table that is wider than its place says so.
+const wider = new ResizeObserver((entries) => entries.forEach(({ target }) => target.classList.toggle("wider", target.scrollWidth > target.clientWidth + 1)));
+document.querySelectorAll(".scroll").forEach((each) => wider.observe(each));
+
