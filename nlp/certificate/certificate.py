@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from ...models import FloatArray
+from ...models.whole import Whole
 from ..case.task import Sense
 from ..program.nlp import Nlp
 
@@ -24,7 +25,7 @@ class CertificateStatus(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Whole):
     """A proven bound.
 
     Attributes:
@@ -62,6 +63,9 @@ class Certificate:
     seconds: float
     reason: str
     history: tuple[tuple[float, float, float], ...]
+
+    def __repr__(self) -> str:
+        return f"<Certificate of {self.nlp.case.name!r}: {self.statement}>"
 
     @property
     def gap(self) -> float:

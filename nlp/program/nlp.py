@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from ...models import FloatArray
+from ...models.whole import Whole
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.task import Sense
@@ -67,7 +68,7 @@ class Sides:
 
 
 @dataclass(frozen=True, eq=False)
-class Nlp:
+class Nlp(Whole):
     """A program with its numbers, on which every solver, certificate and report is based.
 
     Attributes:
@@ -95,6 +96,9 @@ class Nlp:
     g_upper: FloatArray
     constant_limits: tuple[BoundedConstraint, ...] = ()
     size: float | None = None
+
+    def __repr__(self) -> str:
+        return f"<Nlp of {self.case.name!r}: {self.sense.value} F, {self.program!r}>"
 
     @property
     def n(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
 from ..certificate.bounding import search_tape
@@ -56,7 +57,7 @@ class CertifyOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Certified:
+class Certified(Whole):
     """A solution with its certificates.
 
     Attributes:
@@ -72,6 +73,10 @@ class Certified:
     combined: Certificate | None
     statement: Statement
     tree: bytes | None
+
+    def __repr__(self) -> str:
+        proofs = ", ".join(each.status.value for each in self.tasks)
+        return f"<Certified {self.solution!r}: {proofs}>"
 
     @property
     def certificate(self) -> Certificate | None:

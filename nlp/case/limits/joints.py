@@ -35,13 +35,23 @@ from .limit import Limit, LimitedCase, PosedRobot, TableField, Written
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
 
+
+def _angle(value: float) -> float:
+    """Return the angle whose cosine is minus a value."""
+    return math.acos(min(max(-value, -1.0), 1.0))
+
+
+def _slope(value: float) -> float:
+    """Return the derivative of ``-cos(angle)`` at a value of it."""
+    return math.sqrt(max(1 - value * value, 0.0))
+
+
+def _minus_cosine(angle: SX) -> SX:
+    return -ca.cos(angle)
+
+
 #: ``-cos(angle)`` read as the angle.
-_ANGLE = Reading(
-    Dimension.ANGLE,
-    from_value=lambda value: math.acos(min(max(-value, -1.0), 1.0)),
-    slope=lambda value: math.sqrt(max(1 - value * value, 0.0)),
-    to_value=lambda number: -ca.cos(number),
-)
+_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine)
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
