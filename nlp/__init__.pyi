@@ -63,6 +63,7 @@ from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
 from .results.jsondata import json_data as json_data
+from .results.reading import load_result as load_result
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of
