@@ -98,6 +98,16 @@ class Case(Whole):
         parts += [_counted(len(self.limits), "limit")] if self.limits else []
         return f"<Case {self.name!r}: robot {self.model.name!r}, {', '.join(parts)}>"
 
+    def to_toml(self) -> str:
+        """Return the case as the text of a case file, from which the same case is read again.
+
+        Raises:
+            CaseError: no case file can state the case, such as one of a robot that is not found by its name.
+        """
+        from .writer import case_text  # noqa: PLC0415 - a case that is not written starts without the tables of files
+
+        return case_text(self)
+
     def components(self, name: str) -> tuple[Value, ...]:
         """Return the values of a parameter's components.
 
