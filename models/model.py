@@ -17,6 +17,7 @@ from casadi import SX
 
 from .drawing import Scene
 from .parts import Closure, Leg, Parameter, PoseSymbols, Quantity, Unknown
+from .shown import Shown
 from .whole import Whole
 from .wrench import Wrench, WrenchKind
 
@@ -26,7 +27,7 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Model(Whole):
+class Model(Whole, Shown):
     """A parallel robot as symbols and expressions.
 
     Attributes:

@@ -10,6 +10,7 @@ import sys
 import tomllib
 import zipfile
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -35,8 +36,10 @@ def test_every_public_name_is_there_and_listed_in_order(package: object) -> None
 def test_the_stub_is_the_one_list_of_public_names() -> None:
     stub = Path(screwsynth.nlp.__file__).with_suffix(".pyi")
     tree = ast.parse(stub.read_text(encoding="utf-8"))
-    places = {alias.asname: (node.module, alias.name) for node in tree.body[1:] for alias in node.names}  # type: ignore[attr-defined]
-    assert all(isinstance(node, ast.ImportFrom) and node.level == 1 for node in tree.body[1:])
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    places = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
+    assert all(node.level == 1 for node in imports)
+    assert [ast.unparse(node) for node in tree.body[1:] if node not in imports] == ["__version__: str"]
     assert sorted(places) == screwsynth.nlp.__all__ == dir(screwsynth.nlp)
     for name, (module, own_name) in places.items():
         assert own_name == name
@@ -46,6 +49,13 @@ def test_the_stub_is_the_one_list_of_public_names() -> None:
         assert value.__module__ == f"screwsynth.nlp.{module}"
     with pytest.raises(AttributeError, match="no attribute 'no_such_name'"):
         _ = screwsynth.nlp.no_such_name  # type: ignore[attr-defined]
+
+
+def test_the_version_is_that_of_the_distribution() -> None:
+    assert screwsynth.nlp.__version__ == version("screwsynth")
+    # A namespace package has no file that could hold a name.
+    assert not hasattr(screwsynth, "__version__")
+    assert screwsynth.__spec__.origin is None
 
 
 def test_no_public_name_is_that_of_a_room() -> None:
@@ -84,7 +94,7 @@ def test_pictures_and_pages_are_public_functions(tmp_path: Path) -> None:
     page = screwsynth.nlp.report(solution, text=text)
     assert page.startswith("<!DOCTYPE html>")
     assert html.escape(text.splitlines()[0]) in page
-    assert "has no case file" in screwsynth.nlp.report(solution)
+    assert html.escape(case.to_toml().splitlines()[0]) in screwsynth.nlp.report(solution)
 
 
 def test_public_names_show_before_they_are_loaded() -> None:

@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
+from ...models.shown import Shown
 from ...models.whole import Whole
 from ..errors import CaseError, nearest
 from ..units import Units
@@ -27,7 +28,7 @@ from .task import Method, Sense, Task
 
 
 @dataclass(frozen=True, eq=False)
-class Case(Whole):
+class Case(Whole, Shown):
     """A synthesis problem.
 
     Attributes:

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from ...models import FloatArray
+from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.task import Sense
 from ..program.nlp import Nlp
@@ -25,7 +26,7 @@ class CertificateStatus(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate(Whole):
+class Certificate(Whole, Shown):
     """A proven bound.
 
     Attributes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
@@ -18,6 +19,7 @@ from ..errors import InputError
 from ..program.epigraph import formulate_worst
 from ..program.formulation import formulate, formulate_each, formulate_weighted
 from ..program.nlp import Nlp
+from .answer import Answer
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
 from .solution import Combination, Solution
@@ -57,7 +59,7 @@ class CertifyOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Certified(Whole):
+class Certified(Whole, Shown, Answer):
     """A solution with its certificates.
 
     Attributes:

@@ -82,7 +82,7 @@ class ProgramSolution(Whole):
     relaxation: tuple[RelaxedLimit, ...] = ()
 
     def __repr__(self) -> str:
-        found = f", F = {self.F:.10g}" if self.status.is_answer else ""
+        found = f", F = {self.F:.7g}" if self.status.is_answer else ""
         return f"<ProgramSolution of {self.nlp.case.name!r}: {self.status.value}{found}, {len(self.starts)} starts>"
 
     @property
