@@ -17,7 +17,8 @@ from screwsynth.nlp.certificate.engines import kernel
 LIMIT = 60.0
 
 
-def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+def measure(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+    """Return the certificate of a solution, and the CPU seconds of the fastest of up to three runs."""
     best = float("inf")
     for _ in range(3):
         began = time.process_time()
@@ -29,7 +30,8 @@ def measured(solution: Solution, gap: float, engine: str) -> tuple[Certificate, 
 
 
 def row(name: str, solution: Solution, gap: float, engine: str) -> None:
-    found, seconds = measured(solution, gap, engine)
+    """Print one row of the table."""
+    found, seconds = measure(solution, gap, engine)
     relative = "" if found.relative_gap is None else f"{found.relative_gap:.1e}"
     print(
         f"{name:34} {engine:6} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
@@ -37,8 +39,8 @@ def row(name: str, solution: Solution, gap: float, engine: str) -> None:
     )
 
 
-def scaled(free: int) -> Case:
-    """The paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
+def case_with(free: int) -> Case:
+    """Return the paper's screw motion with 2 to 9 free variables: pose first, then dimensions."""
     ranges = {
         "p_x": Free(-10.0, 10.0), "p_y": Free(-10.0, 10.0), "p_z": Free(20.0, 50.0), "x4": Free(0.0, 0.5235),
         "x2": Free(6.0, 10.0), "x3": Free(0.1, 0.5),
@@ -53,6 +55,7 @@ def scaled(free: int) -> Case:
 
 
 def main(engines: Iterable[str]) -> None:
+    """Print the table: cases by engine, then gaps, then numbers of free variables."""
     print(f"{'case':34} {'engine':6} {'asked':>7} {'status':10} {'boxes':>9} {'CPU s':>9} gap")
     for name in ("paper-4.1-helical", "paper-4.1-rotation", "paper-4.2-rotation", "paper-4.2-translation", "paper-4.3"):
         solution = solve(load_case(name), starts=8)
@@ -61,7 +64,7 @@ def main(engines: Iterable[str]) -> None:
     for gap in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
         row("paper-4.1-helical", solve(load_case("paper-4.1-helical"), starts=8), gap, next(iter(engines)))
     for free in range(2, 10):
-        solution = solve(scaled(free), starts=16)
+        solution = solve(case_with(free), starts=16)
         row(f"{solution.nlp.n} free variables", solution, 1e-4, next(iter(engines)))
 
 

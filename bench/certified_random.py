@@ -1,4 +1,4 @@
-"""Random problems: is a certified bound ever below the best of many Ipopt starts, and what does it take?
+"""Random problems: certified bounds against the best of many Ipopt starts, and the cost of the certificates.
 
     python -P bench/certified_random.py [problems] [starts] [gap] [seconds]
 
@@ -21,6 +21,7 @@ from screwsynth.nlp.solver.multistart import solve_program
 
 
 def random_case(seed: int) -> Case:
+    """Return a random case."""
     rng = np.random.default_rng(seed)
     parameters: dict[str, object] = {
         "x1": rng.uniform(6, 15), "x2": rng.uniform(4, 10), "x3": rng.uniform(0.05, 0.5), "x4": rng.uniform(0.05, 0.5)
@@ -42,7 +43,8 @@ def random_case(seed: int) -> Case:
     return Case(stewart_gough(layout=layout), parameters, position, [task], rotation=rotation)
 
 
-def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
+def compare_with_starts(job: tuple[int, int, float, float]) -> dict[str, object]:
+    """Certify a random problem, and compare its bound with the best of its starts."""
     seed, starts, gap, limit = job
     nlp = formulate(random_case(seed))
     solution = solve_program(nlp, Search(starts=starts, seed=seed), jobs=1)
@@ -60,7 +62,8 @@ def measured(job: tuple[int, int, float, float]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def summary(rows: list[dict[str, object]], starts: float, gap: float, limit: float) -> None:
+def print_summary(rows: list[dict[str, object]], starts: float, gap: float, limit: float) -> None:
+    """Print violations, searches that did not reach the gap, and times."""
     print(f"{len(rows)} problems, {int(starts)} starts each, gap {gap:g}, limit {limit:g} s")
     print(f"bounds below the best start: {sum(bool(row['violated']) for row in rows)}")
     print(f"ball active at the optimum: {sum(bool(row['active']) for row in rows)}")
@@ -81,15 +84,16 @@ def summary(rows: list[dict[str, object]], starts: float, gap: float, limit: flo
 
 
 def main() -> None:
+    """Examine random problems in two processes, and print a summary now and then."""
     given = [*sys.argv[1:], *("500", "256", "1e-4", "60")[len(sys.argv) - 1 :]]
     problems, starts, gap, limit = (float(text) for text in given)
     jobs = [(seed, int(starts), gap, limit) for seed in range(int(problems))]
     rows: list[dict[str, object]] = []
     with get_context("spawn").Pool(2) as pool:
-        for row in pool.imap_unordered(measured, jobs):
+        for row in pool.imap_unordered(compare_with_starts, jobs):
             rows.append(row)
             if len(rows) % 50 == 0 or len(rows) == len(jobs):
-                summary(rows, starts, gap, limit)
+                print_summary(rows, starts, gap, limit)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The generated C beside its alternatives, each pair in one run: F by hand, and a solve by Ipopt through CasADi.
+"""Times of the generated C beside its alternatives, each pair in one run: F by hand, and Ipopt through CasADi.
 
 Run by hand: ``.venv/bin/python bench/embedding.py``. The aims: F within 1.3 times the function written by hand, and a
 solve of the paper's Section 4.1 at least 30 times faster than Ipopt's.
@@ -47,7 +47,7 @@ int main(void) {
 
 
 def ipopt(nlp: Nlp) -> ca.Function:
-    """Ipopt over scaled variables, as a user of CasADi would call it."""
+    """Return Ipopt over scaled variables, as a user of CasADi would call it."""
     s, program = ca.SX.sym("s", nlp.n), nlp.program
     F, g = program.values.call([nlp.centre + nlp.scale * s, ca.DM(nlp.arguments)])
     problem = {"x": s, "f": nlp.sign / nlp.objective_scale * F, "g": g}

@@ -18,7 +18,7 @@ BOUNDS = [(-10.0, 10.0), (-10.0, 10.0), (20.0, 50.0), *[(-RADIUS, RADIUS)] * 3, 
 
 
 def legs(p: list, q: list, q0: object, x4: object, functions: tuple) -> list:
-    """(d, b) of each leg: vector from base to platform joint, and base joint."""
+    """Return (d, b) of each leg: vector from base to platform joint, and base joint."""
     sin, cos = functions
     found = []
     for k in range(3):
@@ -38,7 +38,7 @@ def legs(p: list, q: list, q0: object, x4: object, functions: tuple) -> list:
 
 
 def rate(d: list, b: tuple) -> object:
-    """(b x d) . omega + d . v = d . (v + omega x b)."""
+    """Return (b x d) . omega + d . v = d . (v + omega x b)."""
     g = (
         V[0] + OMEGA[1] * b[2] - OMEGA[2] * b[1],
         V[1] + OMEGA[2] * b[0] - OMEGA[0] * b[2],
@@ -48,6 +48,7 @@ def rate(d: list, b: tuple) -> object:
 
 
 def scip(free_angle: bool, seconds: float) -> None:
+    """Maximise F by SCIP, and print the best point and the bound."""
     import pyscipopt as scip_  # noqa: PLC0415 - one of the two may be missing
 
     model = scip_.Model()
@@ -59,7 +60,7 @@ def scip(free_angle: bool, seconds: float) -> None:
     functions = (scip_.sin, scip_.cos) if free_angle else (math.sin, math.cos)
     terms = []
     for k, (d, b) in enumerate(legs(p, q, q0, x[6] if free_angle else math.radians(8), functions)):
-        # Unit directions bound each term by a ball, which the solver likes better than quotients.
+        # Unit directions bound each term by a ball, with which the solver is faster than with quotients.
         unit = [model.addVar(f"u{k}{i}", lb=-1, ub=1) for i in range(3)]
         length = model.addVar(f"l{k}", lb=1, ub=150)
         model.addCons(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] == 1)
@@ -80,6 +81,7 @@ def scip(free_angle: bool, seconds: float) -> None:
 
 
 def maingo(free_angle: bool, seconds: float) -> None:
+    """Maximise F by MAiNGO, and print the best point and the bound."""
     import maingopy as mg  # noqa: PLC0415
 
     class Problem(mg.MAiNGOmodel):

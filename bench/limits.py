@@ -1,4 +1,4 @@
-"""Time of a case with its limits beside the same case without, taken in turns, and how many starts find the optimum.
+"""Time of a case with its limits beside the same case without, in turns, and the number of starts at the optimum.
 
 Run by hand: ``.venv/bin/python bench/limits.py [rounds]``. The aims for hexapod-machining: at most 5 times, and at
 least 90 % of the starts, whatever the seed.

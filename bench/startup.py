@@ -1,8 +1,8 @@
-"""Time of whole commands beside the bare import of their libraries, taken in turns so that a busy machine burdens all.
+"""Time of whole commands beside the bare import of their libraries, run in turns so that a busy machine slows all.
 
 Run by hand: ``.venv/bin/python bench/startup.py [rounds] [bin folder of another environment]``. The aims: a solve with
-32 starts in at most 4 times the import, and help in no more than it. With another environment, such as one with an
-older version, every command is run in both, one after the other, and the median of the differences is shown.
+32 starts in at most 4 times the import, and help in no more than the import. With another environment, such as one with
+an older version, every command is run in both, one after the other, and the median of the differences is shown.
 """
 
 import os
@@ -24,8 +24,8 @@ COMMANDS = {
 }
 
 
-def times(folder: Path, command: list[str]) -> tuple[float, float]:
-    """Wall and processor milliseconds of a command in an environment."""
+def measure(folder: Path, command: list[str]) -> tuple[float, float]:
+    """Return wall and processor milliseconds of a command in an environment."""
     began = time.perf_counter()
     running = subprocess.Popen([folder / command[0], *command[1:]], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(running.pid, 0)
@@ -39,11 +39,11 @@ rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 20
 folders = [BIN, *(Path(argument) for argument in sys.argv[2:3])]
 runs = [(name, folder) for name in COMMANDS for folder in folders]
 for name, folder in runs:  # files into the cache
-    times(folder, COMMANDS[name])
+    measure(folder, COMMANDS[name])
 taken: dict[tuple[str, Path], list[tuple[float, float]]] = {run: [] for run in runs}
 for k in range(rounds):
     for run in runs if k % 2 else reversed(runs):
-        taken[run].append(times(run[1], COMMANDS[run[0]]))
+        taken[run].append(measure(run[1], COMMANDS[run[0]]))
 base = [wall for wall, _ in taken[BASE, BIN]]
 for name in COMMANDS:
     wall, processor = zip(*taken[name, BIN], strict=True)

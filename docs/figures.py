@@ -1,6 +1,7 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
-The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, and the robots with their parameters.
+The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
+robots with their parameters.
 """
 
 from pathlib import Path
@@ -17,6 +18,12 @@ CASES = {
     "fig-10-two-free-rotations": "paper-4.4-snu",
     "fig-11-resisting": "paper-4.4-max",
     "hexapod-machining": "hexapod-machining",
+    "peg-in-hole": "peg-in-hole",
+    "drilling-spindle": "drilling-spindle",
+    "camera-mount": "camera-mount",
+    "free-wrist": "free-wrist",
+    "haptic-device": "haptic-device",
+    "flight-simulator": "flight-simulator",
 }
 
 FOLDER.mkdir(exist_ok=True)

@@ -1,6 +1,6 @@
 """Names of a case's own numbers: of the robot's parameters, and of position and rotation of each stated pose.
 
-A robot may call its parameters what it likes. A parameter, or a component of one, that has the name of a number of a
+A robot may give its parameters any names. A parameter, or a component of one, that has the name of a number of a
 pose, such as ``p_x``, is written ``robot.p_x``.
 """
 

@@ -9,8 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import screwsynth.cases
-
+from ... import cases
 from ...models import Dimension
 from ..errors import CaseError, InputError, nearest
 from ..units import Units
@@ -24,7 +23,7 @@ from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable,
 from .settings import Expectation, ExpectedValue, Published, Search
 from .task import Method, Sense, Task, unit_twist
 
-_SHIPPED = Path(screwsynth.cases.__file__).parent
+_SHIPPED = Path(cases.__file__).parent
 
 
 def shipped_cases() -> tuple[str, ...]:

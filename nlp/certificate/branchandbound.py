@@ -134,8 +134,8 @@ class _Search:
     Attributes:
         form: the form.
         engine: examines boxes.
-        gap: as for :func:`certify`.
-        above: as for :func:`certify`.
+        gap: as for :func:`certify_program`.
+        above: as for :func:`certify_program`.
         began: time at the start.
         recorder: records the search's tree for a proof.
         incumbent: the best feasible point known.

@@ -17,7 +17,7 @@ UNMOVED, COLLAPSED = -2, -1
 
 
 class Verdict(enum.IntEnum):
-    """Whether a box is closed, and by which rule. The numbers are those of ``_bounds.c``."""
+    """Verdict on a box: open, or closed by a rule. The numbers are those of ``_bounds.c``."""
 
     OPEN = 0
     BOUNDED = 1  # its bound does not exceed the threshold

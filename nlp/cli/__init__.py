@@ -1,4 +1,4 @@
 """The command line: options in, text out, no mathematics. One file a command.
 
-What a command needs is imported when the command runs, so that help is there at once.
+A command imports its modules when it runs, so that help appears at once.
 """

@@ -28,7 +28,7 @@ def evaluate(
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    loaded = load_case(case, dict(_setting(text) for text in settings or []))
+    loaded = load_case(case, dict(_parse_setting(text) for text in settings or []))
     check_target(json_file)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
@@ -43,11 +43,11 @@ def evaluate(
     raise typer.Exit(1 if result.violated else 0)
 
 
-def _setting(text: str) -> tuple[str, float | list[float]]:
+def _parse_setting(text: str) -> tuple[str, float | list[float]]:
     """Read ``NAME=NUMBER`` or ``NAME=X,Y,Z``.
 
     Raises:
-        InputError: it is neither.
+        InputError: the text is neither.
     """
     from ..errors import InputError
 

@@ -1,6 +1,6 @@
 """The command ``screwsynth``: from the process's arguments to its exit status.
 
-Exit status: 0 done; 1 the answer is not what was asked for; 2 the input is wrong; 130 interrupted.
+Exit status: 0 done; 1 no answer, no proof, a violated limit, or a failed check; 2 the input is wrong; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ import sys
 
 import typer
 
-#: Objects allocated between two garbage collections. Imports allocate 90,000 and leave no garbage: with Python's own
-#: threshold of 700 they cost 120 collections, 60 ms of a solve's 700.
+#: Objects allocated between two garbage collections. Imports allocate 90,000 objects and leave no garbage: with
+#: Python's own threshold of 700 they cause 120 collections, which take 60 ms of a solve's 700.
 _GARBAGE_AFTER = 200_000
 
 
 def main() -> None:
     """Run the command line, and end the process without finalising the interpreter.
 
-    Every file is closed by then. Finalising the numerical libraries takes 110 ms, of a solve's 700.
+    Every file is closed before the end. Finalising the numerical libraries takes 110 ms, of a solve's 700.
     """
     status = run()
     try:
         sys.stdout.flush()
         sys.stderr.flush()
-    except OSError:  # nobody reads any more
+    except OSError:  # the reader has closed the pipe
         status = status or 1
     os._exit(status)
 

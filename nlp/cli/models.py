@@ -28,7 +28,7 @@ def models(
         return
     options = model_options(name)
     needed = [option.name for option in options if option.default is None]
-    # Without the options that it cannot do without, a robot has no parameters to show yet.
+    # Without the options that have no default, the robot cannot be built, and has no parameters to show.
     model = None if needed else build_model(name)
     if plot is not None:
         from ..output.pictures.plot import plot as draw
@@ -40,7 +40,10 @@ def models(
 
 
 def _description(model: str) -> str:
-    """Return a robot's description, or why it cannot be used: another package's fault must not hide the others."""
+    """Return a robot's description, or the fault of a robot that cannot be built.
+
+    The fault of one package's robot must not hide the other robots.
+    """
     from ..case.robots import build_model
     from ..errors import CaseError
 

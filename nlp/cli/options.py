@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the checks of where results go."""
+"""Arguments and options that several commands share, and checks of the files for results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check_target(target: str | None) -> None:
     """Refuse a file that cannot be written, before the work begins.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     from ..output.files import check_target as check
 
@@ -38,7 +38,7 @@ def check_picture(target: str | None) -> None:
     """Refuse a picture that cannot be drawn or written, before the work begins.
 
     Raises:
-        InputError: its ending is no picture's, Matplotlib is not installed, or the file cannot be written.
+        InputError: the name's ending is no picture's, Matplotlib is not installed, or the file cannot be written.
     """
     if target is not None:
         from ..output.pictures.requirements import check_picture as check
@@ -51,7 +51,7 @@ def write_json(target: str, result: JsonObject) -> None:
     """Write a result as JSON, to standard output for ``-``.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     import json
 
@@ -62,8 +62,8 @@ def write_json(target: str, result: JsonObject) -> None:
 
 
 def console() -> Console:
-    """Return standard output for tables."""
+    """Return a console on standard output for lines and tables."""
     from rich.console import Console
 
-    # Into a file or a pipe, tables are as wide as they need to be.
+    # In a file or a pipe, a table is as wide as its content.
     return Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 120)

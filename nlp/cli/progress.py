@@ -1,4 +1,4 @@
-"""Solves and certificates with a line of progress on standard error, where that is a terminal."""
+"""Solves and certificates with a line of progress on standard error, where standard error is a terminal."""
 
 from __future__ import annotations
 
@@ -14,16 +14,22 @@ if TYPE_CHECKING:
     from ..solver.solution import Solution
 
 
-class Solved(NamedTuple):
-    """A solution, the same with certificates where they were asked for, and whether all of these are proved."""
+class SolveOutcome(NamedTuple):
+    """Outcome of a solve.
+
+    Attributes:
+        solution: the solution.
+        found: the solution with its certificates; without certification, the solution.
+        is_proved: whether every certificate is proved; true without certification.
+    """
 
     solution: Solution
     found: Solution | Certified
     is_proved: bool
 
 
-def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> Solved:
-    """Solve a case, and certify it where that is asked for.
+def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> SolveOutcome:
+    """Solve a case, and certify it with ``certify``.
 
     Raises:
         CaseError: the case contradicts itself.
@@ -33,10 +39,10 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
 
     if certify:
         certified = certify_with_progress(case, jobs=jobs)
-        return Solved(certified.solution, certified, certified.is_proved)
+        return SolveOutcome(certified.solution, certified, certified.is_proved)
     if not sys.stderr.isatty():
         solution = solve(case, jobs=jobs)
-        return Solved(solution, solution, True)
+        return SolveOutcome(solution, solution, True)
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress
@@ -50,7 +56,7 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
             bar.update(line, completed=done, total=total, description=f"{label}{best_text}")
 
         solution = solve(case, jobs=jobs, progress=show)
-    return Solved(solution, solution, True)
+    return SolveOutcome(solution, solution, True)
 
 
 def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`

@@ -91,23 +91,23 @@ class Linearisation:
 def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     """Return the program linearised at a point (n,)."""
     F, gradient, g, jacobian = nlp.program.kernels.derivatives(x, nlp.arguments)
-    table, scale = nlp.sides, nlp.scale
+    sides, scale = nlp.sides, nlp.scale
     rows = jacobian * scale
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     # Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
     sizes = np.where(sizes > 1e-9, sizes, 1.0)
-    per_unit = 1 / np.concatenate([scale, sizes])[table.place]
-    residual = table.sign * (np.concatenate([x, g.ravel()])[table.place] - table.limit) * per_unit
-    outward = table.sign * per_unit
-    normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[table.place]
+    per_unit = 1 / np.concatenate([scale, sizes])[sides.place]
+    residual = sides.sign * (np.concatenate([x, g.ravel()])[sides.place] - sides.limit) * per_unit
+    outward = sides.sign * per_unit
+    normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[sides.place]
     weight = nlp.sign / nlp.objective_scale
     return Linearisation(
         x=np.asarray(x, dtype=np.float64),
         F=float(F[0, 0]),
         phi=weight * float(F[0, 0]),
         gradient=weight * gradient.ravel() * scale,
-        sides=table.sides,
-        slack=np.where(table.equal, -np.abs(residual), -residual),
+        sides=sides.sides,
+        slack=np.where(sides.equal, -np.abs(residual), -residual),
         residual=residual,
         normals=normals,
         per_unit=per_unit,
@@ -155,8 +155,8 @@ def constraint_weights(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
         at: the program at the point.
         mu: (k,) multipliers of the sides.
     """
-    table = nlp.sides
-    weights = np.bincount(table.place, table.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
+    sides = nlp.sides
+    weights = np.bincount(sides.place, sides.sign * mu * at.per_unit, nlp.n + len(nlp.program.constraints))
     return np.asarray(weights[nlp.n :], dtype=np.float64)
 
 
@@ -228,11 +228,11 @@ def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, flo
 
 def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> FloatArray:
     """Return a point (n,) with the variables whose bounds are in the active set exactly on these bounds."""
-    table, moved = nlp.sides, x.copy()
+    sides, moved = nlp.sides, x.copy()
     for j in active_set:
-        variable = table.sides[j].variable
+        variable = sides.sides[j].variable
         if variable is not None:
-            moved[variable] = table.limit[j]
+            moved[variable] = sides.limit[j]
     return moved
 
 

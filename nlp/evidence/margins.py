@@ -2,8 +2,8 @@
 
 The cost of a limit is the derivative of the optimal F by the number that stands in the case, from the multipliers: with
 the Lagrangian ``phi + sum_j mu_j (g_j - c_j)`` of :mod:`.kkt`, ``d phi* / d c_j = -mu_j``. A number that
-limits several legs or poses costs the sum of what it costs at each of them. The derivative is two-sided where the
-active limits have independent normals and positive multipliers, which :mod:`screwsynth.nlp.evidence.optimality` tells.
+limits several legs or poses costs the sum of its costs at each of them. The derivative is two-sided where the
+active limits have independent normals and positive multipliers, which :mod:`screwsynth.nlp.evidence.optimality` says.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Margin:
         name: the limit and where.
         key: dotted key, below ``limits``, of the number in the case.
         bound: which side of it.
-        value: what is measured there, radians for angles.
+        value: the measured value there, radians for angles.
         limit: the number in the case, radians for angles.
-        dimension: what both measure.
+        dimension: of both.
         active: whether the point lies on it.
         cost: derivative of the optimal F by the limit, per radian for angles; None where there is no optimum.
     """

@@ -72,7 +72,7 @@ class ActiveSide:
         bound: ``min``, ``max`` or ``equal``.
         value: the limit, radians for angles.
         multiplier: improvement of F per unit by which the limit is relaxed, in the same unit.
-        dimension: what the limit measures.
+        dimension: of the limit.
     """
 
     name: str

@@ -29,6 +29,7 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
 
 
 def _add_test(suite: ElementTree.Element, case: str, name: str, fault: str) -> int:
+    """Add a test to a suite, failed where there is a fault; return the number of failures, 0 or 1."""
     test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
     if fault:
         ElementTree.SubElement(test, "failure", message=fault)
@@ -47,5 +48,6 @@ def markdown(table: TextTable) -> str:
 
 
 def _row(cells: Sequence[str | Line]) -> str:
+    """Return a row of a Markdown table."""
     texts = (cell.words if isinstance(cell, Line) else cell for cell in cells)
     return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"

@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, and read with one sentence for each fault."""
+"""Reading and writing of files: a file is written whole or not at all, and each fault is one sentence."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def write_text(target: str, text: str) -> None:
     """Write a text to a file, or to standard output for ``-``.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     if target == "-":
         sys.stdout.write(text)
@@ -29,7 +29,7 @@ def write_bytes(target: str, content: bytes) -> None:
     The file appears under its name only when it is complete; a pipe or device is written to, not replaced.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     try:
         path = Path(target)
@@ -44,7 +44,7 @@ def write_bytes(target: str, content: bytes) -> None:
 def write_folder(target: str, files: Mapping[str, str]) -> None:
     """Write texts by file name into a folder, which is made when missing.
 
-    All of them are complete before the first appears under its name; other files in the folder stay.
+    All files are complete before the first appears under its name; other files in the folder stay.
 
     Raises:
         InputError: the folder cannot be made or written.
@@ -82,7 +82,7 @@ def read_text(source: str) -> str:
     """Read the text of a file.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the file cannot be read.
     """
     try:
         return Path(source).read_text(encoding="utf-8")
@@ -99,7 +99,7 @@ def _replace(path: Path, content: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        # A temporary file is for its owner only; the result gets the permissions of any new file.
+        # Only its owner may read a temporary file; the result gets the permissions of any new file.
         mask = os.umask(0)
         os.umask(mask)
         Path(temporary).chmod(0o666 & ~mask)
@@ -114,7 +114,7 @@ def _cannot_be_written(target: str, error: OSError) -> InputError:
 
 
 def _fault(path: Path) -> str:
-    """Return why a file cannot be written, or nothing."""
+    """Return the reason why a file cannot be written; empty where it can."""
     if path.is_dir():
         return "it is a folder"
     if not path.parent.is_dir():

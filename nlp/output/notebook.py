@@ -31,7 +31,7 @@ from ..solver.solution import Solution
 from .pictures.drawing import Drawing, drawing_of, drawing_of_model
 from .pictures.requirements import check_library
 from .pictures.solutions import drawings_of
-from .report.markup import html_table, joined, paragraphs, tag
+from .report.markup import html_table, join_markup, paragraphs, tag
 from .terminal import show
 
 #: Width of a text without a terminal, as the command line writes into a file.
@@ -109,7 +109,7 @@ def _html(items: Iterable[Line | TextTable], drawings: Callable[[], Sequence[Dra
         parts.append(tag("img", src=f"data:image/svg+xml;base64,{image}", alt="the robot") if image else tag("p"))
     except (InputError, EvaluationError) as error:
         parts.append(tag("p", str(error)))
-    return tag("div", joined(parts))
+    return tag("div", join_markup(parts))
 
 
 def _picture(drawings: Sequence[Drawing]) -> Picture:

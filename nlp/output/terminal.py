@@ -25,14 +25,16 @@ _STYLES = {
 def show(console: Console, items: Iterable[Line | TextTable]) -> None:
     """Print lines and tables."""
     for item in items:
-        console.print(_rendered(item))
+        console.print(_render(item))
 
 
-def _rendered(item: Line | TextTable) -> RenderableType:
+def _render(item: Line | TextTable) -> RenderableType:
+    """Return a line or a table for a console."""
     return _text(item) if isinstance(item, Line) else _table(item)
 
 
 def _text(line: Line) -> Text:
+    """Return a line with its label dim and its text in the style of its tone."""
     style = _STYLES[line.tone]
     if not (line.label or line.before or line.after):
         return Text(line.text, style=style)

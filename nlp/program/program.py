@@ -2,7 +2,7 @@
 
 A program belongs to a *structure*: a robot with a choice of free numbers. Every number that a case fixes (dimensions,
 pose, twist) is an argument, so one program serves every start, every task and every point of a sweep. Variables are in
-the units of the case (radians for angles); division by :attr:`Nlp.scale` makes them of order 1.
+the units of the case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Certificates of a case as a result: the types, and how they are made."""
+"""Certificates of a case as a result: the types and their construction."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Checks of cases as a result: the types, and how they are made."""
+"""Checks of cases as a result: the types and their construction."""
 
 from collections.abc import Sequence
 
@@ -100,15 +100,16 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
                 title=check.title,
                 passed=check.passed,
                 seconds=check.seconds,
-                expected=tuple(_expected(row) for row in check.expected),
-                published=tuple(_published(row) for row in check.published),
+                expected=tuple(_expected_data(row) for row in check.expected),
+                published=tuple(_published_data(row) for row in check.published),
             )
             for check in checks
         ),
     )
 
 
-def _expected(row: ExpectedCheck) -> ExpectedData:
+def _expected_data(row: ExpectedCheck) -> ExpectedData:
+    """Return the check of an expected number as data."""
     return ExpectedData(
         quantity=row.quantity,
         expected=row.expected,
@@ -118,7 +119,8 @@ def _expected(row: ExpectedCheck) -> ExpectedData:
     )
 
 
-def _published(row: PublishedCheck) -> PublishedData:
+def _published_data(row: PublishedCheck) -> PublishedData:
+    """Return the check of a published number as data."""
     said = row.published
     return PublishedData(
         quantity=said.quantity,

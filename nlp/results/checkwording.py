@@ -9,7 +9,7 @@ from .text import Line, TextTable, Tone
 
 
 def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
-    """Yield how many numbers of each case hold, and every one that does not."""
+    """Yield the count of numbers that hold in each case, and every number that does not."""
     yield TextTable(("case", "expected", "published", "seconds"), tuple(_summary_row(check) for check in checks))
     faults = [fault for check in checks for fault in _faults(check)]
     yield from (Line(fault, tone=Tone.FAULT) for fault in faults)
@@ -17,6 +17,7 @@ def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
 
 
 def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
+    """Return a case's row: its name, counts and seconds."""
     reproduced = sum(row.reproduced for row in check.published)
     held = sum(row.passed for row in check.expected)
     published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
@@ -25,6 +26,7 @@ def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
 
 
 def _faults(check: CaseCheck) -> Iterator[str]:
+    """Yield a sentence for each number of a case that does not hold."""
     for row in check.expected:
         if not row.passed:
             yield f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}"

@@ -25,8 +25,8 @@ def combined_result(
 
     Args:
         solution: of the case.
-        combination: how its tasks were combined.
-        certificates: of each task by itself, where they were asked for.
+        combination: the combination of the tasks.
+        certificates: of each task by itself; empty without certification.
         combined_certificate: of the combined program.
     """
     combined, point = combination.combined, _point(solution, combination)
@@ -59,7 +59,7 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
     own, combined = solution.outcomes[0], combination.combined
     if own.state is None:
         return CombinedPointData(robot=None, margins=None, limits=None)
-    # Where one program brought the tasks together, a limit has a cost: of that program's value.
+    # Only a combined program gives a limit a cost, which is that of the program's value.
     nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
     robot = robot_data(own.own.nlp, solution.x, own.state, None)
@@ -67,7 +67,7 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
 
 
 def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
-    """Return a task at the combined point; without an answer there is no F, without an own optimum no best."""
+    """Return a task at the combined point; ``F`` is absent without an answer, ``best`` without an own optimum."""
     best = outcome.own.F if outcome.own.status.is_answer else None
     state = outcome.state if is_answer else None
     loss = outcome.loss if state is not None and best is not None else math.nan

@@ -1,6 +1,6 @@
-"""Results of a solve: of one task, and of several tasks brought together.
+"""Results of a solve: of one task, and of several tasks combined.
 
-A solve that failed has no ``F``: the point that it reached is under ``reached``, and can't be taken for an answer.
+A solve that failed has no ``F``: the point reached is under ``reached``, so that nobody takes it for an answer.
 """
 
 from collections.abc import Mapping
@@ -250,7 +250,7 @@ class CombinedData(JsonObject):
 
     @property
     def point(self) -> CombinedPointData | None:
-        """The combined point, be it an answer or merely reached."""
+        """The combined point, whether an answer or merely reached."""
         return self.reached if self.method_point is None else self.method_point
 
 
@@ -274,5 +274,5 @@ class CombinedResult(JsonObject):
     seconds: float
 
 
-#: What solving a case results in.
+#: Result of solving a case, of one task or of several.
 CaseResult: TypeAlias = SolveResult | CombinedResult

@@ -22,6 +22,7 @@ def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[MarginData,
 
 
 def _margin(units: Units, row: Margin) -> MarginData:
+    """Return a margin in the case's units."""
     return MarginData(
         name=row.name,
         key=row.key,
@@ -42,6 +43,7 @@ def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
 
 
 def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
+    """Return one limiting number from all its margins."""
     least = min(margins, key=lambda row: -math.inf if row.margin is None else row.margin)
     costs = [row.cost for row in margins if row.cost is not None]
     return LimitData(

@@ -1,4 +1,4 @@
-"""The robot at one given point as a result: the types, and how they are made. Nothing is optimised."""
+"""The robot at one given point as a result: the types and their construction. Nothing is optimised."""
 
 from collections.abc import Sequence
 
@@ -79,7 +79,7 @@ class EvaluationResult(JsonObject):
 
 
 def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotState]) -> EvaluationResult:
-    """Return the robot at one point: with its first task, then every task, and the motions that it resists least.
+    """Return the robot at one point: with its first task, then every task, and the motions at which F is stationary.
 
     Args:
         nlps: the program of each task.
@@ -114,4 +114,5 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
 
 
 def _principal(motion: PrincipalMotion) -> PrincipalMotionData:
+    """Return a motion at which F is stationary as data."""
     return PrincipalMotionData(F=motion.F, motion=motion_data(motion.twist))

@@ -13,7 +13,7 @@ from .jsondata import finite_or_none, vector
 
 
 def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
-    """Return the evidence about a point of a program in the case's units, where there is any."""
+    """Return the evidence about a point of a program in the case's units; None without any."""
     if evidence is None:
         return None
     units = nlp.case.units
@@ -49,7 +49,7 @@ def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:
-    """Return a proven bound, where there is one."""
+    """Return a proven bound; None without a certificate."""
     if certificate is None:
         return None
     return CertificateData(

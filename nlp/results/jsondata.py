@@ -1,8 +1,8 @@
 """Frozen values that JSON writes as objects: their base class, the marks of their fields, and the conversion.
 
-A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type checkers treat it as one. It is
-none, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a short
-command a thirtieth slower.
+A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type checkers treat it as a dataclass. It
+is no dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a
+short command a thirtieth slower.
 """
 
 import enum
@@ -19,7 +19,7 @@ JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, J
 
 
 class Mark(enum.Enum):
-    """Treatment of a field that is not simply written under its own name."""
+    """Treatment of a field that is not always written, or not under its own name."""
 
     ABSENT = "left out where it is None"
     INLINE = "its own fields stand in its place; none of them where it is None"
@@ -31,9 +31,9 @@ class Size(NamedTuple):
     entries: int
 
 
-#: A field that is left out of the object where it is None.
+#: A field that is absent from the object where the value is None.
 Absent: TypeAlias = Annotated[_T | None, Mark.ABSENT]
-#: A field in whose place its own fields stand.
+#: A field whose own fields are written in its place.
 Inline: TypeAlias = Annotated[_T, Mark.INLINE]
 
 Vector: TypeAlias = tuple[float, ...]
@@ -56,7 +56,7 @@ class JsonObject:
         kinds = cls.__annotations__
         if any(isinstance(kind, str) for kind in kinds.values()):
             raise TypeError(f"{cls.__name__}: its annotations are read at run time, and must not be text")
-        cls.marks = {name: _mark(kind) for name, kind in kinds.items()}
+        cls.marks = {name: _mark_of(kind) for name, kind in kinds.items()}
 
     def __init__(self, **values: object) -> None:
         if values.keys() != self.marks.keys():
@@ -74,7 +74,8 @@ class JsonObject:
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in self.marks)})"
 
 
-def _mark(kind: object) -> Mark | None:
+def _mark_of(kind: object) -> Mark | None:
+    """Return the mark of a field's annotation; None without one."""
     marks = getattr(kind, "__metadata__", ()) if get_origin(kind) is Annotated else ()
     return next((mark for mark in marks if isinstance(mark, Mark)), None)
 
@@ -89,25 +90,26 @@ def json_data(value: JsonObject) -> dict[str, JsonValue]:
     for name, mark in value.marks.items():
         part = getattr(value, name)
         if mark is None:
-            found[name] = _plain(part)
+            found[name] = _json_value(part)
         elif part is not None and mark is Mark.INLINE:
             found |= json_data(part)
         elif part is not None:
-            found[name] = _plain(part)
+            found[name] = _json_value(part)
     return found
 
 
-def _plain(value: object) -> JsonValue:
+def _json_value(value: object) -> JsonValue:
+    """Return a field's value as JSON's own types."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, JsonObject):
         return json_data(value)
     if isinstance(value, tuple | list):
-        return [_plain(each) for each in value]
+        return [_json_value(each) for each in value]
     if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
+        return {str(key): _json_value(each) for key, each in value.items()}
     if isinstance(value, enum.Enum):
-        return _plain(value.value)
+        return _json_value(value.value)
     raise TypeError(f"JSON has no type for {value!r}")
 
 

@@ -37,7 +37,7 @@ from .parts import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: Violations of less than this part of the worst are left out: they only give way to it.
+#: Violations of less than this part of the worst are left out: a failed solve leaves them beside the worst.
 _SMALL = 1e-3
 
 
@@ -93,7 +93,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
 def _poses_data(nlp: Nlp, x: FloatArray) -> PosesData | None:
     """Return the robot at every pose, or None where there is one pose only.
 
-    F and rates are those of the program's task, of its first where it combines several.
+    F and rates are those of the program's task; of the first task, where the program combines several.
     """
     case = nlp.case
     if len(nlp.program.robots) == 1:
@@ -106,6 +106,7 @@ def _poses_data(nlp: Nlp, x: FloatArray) -> PosesData | None:
 
 
 def _pose_state(case: Case, state: RobotState) -> PoseStateData:
+    """Return the robot at one of several poses."""
     return PoseStateData(
         F=state.F,
         pose=pose_data(case, state),
@@ -167,19 +168,20 @@ def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:
 
 
 def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
+    """Return the values of one measure by their limbs or joints, in the case's units."""
     pairs = zip(quantity.owners, values, strict=True)
     return MappingProxyType({owner: case.units.shown(float(value), quantity.dimension) for owner, value in pairs})
 
 
 def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:
-    """Return F at a point (n,): that of the state, or the sum, mean or worst over several poses."""
+    """Return F at a point (n,): the state's F, or the sum, mean or worst over several poses."""
     return nlp.evaluate(x)[0] if state is None or len(nlp.program.robots) > 1 else state.F
 
 
 def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
     """Return the bounds and constraints that a point (n,) lies outside of, in the case's words and units.
 
-    Those that are violated a thousand times less than the worst are left out: they only give way to it.
+    Violations a thousand times smaller than the worst are left out: a failed solve leaves them beside the worst.
     """
     at, g = linearise(nlp, x), nlp.evaluate(x)[1]
     units = nlp.case.units

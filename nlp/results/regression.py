@@ -1,4 +1,4 @@
-"""Cases held to expected and to published values.
+"""Checks of cases against expected and published values.
 
 Three kinds of value are kept apart: those that this program **computes**, those that the case **expects**, with a
 tolerance of its own, and those that the literature prints (**published**). A published number is *reproduced* by one of
@@ -6,9 +6,10 @@ two rules, and no other:
 
 * ``digits``: the computed number is within half a unit of the last printed digit, in every component;
 * ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
-  and its neighbours held as printed: where F is flat, or best on a whole set, an argument says less than its digits.
+  and the other printed arguments held fixed. Where F is flat, or best on a whole set, fewer digits of an argument are
+  significant than are printed.
 
-A number that a case marks reproduced and is not, or the other way round, is *newly changed*, and fails the check.
+A number that a case marks reproduced and that is not, or the other way round, is *newly changed*, and fails the check.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class PublishedCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether the case marks it as it is."""
+        """Whether the number is reproduced where the case marks it so, and only there."""
         return self.reproduced == self.published.reproduced
 
     @property
@@ -115,7 +116,7 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
 
     Args:
         name: path of a case file, or the bare name of a shipped case.
-        solved: results of cases by name, for those that refer to each other; added to.
+        solved: results of cases by name, for cases that refer to each other; new results are added.
 
     Raises:
         InputError: the case, or one that it refers to, cannot be read.
@@ -123,26 +124,33 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
     began = time.perf_counter()
     solved = {} if solved is None else solved
     case = load_case(name)
-    result = _solved(name, solved, case)
+    result = _result_for(name, solved, case)
     data = json_data(result)
     return CaseCheck(
         name=case.name,
         title=case.title,
-        expected=tuple(_expected(case, result, data)),
-        published=tuple(_published(name, case, row, result, data, solved) for row in case.published),
+        expected=tuple(_check_expected(case, result, data)),
+        published=tuple(_check_published(name, case, row, result, data, solved) for row in case.published),
         seconds=time.perf_counter() - began,
     )
 
 
-def _solved(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
-    """Return the result of a case by name, solved once; the case itself, where it is read already."""
+def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
+    """Return the result of a case by name; each case is solved once.
+
+    Args:
+        name: of the case.
+        solved: results by name; a new result is added.
+        case: the case, where it is read already.
+    """
     if name not in solved:
         case = case or load_case(name)
         solved[name] = result_of(solve(case))
     return solved[name]
 
 
-def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
+def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
+    """Return the expected numbers of a case beside the computed ones, its status first."""
     expect = case.expect
     rows = [ExpectedCheck("status", "an answer", result.status.value, 0.0, result.status.is_answer)]
     if expect.F is not None:
@@ -160,7 +168,7 @@ def _expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCh
 
 
 def _lookup(data: JsonValue, path: str) -> JsonValue:
-    """Return the value at a dotted path of JSON data, numbers being places in lists; None where there is none."""
+    """Return the value at a dotted path of JSON data, where a number is an index in a list; None without one."""
     found = data
     for part in path.split("."):
         if isinstance(found, dict):
@@ -179,20 +187,25 @@ def _number(data: JsonValue, path: str) -> float | None:
 
 
 def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
-    """Return the number, or the list of numbers, at a dotted path of JSON data; nothing where there is neither."""
+    """Return the number, or the list of numbers, at a dotted path of JSON data; empty where there is neither."""
     found = _lookup(data, path)
     parts = found if isinstance(found, list) else [found]
     numbers = tuple(float(part) for part in parts if isinstance(part, float | int))
     return numbers if len(numbers) == len(parts) else ()
 
 
-def _published(
+def _check_published(
     name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
 ) -> PublishedCheck:
+    """Return a published number beside the computed one, with the rule that decided.
+
+    Raises:
+        CaseError: the quantity is no number of the result, or has another number of components.
+    """
     if row.over is None:
         computed = _numbers(data, row.quantity)
     else:
-        over, F = _number(json_data(_solved(row.over, solved)), "F"), _number(data, "F")
+        over, F = _number(json_data(_result_for(row.over, solved)), "F"), _number(data, "F")
         computed = (100 * (F - over) / over,) if F is not None and over else ()
     if not result.status.is_answer:
         return PublishedCheck(row, (), False, f"the case has no answer: it is {result.status.value}")
@@ -225,14 +238,14 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
     """
     printed: dict[str, float | list[float]] = {}
     for each in case.published:
-        printed.update(_setting(case, each.quantity, each.value))
-    own, robot = _setting(case, row.quantity, row.value), _robot(result)
+        printed.update(_argument_settings(case, each.quantity, each.value))
+    own, robot = _argument_settings(case, row.quantity, row.value), _answer_robot(result)
     if not own or robot is None:
         return None
-    settings = {**_own_settings(case, robot), **printed}
+    settings = {**_computed_settings(case, robot), **printed}
     try:
-        at_printed = _objectives(load_case(name, settings))
-        best = _objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
+        at_printed = _best_objectives(load_case(name, settings))
+        best = _best_objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
     except (InputError, EvaluationError):
         return None
     differences = []
@@ -242,8 +255,8 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
     return max(differences)
 
 
-def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
-    """Return an argument of F as settings of the case; nothing for anything else."""
+def _argument_settings(case: Case, quantity: str, value: Sequence[float]) -> Settings:
+    """Return an argument of F as settings of the case; empty for another quantity."""
     path = quantity.removeprefix("combined.")
     if path == "pose.position":
         return dict(zip(component_names("p", 3), value, strict=True))
@@ -255,14 +268,14 @@ def _setting(case: Case, quantity: str, value: Sequence[float]) -> Settings:
     return {}
 
 
-def _robot(result: CaseResult) -> RobotData | None:
+def _answer_robot(result: CaseResult) -> RobotData | None:
     """Return the robot of an answer, or None where its equations have no value."""
     if isinstance(result, CombinedResult):
         return None if result.combined.method_point is None else result.combined.method_point.robot
     return result.robot
 
 
-def _own_settings(case: Case, robot: RobotData) -> Settings:
+def _computed_settings(case: Case, robot: RobotData) -> Settings:
     """Return the computed point as settings of the case."""
     settings: dict[str, float | list[float]] = {
         case.parameter_name(name): list(value) if isinstance(value, tuple) else value
@@ -274,7 +287,7 @@ def _own_settings(case: Case, robot: RobotData) -> Settings:
     return settings
 
 
-def _objectives(case: Case) -> list[tuple[float, float]]:
+def _best_objectives(case: Case) -> list[tuple[float, float]]:
     """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):

@@ -73,6 +73,7 @@ def _compound(kind: object, definitions: Schema) -> Schema:
 
 
 def _reference(kind: type[JsonObject], definitions: Schema) -> Schema:
+    """Return a reference to the schema of an object type, which is added to the definitions."""
     name = kind.__name__
     if name not in definitions:
         fields = _fields(kind, definitions)
@@ -106,13 +107,14 @@ class _Fields(NamedTuple):
 
 
 def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
+    """Return the fields of an object type, those of its inline parts among them."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
     for name, annotation in kind.__annotations__.items():
         mark = kind.marks[name]
         if mark is Mark.INLINE:
             _add_inline(fields, annotation, definitions)
             continue
-        schema = _schema(annotation if mark is None else _present(annotation), definitions)
+        schema = _schema(annotation if mark is None else _type_without_none(annotation), definitions)
         fields.properties[name] = {**schema, **({"description": descriptions[name]} if name in descriptions else {})}
         if mark is None:
             fields.required.append(name)
@@ -120,8 +122,8 @@ def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
 
 
 def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> None:
-    """Add the fields of an inline part; where it may be absent, they are there all together or not at all."""
-    kind = _present(annotation)
+    """Add the fields of an inline part; where the part may be absent, its fields are present together or not at all."""
+    kind = _type_without_none(annotation)
     if not (isinstance(kind, type) and issubclass(kind, JsonObject)):
         raise TypeError(f"only an object can stand inline, which {kind!r} is not")
     part = _fields(kind, definitions)
@@ -135,8 +137,8 @@ def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> Non
             fields.together[name] = [*fields.together.get(name, []), *(others if name == first else [first])]
 
 
-def _present(annotation: object) -> object:
-    """Return the type of a marked field where it is not None."""
+def _type_without_none(annotation: object) -> object:
+    """Return the type of a marked field, without None."""
     kind = get_args(annotation)[0]
     if get_origin(kind) not in (Union, UnionType):
         return kind

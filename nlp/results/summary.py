@@ -1,4 +1,4 @@
-"""Results as a sequence of lines and tables, as a terminal shows them."""
+"""Results as sequences of lines and tables for a terminal."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from .wording import (
     combined_value_lines,
     evidence_lines,
     heading_lines,
-    listed,
     number,
+    numbers,
     singularity_lines,
     starts_lines,
     task_line,
@@ -44,10 +44,11 @@ Summary: TypeAlias = Iterator[Line | TextTable]
 
 def case_summary(case: Case, result: CaseResult) -> Summary:
     """Yield the result of a solve, of one task or of several."""
-    return _combined(case, result) if isinstance(result, CombinedResult) else _solved(case, result)
+    return _combined_summary(case, result) if isinstance(result, CombinedResult) else _task_summary(case, result)
 
 
-def _solved(case: Case, result: SolveResult) -> Summary:
+def _task_summary(case: Case, result: SolveResult) -> Summary:
+    """Yield the result of a solve of one task."""
     yield from heading_lines(case, result)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
@@ -63,7 +64,8 @@ def _solved(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
 
 
-def _combined(case: Case, result: CombinedResult) -> Summary:
+def _combined_summary(case: Case, result: CombinedResult) -> Summary:
+    """Yield the result of a solve of several tasks."""
     combined, point = result.combined, result.combined.method_point
     yield title_line(case)
     yield from combined_lines(result)
@@ -112,6 +114,6 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     if result.limits:
         yield limit_table(result.limits)
     yield jacobian_table(case, robot)
-    yield Line(listed(robot.singular_values), label="singular values")
+    yield Line(numbers(robot.singular_values), label="singular values")
     yield principal_table(result.principal_motions, case.units)
     yield from singularity_lines(robot, case.units)

@@ -10,7 +10,7 @@ from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..units import Units
 from .text import TextTable
-from .wording import NOISE, SET, listed, motion_words, number
+from .wording import NOISE, SET, motion_words, number, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from .evaluation import PrincipalMotionsData
     from .parts import LimitData, MarginData, PosesData, RobotData, SensitivityData, VersionsData
 
-#: A rotation by less than this, radians, has no axis that means anything.
+#: A rotation by less than this, radians, has no determined axis.
 _TURNED = 1e-9
-#: So many places where a limit is active are named.
+#: Largest number of places named where a limit is active.
 _PLACES = 3
-#: So many optima are shown in full.
+#: Largest number of optima shown in full.
 MOST_OPTIMA = 12
 
 
@@ -37,24 +37,29 @@ def design_table(
     active: Sequence[ActiveData] = (),
     sensitivity: Sequence[SensitivityData] = (),
 ) -> TextTable:
-    """Return every dimension and the pose: value, unit, the range it was free in, and the limit that holds it.
+    """Return every dimension and the pose: value, unit, the range of a free one, and its active bound or limit.
 
     Args:
         case: the case.
         robot: at the point.
-        reached: whether the point is merely where a failed solve ended.
+        reached: whether the point is only the one that a failed solve reached.
         active: bounds and limits that hold the point.
         sensitivity: of the optimal F to fixed numbers.
     """
     units = case.units
-    # Variables' bounds come first among the active ones, so that a constraint of the same name hides none of them.
+    # Variables' bounds come first among the active sides, and the first side of a name stays: no constraint hides one.
     held = {side.name: f"{side.bound}, {side.multiplier:.4g} F" for side in reversed(active)}
     fixed = {row.name: f"fixed, {row.derivative + 0.0:+.4g} F" for row in sensitivity}
     column = ("held by",) if held or fixed else ()
     rows: list[tuple[str, ...]] = []
 
     def add(name: str, dimension: Dimension, value: float, given: Value) -> None:
-        row = (name, _settled(value, given, units, dimension), units.label(dimension), _range(given, units, dimension))
+        row = (
+            name,
+            _number_text(value, given, units, dimension),
+            units.label(dimension),
+            _range_text(given, units, dimension),
+        )
         reason = held.get(name) or fixed.get(name)
         why = f"{reason}/{units.label(dimension) or 'unit'}" if reason else ""
         rows.append((*row, *((why,) if column else ())))
@@ -73,9 +78,9 @@ def design_table(
         angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
         turned = abs(units.to_internal(found.angle, Dimension.ANGLE)) > _TURNED
         if not is_held and isinstance(angle, Free):
-            # The sign of the angle means nothing then: its size is limited.
+            # Then only the size of the angle is limited, and its sign is arbitrary.
             angle = Free(*sizes_of_turn(angle))
-        axis = listed(found.axis) if turned or is_held else "none"
+        axis = numbers(found.axis) if turned or is_held else "none"
         row = (f"{prefix}axis", axis, "", "" if is_held else "any direction")
         rows.append((*row, *(("",) if column else ())))
         add(f"{prefix}angle", Dimension.ANGLE, found.angle, angle)
@@ -91,21 +96,22 @@ def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> Te
 
 
 def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) -> TextTable:
-    """Return the design that several tasks were combined to."""
+    """Return the design at the combined point of several tasks."""
     reached = combined.method_point is None
     active = () if reached or combined.optimality is None else combined.optimality.active
     return design_table(case, robot, reached=reached, active=active)
 
 
-def _settled(value: float, given: Value, units: Units, dimension: Dimension) -> str:
-    """Return a number's text, 0 where it is rounding error beside the range that it was free in."""
+def _number_text(value: float, given: Value, units: Units, dimension: Dimension) -> str:
+    """Return a number's text, 0 where it is rounding error beside the range of a free number."""
     if isinstance(given, Free):
         width = units.shown(given.upper - given.lower, dimension)
         value = 0.0 if abs(value) < NOISE * width else value
     return number(value)
 
 
-def _range(given: Value, units: Units, dimension: Dimension) -> str:
+def _range_text(given: Value, units: Units, dimension: Dimension) -> str:
+    """Return the range of a free number; empty for a fixed one."""
     if not isinstance(given, Free):
         return ""
     return f"{units.shown(given.lower, dimension):g} .. {units.shown(given.upper, dimension):g}"
@@ -117,7 +123,7 @@ def robot_table(case: Case, robot: RobotData) -> TextTable:
 
 
 def _pose_table(case: Case, several: PosesData) -> TextTable:
-    """Return the robot at every pose: F, where it stands, and the range of each measure over its limbs."""
+    """Return the robot at every pose: F, position and angle, and the range of each measure over its limbs."""
     measures = [item for item in case.model.quantities if item.name in several.poses[0].quantities]
     words = [item.name.replace("_", " ").removesuffix(" angle") for item in measures]
     labels = [f"{word}\n{case.units.label(item.dimension)}" for word, item in zip(words, measures, strict=True)]
@@ -163,8 +169,8 @@ def principal_table(motions: PrincipalMotionsData, units: Units) -> TextTable:
     for kind in (motions.rotations, motions.translations):
         noise = NOISE * kind[-1].F
         for rank, motion in zip(("least", "", "most"), kind, strict=True):
-            settled = 0.0 if noise >= motion.F else motion.F
-            rows.append((rank, number(settled), motion_words(motion.motion, units)))
+            F = 0.0 if noise >= motion.F else motion.F
+            rows.append((rank, number(F), motion_words(motion.motion, units)))
     return TextTable(("resisted", "F", "motion"), tuple(rows))
 
 
@@ -175,13 +181,15 @@ def limit_table(limits: Sequence[LimitData]) -> TextTable:
         where = [_place(name) for name in row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
         cost = f"{row.cost + 0.0:+.4g} F/{row.unit or 'unit'}" if row.active and row.cost else ""
-        margin = _beside(row.margin, row.limit) + (", active" if row.active else "")
+        margin = _limit_number_text(row.margin, row.limit) + (", active" if row.active else "")
         shown = ", ".join(where[:_PLACES]) + more
-        rows.append((row.key, f"{row.limit:g}", row.unit, _beside(row.value, row.limit), margin, shown, cost))
+        rows.append(
+            (row.key, f"{row.limit:g}", row.unit, _limit_number_text(row.value, row.limit), margin, shown, cost)
+        )
     return TextTable(("limit", "", "unit", "nearest", "margin", "where", "costs"), tuple(rows))
 
 
-def _beside(value: float | None, limit: float) -> str:
+def _limit_number_text(value: float | None, limit: float) -> str:
     """Return a number's text, 0 where it is rounding error beside a limit."""
     if value is None:
         return "none"
@@ -189,7 +197,7 @@ def _beside(value: float | None, limit: float) -> str:
 
 
 def _place(name: str) -> str:
-    """Return where a limit is, from its name: everything behind the limit's own word."""
+    """Return the place of a limit: its name without the first word."""
     return name.partition(" ")[2]
 
 

@@ -1,4 +1,4 @@
-"""Text without a form: lines and tables, which terminal, Markdown and page render, each in its own way."""
+"""Text without a format: lines and tables, which terminal, Markdown and page render, each in its own way."""
 
 from __future__ import annotations
 

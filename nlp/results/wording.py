@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: A number below this part of its neighbours or its range is shown as 0; in JSON it stands as it is.
 NOISE = 1e-9
-#: So many violated limits, and so many optima, are shown.
+#: Largest numbers of violated limits, and of optima, shown.
 _VIOLATIONS, _OPTIMA = 8, 5
 #: An optimum is a set when its points lie apart by more than this part of the ranges.
 SET = 1e-3
@@ -32,7 +32,7 @@ def number(value: float) -> str:
     return f"{value + 0.0:.7g}"
 
 
-def listed(values: Iterable[float]) -> str:
+def numbers(values: Iterable[float]) -> str:
     """Return numbers with five digits each."""
     return "  ".join(f"{value + 0.0:.5g}" for value in values)
 
@@ -74,7 +74,7 @@ def headline(result: SolveResult) -> Line:
             status = "stationary, not proven optimal"
     if robot is not None and robot.singular:
         status += f", singular: rank {robot.rank}"
-    # What is left of an F that nothing resists is rounding.
+    # Where nothing resists the motion, F is rounding error.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else result.F
     return Line(number(F), tone=Tone.ANSWER, before=f"{word} F = ", after=f"   ({status}{over})")
 
@@ -88,7 +88,7 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
 
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:
-    """Yield the verdict, the evidence for it, and the limits that a failed solve violates or would have to move."""
+    """Yield the verdict, the evidence for it, and the limits that a failed solve violates or that must be moved."""
     evidence = result.optimality
     if evidence is not None:
         yield verdict_line(evidence)
@@ -110,13 +110,13 @@ def verdict_line(evidence: OptimalityData) -> Line:
 
 
 def relaxation_words(row: RelaxationData) -> str:
-    """Return how a number would have to move."""
+    """Return the movement of a limit that makes an infeasible case feasible."""
     unit = f" {row.unit}" if row.unit else ""
     return f"feasible with {row.key} = {row.needed:.6g}{unit} instead of {row.limit:g}{unit}"
 
 
 def costliest_words(limits: Sequence[LimitData]) -> str | None:
-    """Return which active limit costs most per part of its own size, or None where none costs anything."""
+    """Return a sentence about the active limit with the largest cost per part of its size; None without a cost."""
     costly = [(row, row.cost) for row in limits if row.active and row.cost]
     if not costly:
         return None
@@ -136,7 +136,7 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
 
 
 def starts_lines(starts: StartsData) -> Iterator[Line]:
-    """Yield how the starts ended."""
+    """Yield counts of starts by outcome, and the distinct optima."""
     if not starts.run:
         return
     yield Line(f"{starts.converged} of {starts.run} converged", label="starts")
@@ -188,7 +188,7 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
 
 
 def combined_lines(result: CombinedResult) -> Iterator[Line]:
-    """Yield how the tasks were combined, and the limits that the combined point violates."""
+    """Yield the method of combination, and the limits that the combined point violates."""
     combined, status = result.combined, result.status.value
     yield Line(f"{combined.method.value} ({status})", label="combined by")
     if combined.method_point is None:
@@ -198,7 +198,7 @@ def combined_lines(result: CombinedResult) -> Iterator[Line]:
 
 
 def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
-    """Yield the value of the combined objective and the verdict about it, where there is one."""
+    """Yield the value of the combined objective and the verdict about the point, where there is a value."""
     if combined.value is None:
         return
     yield Line(number(combined.value), label=combined.method.value)

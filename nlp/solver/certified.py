@@ -1,4 +1,4 @@
-"""Certificates of a case: an incumbent from a solve, the search of the whole box, and the proof that it leaves."""
+"""Certificates of a case: an incumbent from a solve, a search of the whole box, and the proof from that search."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .solve import solve_programs
 
 
 class OptionError(InputError):
-    """An option of a certificate that has no meaning for the case, or a value that it cannot have."""
+    """An option of a certificate that has no meaning for the case, or whose value is out of range."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class CertifyOptions:
     """Options of a certificate.
 
     Attributes:
-        gap: part of the incumbent that the bound may be off by.
+        gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
         above: prove that F is above this value instead.
         time_limit: seconds for each program.
         jobs: threads.
@@ -67,7 +67,7 @@ class Certified(Whole, Shown, Answer):
         tasks: a certificate for each task by itself.
         combined: for the combined program of several tasks, where the method has one.
         statement: names the program that ``tree`` is about.
-        tree: the proof's nodes; None when none was asked for or there is none.
+        tree: the proof's nodes; None without ``with_proof``, and where nothing is proved.
     """
 
     solution: Solution
@@ -87,7 +87,7 @@ class Certified(Whole, Shown, Answer):
 
     @property
     def is_proved(self) -> bool:
-        """Whether everything that was asked for is proved."""
+        """Whether every certificate is proved."""
         every = [*self.tasks, *([] if self.combined is None else [self.combined])]
         return all(each.status is CertificateStatus.PROVED for each in every)
 
@@ -108,14 +108,14 @@ def certify(
 
     Args:
         found: a case, which is solved first, or its solution.
-        gap: part of the incumbent that the bound may be off by.
+        gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
         above: prove, instead, that F of a case's only task is above this value on the whole box.
-        time_limit: seconds for each program, after which the search stops with what it has.
+        time_limit: seconds for each program; the search then stops with the bound reached.
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
         with_proof: keep the proof of the case's one task, or of its combined program, for :func:`proof_of`.
-        progress: returns, for the name of a program, the function that is called now and then during its search.
+        progress: returns, for the name of a program, the function that is called from time to time during its search.
 
     Raises:
         OptionError: an option is outside of its range, or has no meaning for the case.
@@ -153,25 +153,25 @@ def certify(
         statement = Statement(minimise=above is not None)
         nlp = _with_sense(nlps[0], statement)
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
-        writer = _writer(nlp) if with_proof else None
+        writer = _proof_writer(nlp) if with_proof else None
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None:
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
         solution = solution_of_one_task(case, own)
-        return Certified(solution, (certificate,), None, statement, _tree(writer, certificate))
+        return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or solve_programs(case, nlps, search, jobs=jobs)
     alone = tuple(certify_one(outcome.own, outcome.task.name, None) for outcome in solution.outcomes)
     if solution.combination is None or solution.combination.combined is None:
         return Certified(solution, alone, None, Statement(), None)
     combined = solution.combination.combined
-    writer = _writer(combined.nlp) if with_proof else None
+    writer = _proof_writer(combined.nlp) if with_proof else None
     certificate = certify_one(combined, case.method.value, writer)
-    statement = _statement(solution.combination, combined)
-    return Certified(solution, alone, certificate, statement, _tree(writer, certificate))
+    statement = _combined_statement(solution.combination, combined)
+    return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:
-    """Formulate the program of a case that a proof is about.
+    """Formulate the program of a case to which a proof belongs.
 
     Raises:
         InputError: the case has no such program.
@@ -191,7 +191,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
     """Return the proof that belongs to a certificate.
 
     Args:
-        certified: made with ``with_proof``.
+        certified: the certificates, from :func:`certify` with ``with_proof``.
         text: the case file's text.
 
     Raises:
@@ -210,17 +210,18 @@ def _with_sense(nlp: Nlp, statement: Statement) -> Nlp:
     return replace(nlp, sense=Sense.MIN) if statement.minimise and nlp.sense is not Sense.MIN else nlp
 
 
-def _writer(nlp: Nlp) -> ProofWriter | None:
+def _proof_writer(nlp: Nlp) -> ProofWriter | None:
+    """Return a recorder of the proof of a program; None for a program without variables."""
     return ProofWriter(len(standard_form(nlp).functions)) if nlp.n else None
 
 
-def _tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
-    """Return the nodes of a proof, where something is proved."""
+def _complete_tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
+    """Return the nodes of a complete proof; None where nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     return writer.tree() if writer is not None and complete else None
 
 
-def _statement(combination: Combination, combined: ProgramSolution) -> Statement:
+def _combined_statement(combination: Combination, combined: ProgramSolution) -> Statement:
     """Return the statement that names the combined program of several tasks."""
     weights = combination.weights
     if combination.method is Method.WEIGHTED_SUM:

@@ -34,7 +34,7 @@ def shared_library(source: str) -> Path:
         text, compiled = Path(temporary) / "source.c", Path(temporary) / "compiled.so"
         text.write_text(source, encoding="utf-8")
         _run([compiler, *_FLAGS, str(text), "-lm", "-o", str(compiled)])
-        # Whole or not at all, also when two programs compile it at once.
+        # A rename leaves a whole library or none, also when two processes compile it at the same time.
         compiled.replace(library)
     return library
 
@@ -74,7 +74,7 @@ def _run(words: list[str]) -> str:
 
 
 def _folder() -> Path:
-    """Return the user's cache folder; a fresh folder where there can be none."""
+    """Return the user's cache folder; a new temporary folder where it cannot be written."""
     import tempfile
 
     base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"

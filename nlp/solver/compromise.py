@@ -1,11 +1,11 @@
-"""Several tasks for one robot: equation 15, the best weighted sum, and the best worst task.
+"""Combination of several tasks for one robot: equation 15, the best weighted sum, and the best worst task.
 
 Every task is first solved by itself. Then the tasks are combined:
 
 * ``average`` (equation 15): ``Q = (1/n) sum_j w_j q_j`` of the tasks' own optima ``q_j``. As printed this is a mean
-  only when the weights sum to ``n``; they are scaled so, with a notice. Lengths and angles average linearly, a rotation
-  whose axis is free on SO(3), a free direction on the sphere. Nothing is optimised at ``Q``, and only bounds are sure
-  to hold there, because they are convex.
+  only when the weights sum to ``n``: the weights are scaled to that sum, with a notice. Lengths and angles average
+  linearly, a rotation whose axis is free on SO(3), a free direction on the sphere. Nothing is optimised at ``Q``, and
+  only the bounds of the variables are sure to hold there, because a box is convex.
 * ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
 
 Each method states its cost: every task's F, rates and verdict at the combined point, its loss against its own optimum,
@@ -13,7 +13,7 @@ and every limit that is violated.
 
 Where a task's optimum is not unique, its ``q_j`` is arbitrary. The rule is then *nearest to the others*: the member of
 the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once, repeated until
-no point moves, so that the order of the tasks means nothing.
+no point moves, so that the result does not depend on the order of the tasks.
 """
 
 from __future__ import annotations
@@ -39,11 +39,10 @@ from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
 from .status import Status
 
-#: Weights of the distance to the other tasks' points, in parts of F's scale, smaller and smaller, with which the
-#: nearest member of an optimal set is searched for: the point tends to that member, and the correction that follows
-#: removes the rest.
+#: Weights of the distance to the other tasks' points, in parts of F's scale, in descending order, for the search of the
+#: nearest member of an optimal set: the point tends to that member, and the correction that follows removes the rest.
 _DISTANCE_WEIGHTS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-#: Most rounds of choosing members, and the movement in half ranges that ends them.
+#: Largest number of rounds of choosing members, and the movement in half ranges below which the rounds end.
 _ROUNDS = 20
 _STILL = 1e-9
 
@@ -57,10 +56,10 @@ class SolveOne(Protocol):
 
 
 class Polish(Protocol):
-    """A search of one program that starts close to its solution."""
+    """A search of one program from points close to its solution."""
 
     def __call__(self, nlp: Nlp, *, first: Sequence[FloatArray]) -> ProgramSolution:
-        """Solve a program from points (n,) and few others."""
+        """Solve a program from points (n,) and a few sampled ones."""
         ...
 
 
@@ -86,7 +85,7 @@ def combine(
     Returns:
         The solution, with no seconds yet.
     """
-    weights, scaling_notices = _scaled_weights(case)
+    weights, scaling_notices = _scale_weights(case)
     points, unique, notices = _choose_members(nlps, own, polish)
     notices = [*scaling_notices, *notices]
     combined: ProgramSolution | None = None
@@ -118,12 +117,14 @@ def combine(
 
 
 class _Weights(NamedTuple):
+    """Scaled weights of the tasks, and notices about the scaling."""
+
     values: list[float]
     notices: list[str]
 
 
-def _scaled_weights(case: Case) -> _Weights:
-    """Return weights that sum to the number of tasks, as equation 15 needs them."""
+def _scale_weights(case: Case) -> _Weights:
+    """Return the tasks' weights scaled to sum to the number of tasks, as equation 15 needs them."""
     given = [task.weight for task in case.tasks]
     total, n = sum(given), len(given)
     if abs(total - n) <= 1e-12 * n:
@@ -158,7 +159,7 @@ def _solve_combined(
         return solve_one(case.method.value, formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
     levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
-    # No answer is beyond the least of the tasks' own maxima, nor worse than the best of the first points.
+    # No level can exceed the least of the tasks' own maxima, nor be worse than that of the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
     floor = 1e-3 * max(nlp.objective_scale for nlp in nlps)
@@ -169,7 +170,7 @@ def _solve_combined(
 
 
 class _Members(NamedTuple):
-    """A point of each task's optimal set, whether it is the only one, and notices about those that are not."""
+    """A point of each task's optimal set, whether the set has no other, and notices about sets of several points."""
 
     points: list[FloatArray]
     unique: list[bool]
@@ -187,7 +188,7 @@ def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish:
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
-    extended = proximity_program(nlps[0].program)  # one program serves all tasks: they differ by their numbers
+    extended = proximity_program(nlps[0].program)  # one program serves all tasks: only their arguments differ
     for _ in range(_ROUNDS if notices else 0):
         following = list(points)
         for j in range(len(own)):
@@ -201,14 +202,14 @@ def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish:
     return _Members(points, unique, notices)
 
 
-def _is_set(solution: ProgramSolution) -> bool:
+def _may_be_connected(solution: ProgramSolution) -> bool:
     """Return whether the optimum may belong to a connected set of optima."""
     return solution.evidence is not None and solution.evidence.kind in (PointKind.NOT_ISOLATED, PointKind.UNDECIDED)
 
 
 def _is_unique(solution: ProgramSolution) -> bool:
     """Return whether no other optimum with the same F is known."""
-    return len(_known_members(solution)) == 1 and not _is_set(solution)
+    return len(_known_members(solution)) == 1 and not _may_be_connected(solution)
 
 
 def _known_members(solution: ProgramSolution) -> list[FloatArray]:
@@ -217,7 +218,7 @@ def _known_members(solution: ProgramSolution) -> list[FloatArray]:
         return [np.array(solution.x)]
     tolerance = SAME_VALUE * solution.nlp.objective_scale
     best = solution.optima[0].F
-    if _is_set(solution):
+    if _may_be_connected(solution):
         converged = [start for start in solution.starts if start.status is StartStatus.CONVERGED]
         return [start.x for start in converged if abs(start.F - best) <= tolerance]
     return [optimum.x for optimum in solution.optima if abs(optimum.F - best) <= tolerance]
@@ -231,13 +232,13 @@ def _nearest_member(
     extended: Program,
     polish: Polish,
 ) -> FloatArray:
-    """Return the member of a task's optimal set nearest to a point (n,), as far as the known members lead to it."""
+    """Return the member of a task's optimal set nearest to a point (n,), searched from the known members."""
 
     def distance(x: FloatArray) -> float:
         return float(np.linalg.norm((x - target) / nlp.scale))
 
     closest = min(members, key=distance)
-    if not _is_set(solution):
+    if not _may_be_connected(solution):
         return closest
     best = nlp.evaluate(solution.x)[0]
     points = [closest, target]
@@ -253,7 +254,7 @@ def _nearest_member(
 
 
 def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -> FloatArray:
-    """Return ``Q = (1/n) sum_j w_j q_j`` over points (n,), rotations and directions on their own manifolds."""
+    """Return ``Q = (1/n) sum_j w_j q_j`` over points (n,); rotations and directions are averaged on their manifolds."""
     shares = np.array(weights) / len(weights)
     Q = shares @ np.array(points)
     for triple in nlp.program.places.directions:
@@ -268,7 +269,7 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
 
 
 def _mean_rotation(vectors: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
-    """Return the quaternion vector (3,) of the weighted chordal mean of rotations given by theirs.
+    """Return the quaternion vector (3,) of the weighted chordal mean of rotations, from their quaternion vectors.
 
     The chordal mean of matrices is that of unit quaternions without their signs: the eigenvector of ``sum w q q'`` with
     the largest eigenvalue (F. L. Markley et al., *Averaging Quaternions*, J. Guidance 30 (2007)).

@@ -1,7 +1,7 @@
 """Interface of a local solver: any function of the type :class:`Solver` can search a program.
 
-A solver says where it stopped, with which multipliers, why, and after how many iterations. Its word is never taken for
-it: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the program's own conditions.
+A solver reports the point at which it stopped, the multipliers, the reason, and the number of iterations. The report is
+never trusted: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the program's own conditions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..program.nlp import Nlp
 
 
 class StopReason(enum.Enum):
-    """Why a local solver stopped."""
+    """Reason why a local solver stopped."""
 
     SUCCEEDED = "succeeded"
     ITERATION_LIMIT = "iteration limit"

@@ -1,6 +1,6 @@
 """The call of Ipopt through CasADi, over scaled variables and a scaled objective.
 
-Ipopt's strings end in this module.
+No other module knows Ipopt's strings.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
 
 
 def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return (c,) typical lengths of each limit's gradient in scaled variables, so that Ipopt sees rows of order 1.
+    """Return (c,) typical lengths of each limit's gradient in scaled variables; divided by them, rows are of order 1.
 
-    The program's other constraints are written that way already and have 1.
+    The rows of the program's other constraints are of order 1 already: their length is 1.
     """
     jacobians = [nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_SAMPLED]]
     rows = np.array(jacobians) * nlp.scale

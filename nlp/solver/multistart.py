@@ -1,4 +1,4 @@
-"""Search of one program from many starting points, and the distinct optima that it found."""
+"""Search of one program from many starting points, and the distinct optima found."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .status import Status
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9
-#: A point that is better than the best optimum by more than this part of F's scale is no rounding of it.
+#: A point better than the best optimum by more than this part of F's scale is better by more than rounding.
 _BETTER = 1e-6
 #: Starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
@@ -54,7 +54,7 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class ProgramSolution(Whole):
-    """The outcome of a search of one program.
+    """Outcome of a search of one program.
 
     Attributes:
         status: how it ended; only :attr:`Status.OPTIMAL` is an optimum.
@@ -110,7 +110,7 @@ def solve_program(
     progress: Progress | None = None,
     solver: Solver = ipopt,
 ) -> ProgramSolution:
-    """Solve a program; where its limits seem to contradict each other, find out which and by how much.
+    """Solve a program; where its limits seem to contradict each other, find the smallest relaxation.
 
     Args:
         nlp: the program.
@@ -128,19 +128,19 @@ def solve_program(
     limited = any(any(constraint.keys) for constraint in nlp.program.constraints)
     if solution.status is not Status.INFEASIBLE or not limited:
         return solution
-    stretched = formulate_relaxation(nlp)
+    elastic = formulate_relaxation(nlp)
     points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
     few = replace(search, starts=min(search.starts, _ELASTIC_STARTS))
-    relaxed = _search(stretched, few, points, jobs, None, solver)
-    # An optimum of relaxations is often degenerate, with more limits active than it takes; what counts is that it is
-    # feasible.
+    relaxed = _search(elastic, few, points, jobs, None, solver)
+    # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it need not
+    # count as converged: a feasible point is enough.
     feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
     if not feasible:
         return replace(solution, seconds=time.perf_counter() - began)
     least = min(feasible, key=lambda start: start.F)
     moved = relaxed_limits(nlp, least.x)
     if not moved:
-        # Every limit can hold after all: the search only did not find out where.
+        # All limits can hold at once: the first search only missed the feasible set, which this point lies in.
         solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver)
     return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
 
@@ -156,7 +156,7 @@ def _search(
     """Search a program from the first points and from sampled ones."""
     began = time.perf_counter()
     if nlp.n == 0:
-        return _at_the_only_point(nlp, search, began)
+        return _evaluate_without_variables(nlp, search, began)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     done: list[Start] = []
     best: float | None = None
@@ -167,14 +167,14 @@ def _search(
         if progress is not None:
             progress(len(done), len(points), best)
     starts, optima = _distinct_optima(nlp, done)
-    beaten = _better_unconverged(nlp, starts, optima)
-    if optima and beaten is None:
+    better = _find_better_start(nlp, starts, optima)
+    if optima and better is None:
         x, evidence = optima[0].x, optima[0].evidence
     else:
-        x = (beaten or min(starts, key=lambda start: (start.violation, start.stationarity))).x
+        x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
     return ProgramSolution(
-        status=_status(evidence, bool(optima) and beaten is None),
+        status=_status(evidence, bool(optima) and better is None),
         nlp=nlp,
         x=frozen_array(x, (nlp.n,)),
         state=state_or_none(nlp, x),
@@ -186,7 +186,7 @@ def _search(
     )
 
 
-def _at_the_only_point(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
+def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
     """Evaluate a program without variables."""
     x = frozen_array(nlp.start, (0,))
     status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
@@ -195,10 +195,10 @@ def _at_the_only_point(nlp: Nlp, search: Search, began: float) -> ProgramSolutio
     return ProgramSolution(status, nlp, x, state, evidence, (), (), search.seed, time.perf_counter() - began)
 
 
-def _better_unconverged(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
+def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
     """Return a feasible start that did not converge and is better than every optimum found, or None.
 
-    Then the best optimum found is not the best there is, and must not be given for it.
+    With such a start, the best optimum found is not the global one, and must not be reported as the answer.
     """
     feasible = [start for start in starts if start.status is not StartStatus.CONVERGED and start.violation <= FEASIBLE]
     if not (feasible and optima):
@@ -209,6 +209,7 @@ def _better_unconverged(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Opti
 
 
 def _status(evidence: Evidence, converged: bool) -> Status:
+    """Return the status of a search from the evidence at its best point."""
     if converged and evidence.kind.is_optimum:
         return Status.OPTIMAL
     if evidence.kind is PointKind.INFEASIBLE:
@@ -225,14 +226,14 @@ def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
 
 
 class _Distinct(NamedTuple):
-    """Starts, with those that ended at a saddle marked, and the distinct optima among the others, best first."""
+    """Starts, saddles marked by their status, and the distinct optima among the others, best first."""
 
     starts: list[Start]
     optima: list[Optimum]
 
 
 def _distinct_optima(nlp: Nlp, done: Sequence[Start]) -> _Distinct:
-    """Group converged starts by value and point, and examine one point of each group, once.
+    """Group converged starts by value and point, and examine one point of each group.
 
     Where an optimum is not isolated, all points of its F count as one set; it may have several pieces.
     """
@@ -244,7 +245,7 @@ def _distinct_optima(nlp: Nlp, done: Sequence[Start]) -> _Distinct:
         lead = remaining[0]
         level = [start for start in remaining if abs(start.F - lead.F) <= SAME_VALUE * nlp.objective_scale]
         evidence = examine(nlp, lead.x)
-        # The lead is the first of its level, and so of its group.
+        # The lead is the first start of the level, and so of the first group: its evidence serves that group.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED
         groups = _group_by_point(nlp, level) if isolated else [level]
         examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
@@ -264,7 +265,7 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
     """Group starts whose points count as the same, in the order of the first of each group."""
     groups: list[list[Start]] = []
     for start in starts:
-        same = next((group for group in groups if _distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
+        same = next((group for group in groups if _largest_distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
         if same is None:
             groups.append([start])
         else:
@@ -272,6 +273,6 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
     return groups
 
 
-def _distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:
+def _largest_distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:
     """Return the largest distance along one variable, in half ranges."""
     return float(np.max(np.abs(one - other) / nlp.scale))

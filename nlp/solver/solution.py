@@ -49,12 +49,11 @@ class TaskOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Combination:
-    """The part of a solution that only several tasks have.
+    """Combination of several tasks: the part of a solution that a case with one task does not have.
 
     Attributes:
         method: method that combines the tasks.
-        value: value of the combined objective: the weighted sum, or the level that every task keeps; None for an
-            average.
+        value: value of the combined objective: the weighted sum, or the level of the worst task; None for an average.
         weights: one for each task, scaled to sum to the number of tasks.
         violated: names of the bounds and constraints that the combined point violates.
         notices: sentences for the user about scaled weights and optima that are not unique.
@@ -110,7 +109,7 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def all_solved(self) -> bool:
-        """Whether every program that the method needs is solved; the point is then the one that the method yields."""
+        """Whether every program that the method needs is solved, so that the point is an answer of the method."""
         alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
         decisive = self.decided_by
         return alone and (decisive is None or decisive.status.is_answer)
@@ -139,29 +138,29 @@ class Solution(Whole, Shown, Answer):
     @property
     def nlp(self) -> Nlp:
         """The program that decided."""
-        return self._decisive().nlp
+        return self._decisive_solution().nlp
 
     @property
     def starts(self) -> tuple[Start, ...]:
         """Every start of the program that decided, in order."""
-        return self._decisive().starts
+        return self._decisive_solution().starts
 
     @property
     def optima(self) -> tuple[Optimum, ...]:
         """Distinct optima of the program that decided, best first."""
-        return self._decisive().optima
+        return self._decisive_solution().optima
 
     @property
     def relaxation(self) -> tuple[RelaxedLimit, ...]:
         """Smallest relaxation found that makes an infeasible program feasible."""
-        return self._decisive().relaxation
+        return self._decisive_solution().relaxation
 
     @property
     def seed(self) -> int:
         """Seed of the starting points."""
         return self.outcomes[0].own.seed
 
-    def _decisive(self) -> ProgramSolution:
+    def _decisive_solution(self) -> ProgramSolution:
         """Return the solution of the program that decided.
 
         Raises:

@@ -1,8 +1,7 @@
 """Searches from many starting points, each corrected and judged by the program's own conditions.
 
-At the point where a solver stopped, the sides that it found active are held, and a few Newton steps bring the point to
-rounding error. Whether that point has converged is then judged by the program's own first-order conditions and never by
-the solver's word.
+The sides that the solver reports as active are held, and a few Newton steps bring the solver's point to rounding error.
+Convergence is then judged by the program's own first-order conditions, and never by the solver's report.
 """
 
 from __future__ import annotations
@@ -23,26 +22,26 @@ from ..program.nlp import Nlp
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
 
-#: A side farther than this, in half ranges, from where the solver stopped is not one that the optimum lies on.
+#: A side farther than this, in half ranges, from the solver's point does not belong to the active set.
 _NEAR = 1e-2
-#: What part of its slack the multiplier of a side must exceed for the side to be held. The generous choice is tried
-#: first; where it does not lead to a point this stationary, because it holds sides that the optimum does not lie on,
-#: stricter ones follow.
+#: A side is held where its multiplier exceeds this part of its slack. The smallest part, which holds most sides, is
+#: tried first. Where it holds inactive sides, and so does not lead to a point as stationary as ``_POLISHED``, larger
+#: parts follow.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
 #: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
 _WORSE = 1e-8
 #: Two optima are the same when their points differ by less than this, in half ranges.
 SAME_POINT = 1e-4
-#: How far F where the solver stopped may be from the optimum it stopped at, in parts of F's scale: a barrier's last
-#: bit.
+#: Largest difference of F between the solver's point and the optimum nearby, in parts of F's scale: the remainder of an
+#: interior-point method's barrier.
 _SAME_F = 1e-6
-#: A second thread is worth its own solver from this many starts on.
+#: Starts for each thread: with fewer, building another solver takes longer than the thread saves.
 _STARTS_PER_JOB = 12
 
 
 class StartStatus(enum.Enum):
-    """How the search from one starting point ended; each value is a sentence for people."""
+    """Outcome of the search from one starting point; each value is a sentence for people."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "stopped at the iteration limit: raise solve.max_iterations"
@@ -99,16 +98,16 @@ def search_from(
         InputError: the objective is to be compiled, and cannot be.
     """
     threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
-    waiting: SimpleQueue[LocalSearch] = SimpleQueue()
+    idle: SimpleQueue[LocalSearch] = SimpleQueue()
     for each in solver(nlp, search, points, min(threads, len(points))):
-        waiting.put(each)
+        idle.put(each)
 
     def search_one(point: FloatArray) -> SolverResult:
-        local_search = waiting.get()
+        local_search = idle.get()
         try:
             return local_search(point)
         finally:
-            waiting.put(local_search)
+            idle.put(local_search)
 
     known: list[Start] = []
     with ThreadPoolExecutor(threads) as pool:
@@ -121,10 +120,10 @@ def search_from(
 
 
 def _known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:
-    """Return the converged start that another search ended at too, or None.
+    """Return the converged start whose optimum a solver's point is near, or None.
 
-    Within the distance at which two optima count as one, and with the same F to the solver's accuracy, both ended at
-    the same optimum: the correction would only find it again.
+    Two searches ended at the same optimum where their points count as one and F agrees to the solver's accuracy: the
+    correction would only find the optimum again.
     """
     x = np.clip(stopped, nlp.lower, nlp.upper)
     for start in known:
@@ -142,7 +141,7 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     for share in _SHARES if np.isfinite(raw.violation) else ():
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
-        # A correction that makes F worse has gone to another stationary point.
+        # A correction that makes F worse leads to another stationary point.
         kept = corrected.phi <= raw.phi + _WORSE or raw.violation > FEASIBLE
         if kept and (corrected.violation, left) <= (max(at.violation, FEASIBLE), stationarity):
             at, stationarity = corrected, left
@@ -156,18 +155,19 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
 
 
 def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: float) -> list[int]:
-    """Return the sides that an interior-point solution may lie on: near, with a multiplier not small beside the slack.
+    """Return the sides that may be active at an interior-point solution: near, with a multiplier that exceeds a share.
+
+    The share is a part of the side's slack.
 
     An interior-point method ends with multiplier * slack about equal on all sides. A small share makes the choice
-    generous: a side that does not belong gets a multiplier of the wrong sign and leaves the active set in the
-    correction.
+    generous: an inactive side gets a multiplier of the wrong sign and leaves the active set in the correction.
     """
-    table = nlp.sides
-    reported = np.concatenate([found.bound_multipliers, found.constraint_multipliers])[table.place]
-    # Multipliers of bounds are per half range already, those of constraints are not.
-    strength = table.sign * reported * np.where(table.place < nlp.n, 1.0, 1 / at.per_unit)
+    sides = nlp.sides
+    reported = np.concatenate([found.bound_multipliers, found.constraint_multipliers])[sides.place]
+    # Multipliers of bounds are per half range already; those of constraints are per unit.
+    strength = sides.sign * reported * np.where(sides.place < nlp.n, 1.0, 1 / at.per_unit)
     near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
-    held = np.flatnonzero(table.equal | near)
-    # No more sides than variables can hold a point: those with the least multipliers beside their slack are left out.
-    order = np.where(table.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
+    held = np.flatnonzero(sides.equal | near)
+    # n independent sides determine a point: of more, those with the least multipliers beside their slack are left out.
+    order = np.where(sides.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
     return [int(j) for j in held[np.sort(np.argsort(-order, kind="stable")[: nlp.n])]]

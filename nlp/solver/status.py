@@ -1,4 +1,4 @@
-"""How a solve ended. It stands alone, so that results are shown without loading a solver."""
+"""Status of a solve: a module of its own, so that results are shown without loading a solver."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import enum
 
 
 class Status(enum.Enum):
-    """How a solve ended; each value is the word in results."""
+    """Status of a solve; each value is the word in results."""
 
     OPTIMAL = "optimal"
     AVERAGED = "averaged"
@@ -17,5 +17,5 @@ class Status(enum.Enum):
 
     @property
     def is_answer(self) -> bool:
-        """Whether the solve gave what was asked for."""
+        """Whether the point is an answer: optimal, averaged, or evaluated."""
         return self in (Status.OPTIMAL, Status.AVERAGED, Status.EVALUATED)

@@ -33,7 +33,7 @@ class Reading:
     are a ``partial`` of functions that have: a solution that holds a ``lambda`` cannot be pickled.
 
     Attributes:
-        dimension: what the limit measures for people.
+        dimension: of the number that a case states.
         from_value: the number for people (radians for angles) from the program's bound.
         slope: derivative of the program's bound with respect to the number for people, at the program's bound.
         to_value: the program's bound from the number for people, as an expression; it never falls where that grows.
@@ -68,7 +68,9 @@ SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NU
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``; its bounds are numbers of the :class:`Nlp`.
+    """A named smooth constraint ``lower <= expression <= upper``.
+
+    Its bounds are numbers of the :class:`~screwsynth.nlp.program.nlp.Nlp`.
 
     Attributes:
         name: in the words of a case.

@@ -100,7 +100,7 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
         return {self.name: {name: units.written(value, dimension) for name, value in ends.items() if value is not None}}
 
     def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
-        """Return what is measured on a robot."""
+        """Return the dimension of the measured quantity."""
         return self.measured
 
     def check(self, case: LimitedCase) -> None:

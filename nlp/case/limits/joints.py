@@ -56,7 +56,7 @@ _ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_min
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
-    """Return one of the words for mounting axes, or say what else could stand there."""
+    """Return one of the words for mounting axes; raise an error that names the other allowed values."""
     try:
         return handler(value)
     except ValidationError:

@@ -85,7 +85,7 @@ class LimitedCase(NamedTuple):
         Args:
             key: its dotted key below ``limits``.
             value: the number, radians for an angle; None where it is not given.
-            dimension: what it measures.
+            dimension: of the number.
             above: the number must be larger than this.
             most: the number may be at most this.
 

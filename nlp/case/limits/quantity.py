@@ -61,7 +61,7 @@ class QuantityLimit(IntervalLimit):
         return self.measure
 
     def dimension(self, model: Model) -> Dimension:
-        """Return what is measured on a robot."""
+        """Return the dimension of the measure; that of a pure number where the robot lacks the measure."""
         quantity = quantity_named(self.measure, model)
         return Dimension.NUMBER if quantity is None else quantity.dimension
 

@@ -1,4 +1,4 @@
-"""Small charts as SVG within a page: they need no script, scale with the page, and print."""
+"""Small charts as SVG within a page; a chart needs no script, scales with the page, and prints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .markup import Markup, joined, tag
+from .markup import Markup, join_markup, tag
 
 #: Size of a chart in its own units, and the margins for its axes.
 _WIDTH, _HEIGHT = 320.0, 190.0
@@ -53,14 +53,14 @@ def line_chart(
     labels: tuple[str, str],
     bounds: Sequence[float] = (),
 ) -> Markup:
-    """Return a chart of lines over one axis, or a sentence where no point of theirs has a value.
+    """Return a chart of lines over one axis, or a sentence where no point of the lines has a value.
 
     Args:
         curves: at least one.
         spots: marked points.
         words: the chart's text alternative, a sentence.
         labels: of the horizontal and the vertical axis.
-        bounds: values on the horizontal axis that get a vertical line each.
+        bounds: values on the horizontal axis, each marked by a vertical line.
     """
     xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
     ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
@@ -117,8 +117,9 @@ class _Scale:
 
 
 def _svg(parts: Sequence[object], words: str) -> Markup:
+    """Return a chart from its parts, with its text alternative."""
     return tag(
-        "svg", joined(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
+        "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
     )
 
 
@@ -128,11 +129,11 @@ def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
     parts = []
     for value in _ticks(*scale.across, 5):
         x = f"{scale.x(value):.1f}"
-        parts.append(tag("text", _shown(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
+        parts.append(tag("text", _tick_text(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
     for value in _ticks(*scale.up, 5):
         y = scale.y(value)
         parts.append(tag("path", d=f"M{_LEFT:g} {y:.1f}H{right:g}", class_="rule"))
-        parts.append(tag("text", _shown(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
+        parts.append(tag("text", _tick_text(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
     parts.append(tag("path", d=f"M{_LEFT:g} {_TOP:g}V{floor:g}H{right:g}", class_="axis"))
     middle = (_LEFT + right) / 2
     parts.append(tag("text", labels[0], x=f"{middle:g}", y=f"{_HEIGHT - 6:g}", class_="label middle"))
@@ -158,7 +159,7 @@ def _path(scale: _Scale, curve: Curve) -> str:
 
 
 def _range_with_room(low: float, high: float, part: float) -> tuple[float, float]:
-    """Return a range with room at its ends, in parts of its width; a range without width gets one first."""
+    """Return a range with room at its ends, in parts of its width; a range without width is widened first."""
     # Differences near rounding error would show as noise over the whole height.
     width = high - low
     if width <= 1e-6 * max(abs(low), abs(high)):
@@ -168,12 +169,13 @@ def _range_with_room(low: float, high: float, part: float) -> tuple[float, float
 
 
 def _ticks(low: float, high: float, about: int) -> list[float]:
-    """Return round values within a range, about so many."""
+    """Return at most ``about + 1`` round values within a range."""
     step = 10.0 ** math.floor(math.log10((high - low) / about))
     step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (factor * step) <= about)
     first = math.ceil(low / step - 1e-9)
     return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def _shown(value: float) -> str:
+def _tick_text(value: float) -> str:
+    """Return a number as the label of a tick."""
     return f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")

@@ -1,4 +1,4 @@
-"""The surroundings of the answer as HTML: other optima, slices and maps of F."""
+"""Surroundings of the answer as HTML: other optima, slices and maps of F."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ...results.tables import MOST_OPTIMA, optimum_table
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
-from .markup import Markup, html_table, joined, paragraphs, tag
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 
 
 def optima(report: Report) -> Markup:
-    """Return the distinct optima that the starts ended at: F against count, and where they lie."""
+    """Return the distinct optima found from the starts: a chart of counts over F, and a table of their variables."""
     parts: list[Markup] = []
     solutions = [(part.name, part.solution) for part in report.parts]
     if report.combined is not None:
@@ -28,10 +28,11 @@ def optima(report: Report) -> Markup:
         if len(solutions) > 1:
             parts.append(tag("h3", name))
         parts += _optima_of(solution)
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
+    """Yield the starts of one program, and its distinct optima."""
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {len(solution.starts)} starts ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
@@ -51,7 +52,7 @@ def _optima_of(solution: ProgramSolution) -> Iterator[Markup]:
     yield html_table(optimum_table(solution), f"Where they lie{more}")
 
 
-def around(report: Report) -> Markup:
+def surroundings(report: Report) -> Markup:
     """Return F along each variable through the answer, and over pairs of variables."""
     parts: list[Markup] = []
     with_maps = [k for k, part in enumerate(report.parts) if part.planes]
@@ -80,10 +81,11 @@ def around(report: Report) -> Markup:
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))
         parts.append(_maps(report, with_maps))
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _slice(part: Part, each: Slice) -> Markup:
+    """Return a chart of F along one variable, with a sentence about it."""
     nlp, x = part.nlp, part.x
     variable, units = nlp.program.variables[each.variable], nlp.case.units
     values = [units.shown(float(value), variable.dimension) for value in each.values]
@@ -119,6 +121,12 @@ def _slice(part: Part, each: Slice) -> Markup:
 
 
 def _maps(report: Report, parts: Sequence[int]) -> Markup:
+    """Return the frame of the maps of F, and the choice of two variables.
+
+    Args:
+        report: the report.
+        parts: indices of the parts with maps.
+    """
     options = []
     for k in parts:
         part = report.parts[k]
@@ -139,4 +147,4 @@ def _maps(report: Report, parts: Sequence[int]) -> Markup:
         aria_label="Map of F over two variables",
     )
     few = tag("p", f"The first {shown} of {every} pairs are here.") if shown < every else None
-    return joined([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])
+    return join_markup([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])

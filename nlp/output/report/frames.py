@@ -14,14 +14,14 @@ from ..pictures.posture import Posture
 from ..pictures.style import RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
 
-#: Postures on each side of the one found.
+#: Number of postures on each side of the posture found.
 _SIDE = 20
 #: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
 #: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
-#: Elevation of the eye at first, degrees.
+#: First elevation of the eye, degrees.
 _ELEVATION = 26.0
 
 
@@ -80,7 +80,7 @@ class FrameData(TypedDict):
 
 
 class ViewData(TypedDict):
-    """Everything that the 3-D view shows, in the case's units.
+    """Content of the 3-D view, in the case's units.
 
     ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture found.
     """
@@ -113,7 +113,7 @@ class _TimedPosture(NamedTuple):
     posture: Posture
 
 
-class _Travel(NamedTuple):
+class _PostureSequence(NamedTuple):
     """Postures in order of time, and the index of the one at ``t = 0``."""
 
     postures: list[_TimedPosture]
@@ -125,11 +125,11 @@ def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
 
     Args:
         drawing: the robot and its motion.
-        rates: (m,) work rates at its posture as the result has them, so that page and result agree to the last bit.
+        rates: (m,) work rates at its posture from the result, so that page and result agree to the last bit.
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
-    postures, zero = _travel(drawing)
+    postures, zero = _postures_along_motion(drawing)
     return {
         "name": "" if motion is None else motion.name,
         "headline": drawing.headline,
@@ -158,13 +158,13 @@ def view_data(drawing: Drawing, rates: FloatArray) -> ViewData:
     }
 
 
-def _travel(drawing: Drawing) -> _Travel:
+def _postures_along_motion(drawing: Drawing) -> _PostureSequence:
     """Return postures along the motion of a drawing.
 
-    There are fewer where the robot cannot be put together farther on, and only the drawing's own without a motion.
+    The postures end where the robot cannot be assembled; without a motion, there is only the drawing's own posture.
     """
     if drawing.motion is None:
-        return _Travel([_TimedPosture(0.0, drawing.posture)], 0)
+        return _PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
     step = _largest_time(drawing) / _SIDE
     sides: list[list[_TimedPosture]] = []
     for sign in (-1, 1):
@@ -180,11 +180,11 @@ def _travel(drawing: Drawing) -> _Travel:
             side.append(_TimedPosture(sign * step * k, last))
         sides.append(side)
     back, forth = sides
-    return _Travel([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
+    return _PostureSequence([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
 
 
 def _largest_time(drawing: Drawing) -> float:
-    """Return the largest ``t``: until the rotation or the way of a corner reaches its limit."""
+    """Return the largest ``t``, at which the rotation or the displacement of a corner reaches its limit."""
     twist = np.zeros(6) if drawing.motion is None else drawing.motion.twist
     turn = float(np.linalg.norm(twist[:3]))
     velocities = drawing.velocities_at(drawing.posture)
@@ -213,7 +213,7 @@ def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray,
 
 
 def _noise(drawing: Drawing, posture: Posture) -> float:
-    """Return the size of a rate below which it is rounding error of the terms that it sums."""
+    """Return the size below which a rate is rounding error of the terms that it sums."""
     if drawing.motion is None:
         return 0.0
     terms = np.abs(posture.jacobian) @ np.abs(np.concatenate([drawing.motion.twist[3:], drawing.motion.twist[:3]]))

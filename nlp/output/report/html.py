@@ -30,7 +30,7 @@ def report(
 
     Args:
         found: a solution, or a solution with certificates.
-        text: the case as it is written in its file; left out, as :meth:`.Case.to_toml` writes it.
+        text: text of the case file; left out, as :meth:`.Case.to_toml` writes it.
         check: published and expected numbers beside the computed ones; left out, the page does not show them.
         file: file that the page is written to; None for none.
 

@@ -9,7 +9,7 @@ from ...results.data import CertificateData, CombinedResult, OptimalityData, Sol
 from ...results.tables import active_table
 from ...results.wording import certificate_lines, evidence_lines
 from .charts import Curve, Spot, line_chart
-from .markup import Markup, html_table, joined, paragraphs, tag
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
 
 
@@ -17,7 +17,7 @@ def evidence_section(report: Report) -> Markup:
     """Return the evidence of optimality, from the program alone."""
     result = report.result
     if isinstance(result, SolveResult):
-        return joined(_evidence_of(result))
+        return join_markup(_evidence_of(result))
     parts: list[Markup] = []
     for part, own in zip(report.parts, result.tasks, strict=True):
         parts += [tag("h3", f"“{part.name}” by itself"), *_evidence_of(own)]
@@ -25,10 +25,11 @@ def evidence_section(report: Report) -> Markup:
     if optimality is not None:
         parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
         parts.append(_active(optimality))
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _evidence_of(result: SolveResult) -> Iterator[Markup]:
+    """Yield the evidence about one program's point."""
     yield paragraphs(evidence_lines(result))
     optimality = result.optimality
     if optimality is None:
@@ -40,13 +41,14 @@ def _evidence_of(result: SolveResult) -> Iterator[Markup]:
 
 
 def _active(optimality: OptimalityData) -> Markup:
+    """Return the active bounds and limits as a table, or a sentence without any."""
     if not optimality.active:
         return tag("p", "No bound or limit is active.")
     return html_table(active_table(optimality), "Active bounds and limits")
 
 
-def certificates(report: Report) -> Markup:
-    """Return the proven bounds, and how each came about."""
+def certificate_section(report: Report) -> Markup:
+    """Return the proven bounds, and the course of each search."""
     result = report.result
     found: list[tuple[str, CertificateData | None]] = []
     if isinstance(result, CombinedResult):
@@ -63,11 +65,11 @@ def certificates(report: Report) -> Markup:
             parts.append(tag("h3", name))
         parts.append(paragraphs(certificate_lines(certificate)))
         parts += bound_chart(certificate.history)
-    return joined(parts)
+    return join_markup(parts)
 
 
 def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
-    """Return a chart of the bound and the best F known against time, from (seconds, bound, incumbent) on the way."""
+    """Return a chart of the bound and the incumbent against time, from a history of (seconds, bound, incumbent)."""
     if not history:
         return []
     if len(history) == 1:
@@ -87,8 +89,8 @@ def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
     return [tag("figure", chart, tag("figcaption", f"Bound (blue) and best point known (orange). {words}"))]
 
 
-def published(report: Report) -> Markup:
-    """Return what the literature prints beside what is computed here."""
+def published_section(report: Report) -> Markup:
+    """Return the published numbers beside the computed ones."""
     if report.check is None:
         return Markup("")
     caption = "What the literature prints beside what is computed here"

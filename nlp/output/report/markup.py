@@ -1,4 +1,4 @@
-"""HTML from Python values: everything but markup is escaped, so that no text of a case becomes markup."""
+"""HTML from Python values; all text but markup is escaped, so that no text of a case becomes markup."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ...results.text import Line, TextTable
 
 
 class Markup(str):
-    """Text that is HTML already, and is not escaped again."""
+    """HTML text, which is not escaped again."""
 
     __slots__ = ()
 
 
-#: A cell with a number shorter than this is not broken.
+#: A cell with a number shorter than this is not broken into lines.
 _SHORT = 24
 #: Elements without an end tag.
 _VOID = frozenset(["meta", "link", "input", "br", "img"])
@@ -28,8 +28,8 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
     Args:
         name: of the element.
         content: markup, or anything else, whose text is escaped; None is left out.
-        attributes: by name, ``_`` for ``-`` and at the end of Python's own words; True for one without a value, None
-            or False for none.
+        attributes: by name, with ``_`` for ``-`` and at the end of Python's keywords. True writes an attribute without
+            a value; None and False write none.
     """
     parts = [name]
     for key, value in attributes.items():
@@ -38,11 +38,11 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
         label = key.rstrip("_").replace("_", "-")
         parts.append(label if value is True else f'{label}="{escape(str(value))}"')
     opening = f"<{' '.join(parts)}>"
-    return Markup(opening if name in _VOID else f"{opening}{joined(content)}</{name}>")
+    return Markup(opening if name in _VOID else f"{opening}{join_markup(content)}</{name}>")
 
 
-def joined(content: Iterable[object]) -> Markup:
-    """Return several pieces of content as one."""
+def join_markup(content: Iterable[object]) -> Markup:
+    """Return several pieces of content as one piece; text is escaped."""
     return Markup(
         "".join(part if isinstance(part, Markup) else escape(str(part)) for part in content if part is not None)
     )
@@ -50,19 +50,20 @@ def joined(content: Iterable[object]) -> Markup:
 
 def paragraphs(lines: Iterable[Line | str]) -> Markup:
     """Return a paragraph for each line of text; its label stands before it."""
-    return joined(tag("p", _line(line)) for line in lines)
+    return join_markup(tag("p", _line(line)) for line in lines)
 
 
 def _line(line: Line | str) -> object:
+    """Return the content of a paragraph: the label and the words of a line."""
     if isinstance(line, str):
         return line
     if not line.label:
         return line.words
-    return joined([tag("span", f"{line.label}:", class_="label"), " ", line.words])
+    return join_markup([tag("span", f"{line.label}:", class_="label"), " ", line.words])
 
 
 def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
-    """Return a table of HTML, its first column naming the rows; a wide one scrolls by itself, also by keyboard.
+    """Return a table of HTML, whose first column names the rows; a wide table scrolls by itself, also by keyboard.
 
     Args:
         table: of text.
@@ -70,7 +71,7 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
         attributes: of the element, as for :func:`tag`.
     """
     headers = [header.replace("\n", ", ") for header in table.headers]
-    # A heading without words names nothing: it is a mere cell.
+    # A header without text names nothing: the cell is an ordinary one.
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     body = []
     for row in table.rows:
@@ -81,7 +82,7 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
-    """Return JSON that can stand in a script element: no ``<`` is left that could end the element."""
+    """Return JSON for a script element, with ``<``, ``>`` and ``&`` escaped: no text can end the element."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
@@ -89,8 +90,10 @@ def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
 
 
 def _cell(text: str) -> Markup:
+    """Return a cell of a table, marked where its text is a short number."""
     return tag("td", text, class_="number" if _is_short_number(text) else None)
 
 
 def _is_short_number(text: str) -> bool:
+    """Return whether a text is a number too short to be broken into lines."""
     return len(text) < _SHORT and (text[:1].isdigit() or text[:1] in {"+", "-"})

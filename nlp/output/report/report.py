@@ -1,6 +1,6 @@
 """Content of a report about a solved case: its result, its robot along the motion, and F beside the point found.
 
-A report of a solve that failed shows the point reached, and calls it that.
+A report of a solve that failed shows the point reached, and says that this is no answer.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..pictures.drawing import drawing_of
 from .frames import ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
-#: So many maps of two variables are made in all: seven free variables have 21 pairs.
+#: Largest number of maps of two variables in a report: seven free variables have 21 pairs.
 _PLANES = 24
 
 
@@ -40,7 +40,7 @@ class Part:
         view: the robot there, for the 3-D view; None where it does not exist.
         slices: F along each variable.
         planes: F over pairs of variables.
-        pairs: how many pairs there are.
+        pairs: number of all pairs of variables.
     """
 
     name: str
@@ -59,10 +59,10 @@ class Report:
 
     Attributes:
         case: the case.
-        text: the case as it is written in its file.
+        text: text of the case file.
         result: of the solve.
         parts: one for each task.
-        combined: the solution of the program that brings several tasks together, where there is one.
+        combined: the solution of the program that combines several tasks; None without such a program.
         check: published and expected numbers beside the computed; None where the case has none.
         is_answer: whether the point is an answer.
     """
@@ -88,7 +88,7 @@ def report_of(text: str, solution: Solution, result: CaseResult, check: CaseChec
     """Return the content of a page about a solved case; nothing is solved here.
 
     Args:
-        text: the case as it is written in its file.
+        text: text of the case file.
         solution: the solve.
         result: of that solve, with its certificates.
         check: published and expected numbers beside the computed; None where the case has none.
@@ -105,6 +105,7 @@ def report_of(text: str, solution: Solution, result: CaseResult, check: CaseChec
 def _part(
     nlp: Nlp, x: FloatArray, state: RobotState | None, own: ProgramSolution, task: int, tasks: int, is_answer: bool
 ) -> Part:
+    """Return the part of one task, by its index, at the point (n,) of the report."""
     view = None
     if state is not None:
         view = view_data(drawing_of(nlp, x, state, task, is_answer=is_answer), state.rates)

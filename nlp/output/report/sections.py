@@ -1,4 +1,4 @@
-"""A report as sections of HTML: words and tables, and a chart with its text alternative where one helps."""
+"""Sections of a report as HTML: words, tables, and charts with text alternatives."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from ...results.wording import (
     tolerance_line,
 )
 from ..pictures.style import RATE_COLOURS
-from .exploration import around, optima
+from .exploration import optima, surroundings
 from .frames import ViewData
-from .judgement import certificates, evidence_section, published
-from .markup import Markup, html_table, joined, paragraphs, tag
+from .judgement import certificate_section, evidence_section, published_section
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Return every section that has something to show: its anchor, its heading and its content."""
+    """Return the anchor, heading and content of every section that has content."""
     found = [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", _robot(report)),
         ("result", "Result", _result(report)),
         ("limits", "Limits: margins and costs", _limits(report)),
         ("optima", "Optima found", optima(report)),
-        ("around", "F around this point", around(report)),
+        ("around", "F around this point", surroundings(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
-        ("certificate", "Certificate", certificates(report)),
-        ("published", "Published and computed", published(report)),
+        ("certificate", "Certificate", certificate_section(report)),
+        ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
     return [(anchor, title, content) for anchor, title, content in found if content]
 
 
 def answer(report: Report) -> Markup:
-    """Return the answer, for the top of the page, or the sentence that there is none."""
+    """Return the answer for the top of the page, or the sentence that there is no answer."""
     result = report.result
     if isinstance(result, SolveResult):
         lines = [headline(result).words]
@@ -68,6 +68,7 @@ def answer(report: Report) -> Markup:
 
 
 def _case(report: Report) -> Markup:
+    """Return the case in words."""
     case, first = report.case, report.parts[0]
     lines = [f"{case.model.description}."]
     for task in case.tasks:
@@ -105,6 +106,7 @@ def _case(report: Report) -> Markup:
 
 
 def _robot(report: Report) -> Markup:
+    """Return the 3-D view with its controls, its legend and the rates."""
     views = [part.view for part in report.parts if part.view is not None]
     if not views:
         return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
@@ -145,13 +147,13 @@ def _robot(report: Report) -> Markup:
             aria_label="The robot in three dimensions; the table below says the same in numbers.",
         ),
         buttons,
-        # Printers get a copy of the picture, because what WebGL draws is not printed.
+        # A copy of the picture is for printing, because browsers do not print WebGL.
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
     content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
     note = "Without a script nothing moves and the picture is missing; every number is in the tables."
-    return joined([*content, tag("noscript", tag("p", note))])
+    return join_markup([*content, tag("noscript", tag("p", note))])
 
 
 def _legend(view: ViewData) -> Markup:
@@ -167,13 +169,13 @@ def _legend(view: ViewData) -> Markup:
         " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
         " Point at a limb for its length, rate, share of F and wrench.",
     ]
-    return joined([bar, *words])
+    return join_markup([bar, *words])
 
 
 def _rates(view: ViewData) -> Markup:
-    """Return the rates of every row at the drawn posture; the script keeps the table in step with the platform."""
+    """Return the rates of every row at the drawn posture; the script updates the table as the platform moves."""
     frame = view["frames"][view["zero"]]
-    # Where the task's motion is resisted by nothing, what is left is rounding.
+    # Where nothing resists the task's motion, the rates are rounding error.
     rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
     largest = max(map(abs, rates), default=0.0) or 1.0
     total = sum(rate**2 for rate in rates)
@@ -215,14 +217,16 @@ def _rates(view: ViewData) -> Markup:
 
 
 def _result(report: Report) -> Markup:
+    """Return the design, and the tables of its robot."""
     result = report.result
     if isinstance(result, CombinedResult):
-        return _combined(report, result)
+        return _combined_result(report, result)
     sentences = [f"It would be {relaxation_words(row)}." for row in result.relaxation or ()]
-    return joined([*_one(report.case, result, "design"), paragraphs(sentences)])
+    return join_markup([*_task_tables(report.case, result, "design"), paragraphs(sentences)])
 
 
-def _combined(report: Report, result: CombinedResult) -> Markup:
+def _combined_result(report: Report, result: CombinedResult) -> Markup:
+    """Return the design at the combined point, then each task by itself."""
     case, combined = report.case, result.combined
     parts: list[Markup] = []
     robot = None if combined.point is None else combined.point.robot
@@ -237,11 +241,11 @@ def _combined(report: Report, result: CombinedResult) -> Markup:
     for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"“{report.parts[k].name}” by itself"))
         parts.append(paragraphs([headline(own)]))
-        parts += _one(case, own, f"design-{k + 1}")
-    return joined(parts)
+        parts += _task_tables(case, own, f"design-{k + 1}")
+    return join_markup(parts)
 
 
-def _one(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
+def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
     """Return the tables of one task's result."""
     robot, reached = result.robot, result.reached is not None
     if robot is None:
@@ -256,6 +260,7 @@ def _one(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
 
 
 def _limits(report: Report) -> Markup:
+    """Return the limits with their costs, and every margin."""
     limits, margins = _limits_of(report), _margins_of(report)
     if not limits:
         return Markup("")
@@ -269,10 +274,11 @@ def _limits(report: Report) -> Markup:
         parts.append(paragraphs([tolerance_line(result.tolerance, result.F, report.case.units)]))
     every = html_table(margin_table(margins), "Every margin, positive inside")
     parts.append(tag("details", tag("summary", f"Every margin ({len(margins)})"), every))
-    return joined(parts)
+    return join_markup(parts)
 
 
 def _origin(report: Report) -> Markup:
+    """Return versions, settings of the search, and the text of the case."""
     result = report.result
     origin = origin_table(result.versions, report.case.search, result.seconds)
     text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
@@ -283,11 +289,13 @@ def _origin(report: Report) -> Markup:
         tag("span", id="copied", role="status"),
         class_="controls script",
     )
-    return joined([html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text])
+    return join_markup(
+        [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
+    )
 
 
 def _limits_of(report: Report) -> Sequence[LimitData]:
-    """Return the limits of the case at the point that the report is about."""
+    """Return the limits of the case at the report's point."""
     result = report.result
     if isinstance(result, SolveResult):
         return result.limits
@@ -295,7 +303,7 @@ def _limits_of(report: Report) -> Sequence[LimitData]:
 
 
 def _margins_of(report: Report) -> Sequence[MarginData]:
-    """Return the margins at the point that the report is about."""
+    """Return the margins at the report's point."""
     result = report.result
     if isinstance(result, SolveResult):
         return result.margins

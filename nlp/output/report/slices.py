@@ -19,9 +19,9 @@ from ...program.nlp import Nlp
 
 #: Points along a line, and along each side of a plane: odd, so that the middle of the range is among them.
 _LINE, _PLANE = 121, 41
-#: Where the other components of a unit vector are smaller than this, no scale of them keeps its length.
+#: Where the other components of a unit vector are smaller than this, no scale of them keeps the vector's length.
 _POLE = 1e-9
-#: Violation of a limit, in parts of the limit's size, that rounding and the end of a solve may leave.
+#: Violation of a limit, in parts of the limit's size, that is allowed for rounding and the tolerance of a solve.
 _WITHIN = max(FEASIBLE, 1e-9)
 
 
@@ -93,12 +93,12 @@ def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
 
 
 def has_loops(nlp: Nlp) -> bool:
-    """Return whether the robot has loops: they close at a solution only, so that no variable can move alone."""
+    """Return whether the robot has loops, which close at solutions only, so that no variable can move alone."""
     return bool(nlp.program.model.unknowns)
 
 
 def _movable(nlp: Nlp) -> list[int]:
-    """Return indices of the variables but the epigraph variable, which follows from the others."""
+    """Return indices of all variables but the epigraph variable, which the others determine."""
     epigraph = nlp.program.places.epigraph
     return [k for k in range(nlp.n) if epigraph is None or k != epigraph.level]
 
@@ -154,7 +154,7 @@ def _values(nlp: Nlp, points: FloatArray) -> _Values:
     if epigraph is not None and len(nlp.program.robots) > 1:
         points[epigraph.level] = exact_levels(nlp, points)
     F, g = (each.full() for each in nlp.program.values(points, nlp.arguments))
-    # An infinite bound is none, and has no size.
+    # An infinite bound is absent, and has no size.
     bounds = np.nan_to_num(np.abs([nlp.g_lower, nlp.g_upper]), nan=0.0, posinf=0.0)
     size = np.max(bounds, axis=0, initial=1.0)
     with np.errstate(invalid="ignore"):

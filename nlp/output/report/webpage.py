@@ -1,11 +1,11 @@
-"""A report as one page of HTML that needs nothing else: no network, no other file."""
+"""A report as one page of HTML that needs no network and no other file."""
 
 from __future__ import annotations
 
 from importlib.resources import files
 from string import Template
 
-from .markup import Markup, joined, script_json, tag
+from .markup import Markup, join_markup, script_json, tag
 from .report import Report
 from .sections import answer, sections
 
@@ -13,15 +13,15 @@ from .sections import answer, sections
 def page_of(report: Report) -> str:
     """Return the whole page.
 
-    Words and tables come first and need no script. The library for the 3-D view stands at the end as text, and is
-    started after the page is first painted.
+    Words and tables come first and need no script. The library for the 3-D view is at the end as text, and starts after
+    the page is first painted.
     """
     from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only a report needs it
 
     found = sections(report)
     title = report.case.title or report.case.name
     contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
-    body = joined(
+    body = join_markup(
         tag(
             "section",
             tag("h2", heading, id=f"{anchor}-heading"),
@@ -41,7 +41,7 @@ def page_of(report: Report) -> str:
         "style": Markup(_file("style.css")),
         "script": Markup(_file("page.js")),
         "data": script_json(report.as_data()),
-        # Within a script element nothing but its own end tag has a meaning.
+        # Within a script element, only an end tag of a script and the start of a comment have a meaning.
         "plotly": Markup(get_plotlyjs().replace("</script", "<\\/script").replace("<!--", "<\\!--")),
     }
     return Template(_file("report.html.in")).substitute(parts)
