@@ -97,8 +97,9 @@ def _construction(item: griffe.Class) -> str:
                 continue
             if str(member.annotation) == "KW_ONLY":
                 fields = named
-            elif not name.startswith("_") and not str(member.annotation).startswith("ClassVar"):
+            elif not name.startswith("_") and "instance-attribute" in member.labels:
                 default = "" if member.value is None else f" = {member.value}"
+                default = re.sub(r"field\(default_factory=(\w+)\)", r"\1()", default)
                 fields.append(f"{name}: {member.annotation}{default}")
     return f"{item.name}({', '.join([*free, *(['*'] if named else []), *named])})"
 

@@ -64,8 +64,11 @@ def text_of(found: Solution | Certified, width: int = _WIDTH) -> str:
     """
     out = io.StringIO()
     case = (found if isinstance(found, Solution) else found.solution).case
-    console = Console(file=out, width=width, color_system=None, highlight=False, markup=False, emoji=False)
-    show(console, case_summary(case, result_of(found)))
+    # In a notebook rich would show its lines at once instead of writing them.
+    plain = Console(
+        file=out, width=width, color_system=None, force_jupyter=False, highlight=False, markup=False, emoji=False
+    )
+    show(plain, case_summary(case, result_of(found)))
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().splitlines())
 
 
