@@ -99,7 +99,9 @@ def html_of(value: object) -> str | None:
         return _html(case_summary(solution.case, result_of(value)), lambda: drawings_of(solution))
     if isinstance(value, Certificate):
         words = [title_line(value.nlp.case), *certificate_lines(certificate_data(value))]
-        return _html(words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x)])
+        return _html(
+            words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "the best point known")]
+        )
     return None
 
 
@@ -168,15 +170,20 @@ def _drawings_at_start(case: Case) -> list[Drawing]:
         nlps = formulate_each(plain)
     except CaseError as error:
         raise EvaluationError(str(error)) from None
-    return [_drawing_at(nlp, nlp.start, task) for task, nlp in enumerate(nlps)]
+    return [_drawing_at(nlp, nlp.start, "where the first search begins", task) for task, nlp in enumerate(nlps)]
 
 
-def _drawing_at(nlp: Nlp, x: FloatArray, task: int = 0) -> Drawing:
+def _drawing_at(nlp: Nlp, x: FloatArray, where: str, task: int = 0) -> Drawing:
     """Return the robot at a point (n,) of a program.
+
+    Args:
+        nlp: the program.
+        x: the point.
+        where: the point in words.
+        task: index of the task in the case.
 
     Raises:
         EvaluationError: the robot does not exist there.
     """
     state = evaluate(nlp, x)
-    headline = f"F = {nlp.evaluate(x).F:.7g} here"
-    return drawing_of(nlp, x, state, task, headline=headline)
+    return drawing_of(nlp, x, state, task, headline=f"{where}: F = {nlp.evaluate(x).F:.7g}")
