@@ -37,6 +37,8 @@ check: $(VENV)/ready build/typing/screwsynth ## check formatting, lint, types an
 
 docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/refresh.py
+	$(BIN)/python -P docs/api.py
+	$(BIN)/python -P docs/tour.py
 
 figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py

@@ -17,6 +17,8 @@ from casadi import SX
 
 from .drawing import Scene
 from .parts import Closure, Leg, Parameter, PoseSymbols, Quantity, Unknown
+from .shown import Shown
+from .whole import Whole
 from .wrench import Wrench, WrenchKind
 
 
@@ -25,7 +27,7 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Whole, Shown):
     """A parallel robot as symbols and expressions.
 
     Attributes:
@@ -70,6 +72,11 @@ class Model:
         _check_shapes(self)
         _check_symbols(self)
         _check_references(self)
+
+    def __repr__(self) -> str:
+        options = "".join(f", {key}={value!r}" for key, value in self.options.items())
+        counts = f"{len(self.parameters)} parameters, {len(self.limbs)} limbs, {len(self.wrenches)} rows"
+        return f"<Model {self.name!r}{options}: {counts}>"
 
     @property
     def limbs(self) -> tuple[str, ...]:

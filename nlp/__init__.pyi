@@ -57,12 +57,17 @@ from .evidence.state import RobotState as RobotState
 from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
+from .output.notebook import Picture as Picture
+from .output.notebook import html_of as html_of
+from .output.notebook import picture_of as picture_of
+from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
 from .output.report.html import report as report
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
 from .results.jsondata import json_data as json_data
+from .results.reading import load_result as load_result
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of

@@ -36,6 +36,18 @@ class Units:
         """
         return float(f"{math.degrees(value):.15g}") if self._is_degrees(dimension) else float(value)
 
+    def written(self, value: float, dimension: Dimension) -> float:
+        """Return the number in the case's unit from which :meth:`to_internal` makes a value again, to the last bit.
+
+        Where no number of degrees does so, the result is the nearest one.
+        """
+        number = self.shown(value, dimension)
+        if not self._is_degrees(dimension):
+            return number
+        exact = math.degrees(value)
+        near = [number, exact, math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf)]
+        return min(near, key=lambda each: abs(math.radians(each) - value))
+
     def per_unit(self, derivative: float, dimension: Dimension) -> float:
         """Return a derivative with respect to a number of a computation as that with respect to it in the case's unit.
 

@@ -10,6 +10,7 @@ import sys
 import tomllib
 import zipfile
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,13 @@ def test_the_stub_is_the_one_list_of_public_names() -> None:
         _ = screwsynth.nlp.no_such_name  # type: ignore[attr-defined]
 
 
+def test_the_version_is_that_of_the_distribution() -> None:
+    assert screwsynth.nlp.__version__ == version("screwsynth")
+    # A namespace package has no file that could hold a name.
+    assert not hasattr(screwsynth, "__version__")
+    assert screwsynth.__spec__.origin is None
+
+
 def test_no_public_name_is_that_of_a_room() -> None:
     # Importing the room would put it in the place of the name.
     rooms = {module.name for module in pkgutil.iter_modules(screwsynth.nlp.__path__)}
@@ -86,7 +94,7 @@ def test_pictures_and_pages_are_public_functions(tmp_path: Path) -> None:
     page = screwsynth.nlp.report(solution, text=text)
     assert page.startswith("<!DOCTYPE html>")
     assert html.escape(text.splitlines()[0]) in page
-    assert "has no case file" in screwsynth.nlp.report(solution)
+    assert html.escape(case.to_toml().splitlines()[0]) in screwsynth.nlp.report(solution)
 
 
 def test_public_names_show_before_they_are_loaded() -> None:

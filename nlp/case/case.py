@@ -14,6 +14,8 @@ from types import MappingProxyType
 import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
+from ...models.shown import Shown
+from ...models.whole import Whole
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_value, check_vector
@@ -26,7 +28,7 @@ from .task import Method, Sense, Task
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(Whole, Shown):
     """A synthesis problem.
 
     Attributes:
@@ -89,6 +91,24 @@ class Case:
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
+    def __repr__(self) -> str:
+        values = [value for name in self.parameters for value in self.components(name)]
+        values += [value for pose in self.poses for value in (*pose.position, pose.rotation.angle)]
+        free = sum(isinstance(value, Free) for value in values)
+        parts = [_counted(free, "free number"), _counted(len(self.tasks), "task"), _counted(self.pose_count, "pose")]
+        parts += [_counted(len(self.limits), "limit")] if self.limits else []
+        return f"<Case {self.name!r}: robot {self.model.name!r}, {', '.join(parts)}>"
+
+    def to_toml(self) -> str:
+        """Return the case as the text of a case file, from which the same case is read again.
+
+        Raises:
+            CaseError: no case file can state the case, such as one of a robot that is not found by its name.
+        """
+        from .writer import case_text  # noqa: PLC0415 - a case that is not written starts without the tables of files
+
+        return case_text(self)
+
     def components(self, name: str) -> tuple[Value, ...]:
         """Return the values of a parameter's components.
 
@@ -147,6 +167,11 @@ class Case:
     def as_limited(self) -> LimitedCase:
         """The part of the case that its limits read."""
         return LimitedCase(self.model, self.units, self.scalars)
+
+
+def _counted(count: int, word: str) -> str:
+    """Return a number of things in words."""
+    return f"{count} {word}{'' if count == 1 else 's'}"
 
 
 def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:

@@ -1,4 +1,4 @@
-"""The displacements that a case file states for a pose: along a task's screw motion, or over a grid."""
+"""The displacements that a case file states for a pose: along a task's screw motion, over a grid, or one by one."""
 
 from __future__ import annotations
 
@@ -6,16 +6,22 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from pydantic import ValidationError
 
 from ...models import Dimension, Displacement, axis_from_screw
 from ..errors import CaseError, listing
 from ..units import Units
 from .pose import HERE, along_screw, over_grid
-from .schema import AlongTable, GridTable, OffsetsTable, PoseTable
+from .schema import AlongTable, DisplacementTable, GridTable, OffsetsTable, PoseTable
 from .task import Task
+from .toml import TomlValue
 
 #: Largest number of poses from one stated pose: a larger program takes too long to solve.
 _MOST = 200
+#: Largest error of a rotation matrix: files give its entries with a dozen digits.
+_ROTATION = 1e-9
+#: Digits of the ends of a trajectory in the search of one that gives the same displacements.
+_DIGITS = 12
 
 
 def read_displacements(written: PoseTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
@@ -28,10 +34,14 @@ def read_displacements(written: PoseTable, tasks: Sequence[Task], units: Units, 
         key: dotted key of the table, for messages.
 
     Raises:
-        CaseError: both a trajectory and a grid, a task that does not exist, crossed offsets, or too many poses.
+        CaseError: two of a trajectory, a grid and a list, a matrix that is no rotation, a task that does not exist,
+            crossed offsets, or too many poses.
     """
-    if written.along_task is not None and written.grid is not None:
-        raise CaseError(f"{key}.grid", "cannot stand beside along_task; write two poses")
+    ways = [way for way in ("along_task", "grid", "displacements") if getattr(written, way) is not None]
+    if len(ways) > 1:
+        raise CaseError(f"{key}.{ways[1]}", f"cannot stand beside {ways[0]}; write two poses")
+    if written.displacements is not None:
+        return _read_list(written.displacements, f"{key}.displacements")
     if written.along_task is not None:
         return _read_trajectory(written.along_task, tasks, units, f"{key}.along_task")
     return (HERE,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
@@ -66,6 +76,101 @@ def _read_grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
     if count > _MOST:
         raise CaseError(key, f"has {count} poses, of which at most {_MOST} are allowed")
     return over_grid(offsets)
+
+
+def _read_list(written: Sequence[DisplacementTable], key: str) -> tuple[Displacement, ...]:
+    """Return the displacements of a list.
+
+    Raises:
+        CaseError: a matrix is no rotation, or there are too many displacements.
+    """
+    if len(written) > _MOST:
+        raise CaseError(key, f"has {len(written)} poses, of which at most {_MOST} are allowed")
+    found = tuple(Displacement.by(each.rotation, each.translation) for each in written)
+    for index, each in enumerate(found):
+        error = np.abs(each.rotation @ each.rotation.T - np.eye(3)).max()
+        if not error <= _ROTATION or np.linalg.det(each.rotation) < 0:
+            raise CaseError(f"{key}[{index}].rotation", "must be a rotation matrix: orthogonal, with determinant 1")
+    return found
+
+
+def written_displacements(
+    displacements: Sequence[Displacement], tasks: Sequence[Task], units: Units
+) -> dict[str, TomlValue]:
+    """Return the keys of a pose's table that state its displacements, the inverse of :func:`read_displacements`.
+
+    Args:
+        displacements: of a stated pose.
+        tasks: the case's tasks.
+        units: the file's units.
+
+    Returns:
+        No key for the stated pose alone; a trajectory or a grid where that gives the same displacements to the last
+        bit, and else a list of all of them.
+    """
+    if len(displacements) == 1 and displacements[0].is_identity:
+        return {}
+    for way in (_written_grid(displacements), *(_written_trajectory(displacements, task, units) for task in tasks)):
+        if way is not None and _are_equal(_read_again(way, tasks, units), displacements):
+            return way
+    eye = np.eye(3)
+    tables: list[TomlValue] = [
+        {
+            "rotation": None if np.array_equal(each.rotation, eye) else each.rotation.tolist(),
+            "translation": each.translation.tolist(),
+        }
+        for each in displacements
+    ]
+    return {"displacements": tables}
+
+
+def _written_grid(displacements: Sequence[Displacement]) -> dict[str, TomlValue] | None:
+    """Return the grid whose corners the first and the last displacement are; None where there is none."""
+    translations = np.array([each.translation for each in displacements])
+    axes: dict[str, TomlValue] = {}
+    for name, values in zip("xyz", translations.T, strict=True):
+        count = len(np.unique(values))
+        if count > 1:
+            axes[name] = {"min": float(values[0]), "max": float(values[-1]), "count": count}
+        elif values[0] != 0:
+            return None
+    return {"grid": axes} if axes else None
+
+
+def _written_trajectory(displacements: Sequence[Displacement], task: Task, units: Units) -> dict[str, TomlValue] | None:
+    """Return a trajectory along a task's screw from the first to the last displacement, or None."""
+    screw = axis_from_screw(task.twist)
+    ends = []
+    for each in (displacements[0], displacements[-1]):
+        if math.isinf(screw.pitch):
+            amount, dimension = float(screw.axis @ each.translation), Dimension.LENGTH
+        else:
+            R = each.rotation
+            turned = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+            amount, dimension = math.atan2(float(screw.axis @ turned), float(np.trace(R)) - 1), Dimension.ANGLE
+        # The ends are numbers of a few digits where a file stated them.
+        ends.append(float(f"{units.shown(amount, dimension):.{_DIGITS}g}"))
+    if ends[0] == ends[1]:
+        return None
+    return {"along_task": {"task": task.name, "first": ends[0], "last": ends[1], "count": len(displacements)}}
+
+
+def _read_again(way: dict[str, TomlValue], tasks: Sequence[Task], units: Units) -> tuple[Displacement, ...]:
+    """Return the displacements that the keys of a pose's table state; none where they are refused."""
+    try:
+        table = PoseTable.model_validate({"position": [0, 0, 0], **way})
+        return read_displacements(table, tasks, units, "pose")
+    except (CaseError, ValidationError):
+        return ()
+
+
+def _are_equal(some: Sequence[Displacement], others: Sequence[Displacement]) -> bool:
+    """Return whether displacements are the same, to the last bit."""
+    return len(some) == len(others) and all(
+        np.array_equal(part, other)
+        for one, two in zip(some, others, strict=True)
+        for part, other in zip(one, two, strict=True)
+    )
 
 
 def _read_offsets(written: OffsetsTable | None, key: str) -> list[float]:

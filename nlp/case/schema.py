@@ -160,6 +160,16 @@ class GridTable(Table):
     z: OffsetsTable | None = Field(default=None, description="offsets along z")
 
 
+class DisplacementTable(Table):
+    """A displacement of the stated pose: ``x -> rotation x + translation``, in the world frame."""
+
+    rotation: Annotated[list[Vector], Field(min_length=3, max_length=3)] = Field(
+        default=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        description="rows of the rotation matrix; left out: no rotation",
+    )
+    translation: Vector = Field(description="where the world's origin goes")
+
+
 class PoseTable(Table):
     """Pose of the platform in the world frame."""
 
@@ -169,6 +179,9 @@ class PoseTable(Table):
     rotation: RotationTable | None = Field(default=None, description="left out: no rotation")
     along_task: AlongTable | None = Field(default=None, description="poses along a task's screw motion from this one")
     grid: GridTable | None = Field(default=None, description="poses over a box about this one")
+    displacements: Annotated[list[DisplacementTable], Field(min_length=1)] | None = Field(
+        default=None, description="poses at these displacements from this one, instead of a trajectory or a grid"
+    )
 
 
 Poses = Annotated[

@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 
 from ...models import FloatArray
+from ...models.shown import Shown
+from ...models.whole import Whole
 from ..case.task import Sense
 from ..evidence.state import ZERO_F
 from ..program.nlp import Nlp
@@ -27,7 +29,7 @@ class CertificateStatus(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Whole, Shown):
     """A proven bound.
 
     Attributes:
@@ -65,6 +67,9 @@ class Certificate:
     seconds: float
     reason: str
     history: tuple[tuple[float, float, float], ...]
+
+    def __repr__(self) -> str:
+        return f"<Certificate of {self.nlp.case.name!r}: {self.statement}>"
 
     @property
     def gap(self) -> float:

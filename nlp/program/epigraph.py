@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
+from operator import mul
 from typing import TypeVar
 
 import casadi as ca
@@ -162,6 +164,10 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
     return levels.ravel()
 
 
+def _constant(slope: float, value: float) -> float:  # noqa: ARG001 - a slope is a function of the bound
+    return slope
+
+
 class _EpigraphBuilder:
     """An epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
 
@@ -175,7 +181,9 @@ class _EpigraphBuilder:
         self._layout = layout
         self.level, (self._level_place,) = layout.table.add("level", Dimension.NUMBER, bounds)
         self._size, (self._size_place,) = layout.table.add("ceiling", Dimension.NUMBER, ceiling)
-        self._reading = Reading(Dimension.NUMBER, from_value=lambda value: value * ceiling, slope=lambda _: 1 / ceiling)
+        self._reading = Reading(
+            Dimension.NUMBER, from_value=partial(mul, ceiling), slope=partial(_constant, 1 / ceiling)
+        )
         self._constraints: list[BoundedConstraint] = []
 
     def add(self, name: str, slack: SX) -> None:

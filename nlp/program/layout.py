@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi as ca
@@ -37,7 +37,7 @@ from ...models import (
     matrix_from_quaternion_vector,
 )
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, squared
 from ..case.limits.pairs import PairFamily
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Task
@@ -45,16 +45,21 @@ from ..errors import CaseError
 from .limits import ProgramNumbers, limit_constraints
 from .places import FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
 
+
+def _angle_from(value: float) -> float:
+    """Return the angle from ``sin^2(angle / 2)``."""
+    return 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0)))
+
+
+def _angle_slope(value: float) -> float:
+    """Return the derivative of ``sin^2(angle / 2)`` with respect to the angle, at a value of it."""
+    return math.sqrt(max(value * (1 - value), 0.0))
+
+
 #: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
-ROTATION_ANGLE = Reading(
-    Dimension.ANGLE,
-    from_value=lambda value: 2 * math.asin(math.sqrt(min(max(value, 0.0), 1.0))),
-    slope=lambda value: math.sqrt(max(value * (1 - value), 0.0)),
-)
+ROTATION_ANGLE = Reading(Dimension.ANGLE, from_value=_angle_from, slope=_angle_slope)
 #: The constraint ``|u|^2 = 1`` read as the length itself.
-_LENGTH_OF_DIRECTION = Reading(
-    Dimension.NUMBER, from_value=lambda value: math.sqrt(max(value, 0.0)), slope=lambda value: 2 * math.sqrt(value)
-)
+_LENGTH_OF_DIRECTION = replace(squared(Dimension.NUMBER), to_value=Reading(Dimension.NUMBER).to_value)
 #: Largest size, as a variable, of a component of a free unit vector, or of a rotation's ``q`` in radii of its ball.
 _WIDENING = 1.25
 #: Largest residual of an equation among fixed numbers that counts as none: files give them with a dozen digits.

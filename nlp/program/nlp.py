@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import FloatArray
+from ...models.whole import Whole
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.pairs import PairFamily
@@ -87,7 +88,7 @@ class Sides:
 
 
 @dataclass(frozen=True, eq=False)
-class Nlp:
+class Nlp(Whole):
     """A program with its numbers, on which every solver, certificate and report is based.
 
     Attributes:
@@ -122,6 +123,9 @@ class Nlp:
     pairs: tuple[PairPlace, ...] = ()
     pair_count: int = 0
     size: float | None = None
+
+    def __repr__(self) -> str:
+        return f"<Nlp of {self.case.name!r}: {self.sense.value} F, {self.program!r}>"
 
     @property
     def n(self) -> int:

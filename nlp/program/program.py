@@ -15,6 +15,7 @@ import casadi as ca
 from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance
+from ...models.whole import Whole
 from ..case.limits.constraint import Constraint
 from .kernel import Kernel, single_output
 from .places import Places, Scalar
@@ -76,7 +77,7 @@ class RobotNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(Whole):
     """A nonlinear program without its numbers.
 
     Attributes:
@@ -100,6 +101,12 @@ class Program:
     robots: tuple[RobotInstance, ...]
     model: Model
     places: Places
+
+    def __repr__(self) -> str:
+        counts = (
+            f"{len(self.variables)} variables, {len(self.constraints)} constraints, {len(self.arguments)} arguments"
+        )
+        return f"<Program of robot {self.model.name!r}: {counts}>"
 
     @property
     def robot(self) -> RobotInstance:

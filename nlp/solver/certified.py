@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from ...models.shown import Shown
+from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
 from ..certificate.bounding import search_tape
@@ -17,6 +19,7 @@ from ..errors import InputError
 from ..program.epigraph import formulate_worst
 from ..program.formulation import formulate, formulate_each, formulate_weighted
 from ..program.nlp import Nlp
+from .answer import Answer
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
 from .solution import Combination, Solution
@@ -56,7 +59,7 @@ class CertifyOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Certified:
+class Certified(Whole, Shown, Answer):
     """A solution with its certificates.
 
     Attributes:
@@ -72,6 +75,10 @@ class Certified:
     combined: Certificate | None
     statement: Statement
     tree: bytes | None
+
+    def __repr__(self) -> str:
+        proofs = ", ".join(each.status.value for each in self.tasks)
+        return f"<Certified {self.solution!r}: {proofs}>"
 
     @property
     def certificate(self) -> Certificate | None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import FloatArray, frozen_array
+from ...models.whole import Whole
 from ..case.settings import Search
 from ..errors import EvaluationError
 from ..evidence.kkt import FEASIBLE, linearise
@@ -61,7 +62,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False)
-class ProgramSolution:
+class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
@@ -88,6 +89,10 @@ class ProgramSolution:
     seed: int
     seconds: float
     relaxation: tuple[RelaxedLimit, ...] = ()
+
+    def __repr__(self) -> str:
+        found = f", F = {self.F:.7g}" if self.status.is_answer else ""
+        return f"<ProgramSolution of {self.nlp.case.name!r}: {self.status.value}{found}, {len(self.starts)} starts>"
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name

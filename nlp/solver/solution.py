@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...models import FloatArray
+from ...models.shown import Shown
+from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Task
 from ..errors import EvaluationError
@@ -12,6 +14,7 @@ from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
+from .answer import Answer
 from .multistart import Optimum, ProgramSolution
 from .starts import Start
 from .status import Status
@@ -66,7 +69,7 @@ class Combination:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Whole, Shown, Answer):
     """The answer to a case.
 
     For a case with one task, ``F``, ``nlp``, ``starts``, ``optima`` and ``relaxation`` are those of its program. For
@@ -89,6 +92,15 @@ class Solution:
     outcomes: tuple[TaskOutcome, ...]
     combination: Combination | None
     seconds: float
+
+    def __repr__(self) -> str:
+        if self.combination is None:
+            found = f", F = {self.F:.7g}" if self.status.is_answer else ""
+        else:
+            value = self.combination.value
+            found = f", {len(self.outcomes)} tasks by {self.combination.method.value}"
+            found += "" if value is None else f", value {value:.7g}"
+        return f"<Solution of {self.case.name!r}: {self.status.value}{found}>"
 
     @property
     def decided_by(self) -> ProgramSolution | None:

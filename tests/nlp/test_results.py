@@ -13,13 +13,24 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
-from screwsynth.nlp import Solution, Status, json_data, load_case, result_of, shipped_cases, solve
+from screwsynth.nlp import (
+    InputError,
+    Solution,
+    Status,
+    json_data,
+    load_case,
+    load_result,
+    result_of,
+    shipped_cases,
+    solve,
+)
 from screwsynth.nlp.output.checks import markdown
 from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
 from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
+from screwsynth.nlp.results.reading import result_from_json
 from screwsynth.nlp.results.regression import check_case
 from screwsynth.nlp.results.schema import RESULTS, result_schema
 from screwsynth.nlp.results.summary import case_summary
@@ -78,6 +89,9 @@ def hold(result: Json, schema: Json, kind: str) -> None:
     Draft202012Validator(schema).validate(result)
     names = [each.__name__ for each in RESULTS]
     assert [name for name in names if validator(schema, name).is_valid(result)] == [kind]
+    again = result_from_json(result, "result.json")
+    assert type(again).__name__ == kind
+    assert json_data(again) == result
 
 
 def objects(value: object) -> Iterator[Json]:
@@ -172,6 +186,68 @@ def test_a_robot_is_there_as_a_whole_or_not_at_all(schema: Json) -> None:
     assert without["margins"] == without["limits"] == []
     for key in ("parameters", "pose", "jacobian", "rank"):
         assert not validator(schema, "SolveResult").is_valid({**json.loads(json.dumps(without)), key: whole[key]})
+
+
+def test_a_result_is_read_again_from_its_file(cli: Run, tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    assert cli("solve", "paper-4.3-axis-x", "--starts", "2", "--json", str(file))[0] == 0
+    result = load_result(file)
+    assert isinstance(result, data.SolveResult)
+    assert result.status is Status.OPTIMAL
+    assert json.loads(file.read_text(encoding="utf-8"))["F"] == result.F
+    assert result.robot is not None
+    assert sum(rate**2 for rate in result.robot.rates or ()) == pytest.approx(result.F, rel=1e-12)
+    assert isinstance(result.robot.jacobian, tuple)
+    with pytest.raises(TypeError):
+        result.robot.parameters["x1"] = 1.0  # type: ignore[index]
+    # It is shown as the solution itself is.
+    case = load_case("paper-4.3-axis-x")
+    assert list(case_summary(case, result)) == list(case_summary(case, result_of(solve(case, starts=2))))
+
+
+def _drop(table: Json) -> None:
+    del table["starts"]["run"]
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (lambda table: table.update(schema=2), "schema: must be 1"),
+        (lambda table: table.update(extra=1), "extra: no such key; allowed: schema, case"),
+        (lambda table: table.update(status="perfect"), "status: must be one of 'optimal'"),
+        (lambda table: table.update(F="large"), "F: must be a number"),
+        (lambda table: table.update(seed=1.5), "seed: must be an integer"),
+        (lambda table: table["pose"].update(axis=[0, 1]), "pose.axis: must have 3 entries, got 2"),
+        (lambda table: table["jacobian"][2].append("x"), r"jacobian\[2\]\[6\]: must be a number"),
+        (lambda table: table["units"].update(angle="grad"), "units.angle: must be one of 'deg', 'rad'"),
+        (_drop, "starts.run: is missing"),
+    ],
+)
+def test_a_wrong_result_is_refused_with_its_key(change: Callable[[Json], None], fault: str) -> None:
+    table = json.loads(json.dumps(json_data(result_of(solve(load_case("paper-4.3-axis-x"), starts=1)))))
+    change(table)
+    with pytest.raises(InputError, match=rf"^mine: is no result of screwsynth: {fault}"):
+        result_from_json(table, "mine")
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        (b"{", "is not valid JSON"),
+        (b"\xff", "is not valid JSON"),
+        (b'{"schema": NaN}', "is not valid JSON: NaN"),
+        (b"[" * 100_000, "is not valid JSON"),
+        (b"[1]", "must be an object"),
+        (b"{}", "schema: must be 1"),
+    ],
+)
+def test_a_file_that_is_no_result_is_refused(content: bytes, fault: str, tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=fault):
+        load_result(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_result(tmp_path / "none.json")
 
 
 class Inner(JsonObject):

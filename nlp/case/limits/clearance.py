@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import casadi as ca
@@ -52,15 +53,26 @@ def _near(squared: SX, far: float) -> SX:
     return 1 - ca.fmax(0, 1 - squared / far) ** 3
 
 
+def _bound(far: float, distance: SX) -> SX:
+    """Return :func:`_near` of a distance (1, 1)."""
+    return _near(distance * distance, far)
+
+
+def _distance(far: float, value: float) -> float:
+    """Return the distance from a value of :func:`_near`."""
+    return math.sqrt(far * (1 - max(1 - max(value, 0.0), 0.0) ** (1 / 3)))
+
+
+def _slope(far: float, value: float) -> float:
+    """Return the derivative of :func:`_near` with respect to the distance, at a value of it."""
+    return float(6 * max(1 - value, 0.0) ** (2 / 3) * _distance(far, value) / far)
+
+
 def _reading(far: float) -> Reading:
     """Return the reading of :func:`_near` as the distance."""
-
-    def distance(value: float) -> float:
-        return math.sqrt(far * (1 - max(1 - value, 0.0) ** (1 / 3)))
-
     return Reading(
         Dimension.LENGTH,
-        from_value=lambda value: distance(max(value, 0.0)),
-        slope=lambda value: 6 * max(1 - value, 0.0) ** (2 / 3) * distance(max(value, 0.0)) / far,
-        to_value=lambda number: _near(number * number, far),
+        from_value=partial(_distance, far),
+        slope=partial(_slope, far),
+        to_value=partial(_bound, far),
     )

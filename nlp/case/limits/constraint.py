@@ -6,21 +6,32 @@ import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from casadi import SX
 
 from ....models import Dimension, FloatArray
 
+_T = TypeVar("_T")
+
 #: A measured number from the Jacobian (m, 6) and the position (3,) of the platform at a pose.
 JacobianMeasure: TypeAlias = Callable[[FloatArray, FloatArray], float]
+
+
+def _unchanged(value: _T) -> _T:
+    return value
+
+
+def _one(value: float) -> float:  # noqa: ARG001 - a slope is a function of the bound
+    return 1.0
 
 
 @dataclass(frozen=True)
 class Reading:
     """Conversion between a constraint's bound and the number that a case states for it.
 
-    A limit on an angle may be a bound on a smoother function of it in the program.
+    A limit on an angle may be a bound on a smoother function of it in the program. The three functions have names, or
+    are a ``partial`` of functions that have: a solution that holds a ``lambda`` cannot be pickled.
 
     Attributes:
         dimension: of the number that a case states.
@@ -30,19 +41,26 @@ class Reading:
     """
 
     dimension: Dimension
-    from_value: Callable[[float], float] = lambda value: value
-    slope: Callable[[float], float] = lambda _: 1.0
-    to_value: Callable[[SX], SX] = lambda number: number
+    from_value: Callable[[float], float] = _unchanged
+    slope: Callable[[float], float] = _one
+    to_value: Callable[[SX], SX] = _unchanged
 
 
 def squared(dimension: Dimension) -> Reading:
     """Return the reading of a square as the number itself."""
-    return Reading(
-        dimension,
-        from_value=lambda value: math.sqrt(max(value, 0.0)),
-        slope=lambda value: 2 * math.sqrt(max(value, 0.0)),
-        to_value=lambda number: number * number,
-    )
+    return Reading(dimension, from_value=_root, slope=_slope_of_square, to_value=_square)
+
+
+def _root(value: float) -> float:
+    return math.sqrt(max(value, 0.0))
+
+
+def _slope_of_square(value: float) -> float:
+    return 2 * math.sqrt(max(value, 0.0))
+
+
+def _square(number: SX) -> SX:
+    return number * number
 
 
 LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)

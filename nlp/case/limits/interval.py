@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, NamedTuple, Self
 
@@ -10,7 +11,9 @@ from pydantic import Field, FiniteFloat
 
 from ....models import Dimension, Model
 from ...errors import CaseError
+from ...units import Units
 from ..table import Table
+from ..toml import TomlValue
 from .limit import Limit, LimitedCase, Written
 
 
@@ -90,6 +93,11 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
         """Return the limit that a case file writes."""
         smallest, largest = sides(written, cls.measured)
         return cls(min=smallest, max=largest)
+
+    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
+        """Return the keys of ``[limits]`` that state this limit."""
+        dimension, ends = self.dimension(model), {"min": self.min, "max": self.max}
+        return {self.name: {name: units.written(value, dimension) for name, value in ends.items() if value is not None}}
 
     def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
         """Return the dimension of the measured quantity."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
@@ -29,19 +29,30 @@ from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array
 from ...errors import CaseError
 from ...units import Units
 from ..table import Table, Vector
+from ..toml import TomlValue
 from .constraint import BoundedConstraint, Reading, between
 from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
 
+
+def _angle(value: float) -> float:
+    """Return the angle whose cosine is minus a value."""
+    return math.acos(min(max(-value, -1.0), 1.0))
+
+
+def _slope(value: float) -> float:
+    """Return the derivative of ``-cos(angle)`` at a value of it."""
+    return math.sqrt(max(1 - value * value, 0.0))
+
+
+def _minus_cosine(angle: SX) -> SX:
+    return -ca.cos(angle)
+
+
 #: ``-cos(angle)`` read as the angle.
-_ANGLE = Reading(
-    Dimension.ANGLE,
-    from_value=lambda value: math.acos(min(max(-value, -1.0), 1.0)),
-    slope=lambda value: math.sqrt(max(1 - value * value, 0.0)),
-    to_value=lambda number: -ca.cos(number),
-)
+_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine)
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
@@ -140,6 +151,18 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 rows = [row for row in axes if isinstance(row, list)]
                 flat = [part for part in axes if not isinstance(part, list)]
                 return cls(largest, tuple(_triple(row) for row in rows or [flat]))
+
+    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
+        """Return the keys of ``[limits]`` that state this limit, with the home pose that its cones are about."""
+        largest = units.written(self.max, Dimension.ANGLE)
+        if self.about is None:
+            return {self.key: largest}
+        if isinstance(self.about, MountingPose):
+            home = self.about
+            angle = units.written(home.angle, Dimension.ANGLE)
+            table: TomlValue = {"position": home.position, "axis": home.axis, "angle": angle}
+            return {self.key: {"max": largest, "about": "home"}, "home": table}
+        return {self.key: {"max": largest, "about": self.about[0] if len(self.about) == 1 else self.about}}
 
     def check(self, case: LimitedCase) -> None:
         """Refuse an angle out of its range, and axes that give no direction or are not as many as the legs.

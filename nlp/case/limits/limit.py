@@ -11,7 +11,7 @@ from __future__ import annotations
 import abc
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeVar
 
 from casadi import SX
@@ -25,6 +25,7 @@ from .pairs import PairFamily
 
 if TYPE_CHECKING:
     from ..table import Table
+    from ..toml import TomlValue
 
 #: The value that a case file has at a limit's key: a table, mostly.
 TableT = TypeVar("TableT")
@@ -216,6 +217,19 @@ class Limit(abc.ABC, Generic[TableT]):
         Raises:
             CaseError: the table contradicts itself.
         """
+
+    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - most limits need neither
+        """Return the keys of ``[limits]`` that state this limit, the inverse of :meth:`from_table`.
+
+        This is a table of the limit's own numbers. A limit on angles, which a file has in its own unit, or with another
+        table, has a method of its own.
+
+        Args:
+            model: the robot.
+            units: the file's units.
+        """
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {self.key: {name: value for name, value in values.items() if value is not None}}
 
     @property
     def name(self) -> str:

@@ -6,7 +6,7 @@ Numbers are in the case's units in a relation; :mod:`screwsynth.nlp.case.limits.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -16,6 +16,7 @@ from ....models import Dimension, Model
 from ...errors import CaseError
 from ...units import Units
 from ..table import Table
+from ..toml import TomlValue
 from .constraint import NUMBER, BoundedConstraint, Constraint
 from .grammar import SentenceError, expression, parse
 from .limit import Design, Limit, LimitedCase, TableField, Written
@@ -52,6 +53,10 @@ class Relations(Limit[list[str]]):
     def from_table(cls, written: Written[list[str]]) -> Self:
         """Return the relations that a case file writes."""
         return cls(*written.value)
+
+    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - texts have no units
+        """Return the keys of ``[limits]`` that state the relations."""
+        return {self.key: list(self.texts)}
 
     def check(self, case: LimitedCase) -> None:
         """Refuse a relation that cannot be understood.

@@ -24,13 +24,24 @@ from .constraint import SQUARED_NUMBER, BoundedConstraint, End, Reading, Spectra
 from .limit import Limit, LimitedCase, PosedRobot, Written
 from .spectrum import largest_eigenvalue, smallest_eigenvalue
 
+
+def _condition_from(value: float) -> float:
+    """Return the condition number c from ``-1 / c^2``."""
+    return 1 / math.sqrt(-value) if value < 0 else math.inf
+
+
+def _condition_slope(value: float) -> float:
+    """Return the derivative of ``-1 / c^2`` with respect to c, at a value of it."""
+    return float(2 * max(-value, 0.0) ** 1.5)
+
+
+def _condition_bound(number: SX) -> SX:
+    """Return ``-1 / c^2`` from the condition number c."""
+    return -1 / (number * number)
+
+
 #: ``-1 / c^2`` read as the condition number c.
-_CONDITION = Reading(
-    Dimension.NUMBER,
-    from_value=lambda value: 1 / math.sqrt(-value) if value < 0 else math.inf,
-    slope=lambda value: 2 * max(-value, 0.0) ** 1.5,
-    to_value=lambda number: -1 / (number * number),
-)
+_CONDITION = Reading(Dimension.NUMBER, from_value=_condition_from, slope=_condition_slope, to_value=_condition_bound)
 
 
 class SmallestTable(Table):

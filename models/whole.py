@@ -1,0 +1,119 @@
+"""Values that are pickled and copied as a whole, because symbols connect their parts.
+
+A CasADi symbol is known by its identity: two expressions that are pickled one by one lose the symbols that they share,
+and CasADi itself pickles none outside a context that is global to the process. A :class:`Whole` is therefore pickled
+with everything in it at once: all its expressions in one piece, in which shared symbols stay shared, and everything
+else beside it.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any, Self
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .arrays import FloatArray
+
+
+class Whole:
+    """A frozen dataclass that is pickled, and copied deeply, as a whole; values that it caches are left out.
+
+    Its fields may hold symbols, read-only arrays and mappings, and other values of this kind. A pickle is for the
+    version of the package that made it.
+    """
+
+    def __reduce_ex__(self, protocol: object) -> tuple[Any, ...]:
+        content = io.BytesIO()
+        pickler = _Pickler(content)
+        pickler.dump(self)
+        return _unpacked, (content.getvalue(), _packed_expressions(pickler.expressions))
+
+    def __copy__(self) -> Self:
+        """Return the value itself, which nothing can change."""
+        return self
+
+
+class _Pickler(pickle.Pickler):
+    """A pickler that keeps expressions out of the pickle, in a list.
+
+    Attributes:
+        expressions: every expression, once.
+    """
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self.expressions: list[SX] = []
+        self._places: dict[int, int] = {}
+
+    def persistent_id(self, value: object) -> int | None:
+        """Return the place of an expression in the list; None for any other value."""
+        if not isinstance(value, SX):
+            return None
+        if id(value) not in self._places:
+            self._places[id(value)] = len(self.expressions)
+            self.expressions.append(value)
+        return self._places[id(value)]
+
+    def reducer_override(self, value: object) -> Any:  # noqa: ANN401 - a tuple, or the constant NotImplemented
+        """Return how a value is built again, where Python's own rules would change it."""
+        if isinstance(value, Whole):
+            state = {item.name: getattr(value, item.name) for item in fields(value)}  # type: ignore[arg-type]
+            return object.__new__, (type(value),), state
+        if isinstance(value, MappingProxyType):
+            return _read_only_mapping, (dict(value),)
+        if isinstance(value, np.ndarray) and not value.flags.writeable:
+            return _read_only, (value.copy(),)
+        return NotImplemented
+
+
+class _Unpickler(pickle.Unpickler):
+    """The inverse of :class:`_Pickler`."""
+
+    def __init__(self, file: io.BytesIO, expressions: list[SX]) -> None:
+        super().__init__(file)
+        self._expressions = expressions
+
+    def persistent_load(self, place: Any) -> SX:  # noqa: ANN401 - pickle's own signature
+        """Return the expression at a place of the list."""
+        expression: SX = self._expressions[place]
+        return expression
+
+
+def _unpacked(content: bytes, expressions: str) -> object:
+    """Return a value from its pickle and its expressions."""
+    return _Unpickler(io.BytesIO(content), _unpacked_expressions(expressions)).load()
+
+
+def _packed_expressions(expressions: list[SX]) -> str:
+    """Return expressions as one text; empty where there are none."""
+    if not expressions:
+        return ""
+    serializer = ca.StringSerializer()
+    serializer.pack(expressions)
+    text: str = serializer.encode()
+    return text
+
+
+def _unpacked_expressions(text: str) -> list[SX]:
+    """Return the expressions of a text."""
+    if not text:
+        return []
+    found: list[SX] = ca.StringDeserializer(text).unpack()
+    return found
+
+
+def _read_only_mapping(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    """Return a mapping that cannot be changed; the type itself has no name by which pickle finds it."""
+    return MappingProxyType(values)
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    """Return an array that can no longer be changed."""
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,220 @@
+"""Writer of case files: a :class:`~screwsynth.nlp.case.case.Case` becomes TOML, from which the same case is read again.
+
+Angles are written in the case's unit. A motion is written as axis, point and pitch where it was stated so and these
+give the same six numbers, and else as a twist.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
+from ..errors import CaseError, one_line
+from ..units import Units
+from .case import Case
+from .displacements import written_displacements
+from .pose import Free, Pose, Value
+from .reader import case_from_tables
+from .settings import Expectation, Search
+from .task import Task, unit_twist
+from .toml import TomlValue, toml_lines, toml_table, toml_tables
+
+#: Digits to which a ratio of two components is rounded in the search of a short direction, such as [2, 2, 1].
+_DIGITS = 12
+#: Largest whole number that a component of a short direction has.
+_LARGEST_COMPONENT = 12
+#: Largest rounding error of a component, in units of its last place: of one division and one norm.
+_ROUNDINGS = 4
+#: Two robots whose expressions differ by more than this part of their size at a random point are not the same.
+_SAME = 1e-9
+
+
+def case_text(case: Case) -> str:
+    """Return a case as the text of a case file; the text is read again before it is returned.
+
+    A characteristic length and a combination that have no effect on the case are left out, as a case file cannot state
+    them.
+
+    Raises:
+        CaseError: no case file can state the case: its robot is not found by its name and options, or a value is not
+            one that a file may have.
+    """
+    text = "\n".join(_lines(case)) + "\n"
+    try:
+        again = case_from_tables(tomllib.loads(text), name=case.name, source="")
+    except CaseError as error:
+        raise CaseError(error.key, f"cannot be written to a case file: {error.fault}", error.value) from None
+    if not _are_same(case.model, again.model):
+        fault = "cannot be written to a case file: the robot of this name, with these options, is another one"
+        raise CaseError("robot.model", fault, case.model.name)
+    return text
+
+
+def _lines(case: Case) -> Iterator[str]:
+    """Yield the lines of a case file."""
+    units, model = case.units, case.model
+    yield from toml_lines({"title": case.title or None})
+    yield from toml_table("[units]", {"length": units.length, "angle": units.angle})
+    length = case.characteristic_length if model.has_couples else None
+    options: dict[str, TomlValue | None] = {key: _plain(value) for key, value in model.options.items()}
+    yield from toml_table("[robot]", {"model": model.name, **options, "characteristic_length": length})
+    parameters: dict[str, TomlValue] = {}
+    for item in model.parameters:
+        values = case.components(item.name)
+        numbers = [_number(value, units, item.dimension) for value in values]
+        parameters[item.name] = numbers[0] if len(numbers) == 1 else numbers
+        if item.is_direction and not any(isinstance(value, Free) for value in values):
+            parameters[item.name] = _direction(np.array(values, dtype=np.float64))
+    yield from toml_table("[robot.parameters]", parameters)
+    yield from toml_tables("[[pose]]" if case.further else "[pose]", (_pose(case, pose) for pose in case.poses))
+    for task in case.tasks:
+        yield from toml_table("[[task]]", _task(task))
+    yield from toml_table("[combine]", _combination(case))
+    yield from toml_table("[limits]", _limits(case))
+    yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
+    search, default = case.search, Search()
+    settings = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
+    yield from toml_table("[solve]", {key: value for key, value in settings.items() if value != getattr(default, key)})
+    yield from _expectation(case.expect)
+    for row in case.published:
+        table: dict[str, TomlValue | None] = {
+            "quantity": row.quantity,
+            "value": row.value[0] if len(row.value) == 1 else row.value,
+            "source": row.source,
+            "reproduced": row.reproduced,
+            "because": row.because or None,
+            "decimals": row.decimals,
+            "over": row.over,
+        }
+        yield from toml_table("[[published]]", table)
+
+
+def _expectation(expect: Expectation) -> Iterator[str]:
+    tolerance = expect.tolerance if expect.tolerance != Expectation.tolerance else None
+    yield from toml_table("[expect]", {"F": expect.F, "tolerance": tolerance, "singular": expect.singular})
+    rows: list[dict[str, TomlValue | None]] = [
+        {"quantity": row.quantity, "value": row.value, "within": row.within} for row in expect.values
+    ]
+    yield from toml_tables("[[expect.value]]", rows)
+
+
+def _number(value: Value, units: Units, dimension: Dimension) -> TomlValue:
+    """Return a fixed or free number in the case's unit."""
+    if not isinstance(value, Free):
+        return units.written(value, dimension)
+    start = None if value.start is None else units.written(value.start, dimension)
+    return {
+        "min": units.written(value.lower, dimension),
+        "max": units.written(value.upper, dimension),
+        "start": start,
+    }
+
+
+def _direction(unit: FloatArray) -> list[float]:
+    """Return components (3,) whose unit vector is the given one to the last bit: short ones if there are any."""
+    largest = float(np.abs(unit).max())
+    for scale in range(1, _LARGEST_COMPONENT + 1):
+        short = [round(float(part) / largest * scale, _DIGITS) for part in unit]
+        if np.array_equal(unit_vector(short), unit):
+            return short
+    # The unit vector was made from components whose largest is 1, which are these but for rounding.
+    long, steps = unit / largest, range(-_ROUNDINGS, _ROUNDINGS + 1)
+    moved = np.abs(long) < 1
+    for moves in itertools.product(*(steps if each else (0,) for each in moved)):
+        components = long + np.spacing(long) * moves
+        if np.array_equal(unit_vector(components), unit):
+            return [float(part) for part in components]
+    return [float(part) for part in unit]
+
+
+def _pose(case: Case, pose: Pose) -> dict[str, TomlValue | None]:
+    """Return the table of a stated pose."""
+    axis, angle = pose.rotation.axis, pose.rotation.angle
+    rotation: dict[str, TomlValue] | None = {"angle": _number(angle, case.units, Dimension.ANGLE)}
+    if axis is not None:
+        held = np.asarray(axis, dtype=np.float64)
+        rotation = {"axis": _direction(held), **(rotation or {})}
+        if angle == 0 and np.array_equal(held, (0, 0, 1)):
+            rotation = None
+    return {
+        "position": [_number(value, case.units, Dimension.LENGTH) for value in pose.position],
+        "rotation": rotation,
+        **written_displacements(pose.displacements, case.tasks, case.units),
+    }
+
+
+def _task(task: Task) -> dict[str, TomlValue | None]:
+    """Return the table of a task."""
+    twist = np.asarray(task.twist, dtype=np.float64)
+    motion: dict[str, TomlValue | None] = {"twist": twist.tolist()}
+    screw = axis_from_screw(twist)
+    pitch = round(screw.pitch, _DIGITS)
+    # The unit vector in the twist itself, which is not rounded again.
+    axis = _direction(twist[3:] if math.isinf(pitch) else twist[:3])
+    point = None if task.point is None else np.asarray(task.point, dtype=np.float64).tolist()
+    # A motion that was stated by its twist has no point, and stays so.
+    is_screw = math.isinf(pitch) == (point is None)
+    if is_screw and np.array_equal(unit_twist(axis, point, pitch, "task"), twist):
+        motion = {"axis": axis, "point": point, "pitch": pitch}
+    weight = task.weight if task.weight != Task.weight else None
+    return {"name": task.name, "sense": task.sense.value, **motion, "weight": weight}
+
+
+def _combination(case: Case) -> dict[str, TomlValue | None]:
+    """Return the table of the combination of tasks and poses: only the keys that a file with them may have."""
+    method = case.method.value if len(case.tasks) > 1 else None
+    return {"method": method, "over_poses": case.over_poses.value if case.pose_count > 1 else None}
+
+
+def _limits(case: Case) -> dict[str, TomlValue | None]:
+    """Return the table of the limits.
+
+    Raises:
+        CaseError: two limits need different values of one key.
+    """
+    found: dict[str, TomlValue | None] = {}
+    for limit in case.limits:
+        for key, value in limit.to_keys(case.model, case.units).items():
+            if found.setdefault(key, value) != value:
+                fault = "cannot be written to a case file, which has one value of it, while the limits have two"
+                raise CaseError(f"limits.{key}", fault)
+    return found
+
+
+def _plain(value: object) -> TomlValue:
+    """Return the value of a robot's option as TOML has it; a tuple is a list.
+
+    Raises:
+        CaseError: TOML has no such value.
+    """
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, Sequence):
+        return [_plain(part) for part in value]
+    raise CaseError("robot", f"has an option that cannot be written to a case file: {one_line(repr(value))[:60]}")
+
+
+def _are_same(one: Model, other: Model) -> bool:
+    """Return whether two robots have the same parameters, rows and measures: their values are equal at a point."""
+    names = [[item.components for item in model.parameters] for model in (one, other)]
+    if names[0] != names[1] or one.limbs != other.limbs or len(one.unknowns) != len(other.unknowns):
+        return False
+    rng = np.random.default_rng(0)
+    point = [rng.uniform(0.5, 1.5, part.shape) for part in Substitution.identity(one).all]
+
+    def rows(model: Model) -> FloatArray:
+        outputs = [part for row in model.wrenches for part in (row.force, row.moment)]
+        outputs += [*(each.values for each in model.quantities), *(each.expression for each in model.closure)]
+        function = ca.Function("model", Substitution.identity(model).all, [ca.vertcat(*outputs)])
+        return np.array(function.call(point)[0])
+
+    first, second = rows(one), rows(other)
+    return first.shape == second.shape and np.allclose(first, second, rtol=_SAME, atol=_SAME, equal_nan=True)

@@ -1,0 +1,190 @@
+"""Values as notebooks show them: tables and a drawing as HTML; and a solution as text or as a picture."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from rich.console import Console
+
+from ...models import Dimension, FloatArray, Model, component_names
+from ..case.case import Case
+from ..case.limits.limits import Limits
+from ..case.pose import HERE, Free, Value
+from ..certificate.certificate import Certificate
+from ..errors import CaseError, EvaluationError, InputError
+from ..evidence.state import evaluate
+from ..program.formulation import formulate_each
+from ..program.nlp import Nlp
+from ..results.evidence import certificate_data
+from ..results.point import task_data
+from ..results.result import result_of
+from ..results.robotwording import model_words
+from ..results.rounding import number
+from ..results.summary import case_summary
+from ..results.text import Line, TextTable
+from ..results.wording import certificate_lines, task_lines, title_line
+from ..solver.certified import Certified
+from ..solver.solution import Solution
+from .pictures.drawing import Drawing, drawing_of, drawing_of_model
+from .pictures.requirements import check_library
+from .pictures.solutions import drawings_of
+from .report.markup import html_table, join_markup, paragraphs, tag
+from .terminal import show
+
+#: Width of a text without a terminal, as the command line writes into a file.
+_WIDTH = 120
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that a notebook shows.
+
+    Attributes:
+        svg: the picture as SVG.
+    """
+
+    svg: str
+
+    def __repr__(self) -> str:
+        return f"<Picture: SVG of {len(self.svg)} characters>"
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+
+def text_of(found: Solution | Certified, width: int = _WIDTH) -> str:
+    """Return the tables of a solution as text, as ``solve`` prints them.
+
+    Args:
+        found: a solution, or a solution with certificates.
+        width: number of columns.
+    """
+    out = io.StringIO()
+    case = (found if isinstance(found, Solution) else found.solution).case
+    # In a notebook rich would show its lines at once instead of writing them.
+    plain = Console(
+        file=out, width=width, color_system=None, force_jupyter=False, highlight=False, markup=False, emoji=False
+    )
+    show(plain, case_summary(case, result_of(found)))
+    return "".join(f"{line.rstrip()}\n" for line in out.getvalue().splitlines())
+
+
+def picture_of(found: Solution | Model) -> Picture:
+    """Return the drawing of a solution's robot with its tasks, or of a robot at its typical values.
+
+    Raises:
+        InputError: Matplotlib is not installed.
+        EvaluationError: the robot does not exist at the point reached, or at its typical values.
+    """
+    return _picture([drawing_of_model(found)] if isinstance(found, Model) else drawings_of(found))
+
+
+def html_of(value: object) -> str | None:
+    """Return a value as HTML for a notebook: its tables, and a drawing; None for a value that has neither.
+
+    Without Matplotlib, or where the robot does not exist, a sentence stands in the drawing's place.
+
+    Args:
+        value: a robot, a case, a solution, or a certificate.
+    """
+    if isinstance(value, Model):
+        return _html(model_words(value.name, value, []), lambda: [drawing_of_model(value)])
+    if isinstance(value, Case):
+        return _html(_case_words(value), lambda: _drawings_at_start(value))
+    if isinstance(value, Solution | Certified):
+        solution = value if isinstance(value, Solution) else value.solution
+        return _html(case_summary(solution.case, result_of(value)), lambda: drawings_of(solution))
+    if isinstance(value, Certificate):
+        words = [title_line(value.nlp.case), *certificate_lines(certificate_data(value))]
+        return _html(
+            words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "the best point known")]
+        )
+    return None
+
+
+def _html(items: Iterable[Line | TextTable], drawings: Callable[[], Sequence[Drawing]]) -> str:
+    """Return lines, tables and a drawing as HTML."""
+    parts = [paragraphs([item]) if isinstance(item, Line) else html_table(item, "") for item in items]
+    try:
+        found = drawings()
+        image = "" if not found else base64.b64encode(_picture(found).svg.encode("utf-8")).decode("ascii")
+        parts.append(tag("img", src=f"data:image/svg+xml;base64,{image}", alt="the robot") if image else tag("p"))
+    except (InputError, EvaluationError) as error:
+        parts.append(tag("p", str(error)))
+    return tag("div", join_markup(parts))
+
+
+def _picture(drawings: Sequence[Drawing]) -> Picture:
+    """Return drawings as a picture.
+
+    Raises:
+        InputError: Matplotlib is not installed.
+    """
+    check_library("matplotlib", "pictures")
+    from .pictures.figures import picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
+
+    return Picture(picture(drawings, ".svg").decode("utf-8"))
+
+
+def _case_words(case: Case) -> Iterable[Line | TextTable]:
+    """Yield a case: its title, its tasks, its numbers, fixed or free, and its limits."""
+    yield title_line(case)
+    for index in range(len(case.tasks)):
+        yield from task_lines(task_data(case, index), case.units)
+    rows = []
+    for item in case.model.parameters:
+        values = zip(case.component_names(item), case.components(item.name), strict=True)
+        rows += [_row(case, name, value, item.dimension) for name, value in values]
+    for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True):
+        names = component_names(f"{prefix}p", 3)
+        rows += [_row(case, *each, Dimension.LENGTH) for each in zip(names, pose.position, strict=True)]
+        axis = pose.rotation.axis
+        shown = "free" if axis is None else "  ".join(number(float(part)) for part in np.asarray(axis))
+        rows.append((f"{prefix}axis", shown, ""))
+        rows.append(_row(case, f"{prefix}angle", pose.rotation.angle, Dimension.ANGLE))
+    yield TextTable(("", "value, or free between", "unit"), tuple(rows))
+    if case.limits:
+        yield Line(", ".join(limit.name for limit in case.limits), label="limits")
+    if case.pose_count > 1:
+        yield Line(str(case.pose_count), label="poses")
+
+
+def _row(case: Case, name: str, value: Value, dimension: Dimension) -> tuple[str, str, str]:
+    units = case.units
+    ends = [value.lower, value.upper] if isinstance(value, Free) else [value]
+    return name, " .. ".join(f"{units.shown(end, dimension):.7g}" for end in ends), units.label(dimension)
+
+
+def _drawings_at_start(case: Case) -> list[Drawing]:
+    """Return a case's robot with its tasks where the first search begins, at the first pose.
+
+    Raises:
+        EvaluationError: the robot does not exist there.
+    """
+    # Limits and further poses change nothing in the drawing, and take time.
+    plain = replace(case, limits=Limits(), displacements=(HERE,), further=(), joint_centre_tolerance=None)
+    try:
+        nlps = formulate_each(plain)
+    except CaseError as error:
+        raise EvaluationError(str(error)) from None
+    return [_drawing_at(nlp, nlp.start, "where the first search begins", task) for task, nlp in enumerate(nlps)]
+
+
+def _drawing_at(nlp: Nlp, x: FloatArray, where: str, task: int = 0) -> Drawing:
+    """Return the robot at a point (n,) of a program.
+
+    Args:
+        nlp: the program.
+        x: the point.
+        where: the point in words.
+        task: index of the task in the case.
+
+    Raises:
+        EvaluationError: the robot does not exist there.
+    """
+    state = evaluate(nlp, x)
+    return drawing_of(nlp, x, state, task, headline=f"{where}: F = {nlp.evaluate(x).F:.7g}")

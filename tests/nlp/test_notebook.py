@@ -1,0 +1,202 @@
+"""Answers that show themselves: in a line, as HTML, text, picture, page and plain data."""
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from screwsynth.models import Model, hexapod, shown, stewart_gough, three_upu
+from screwsynth.nlp import (
+    Case,
+    Certified,
+    InputError,
+    Limits,
+    RateShare,
+    Search,
+    Solution,
+    Task,
+    certify,
+    formulate,
+    html_of,
+    json_data,
+    load_case,
+    result_of,
+    shipped_cases,
+    solve,
+    solve_program,
+)
+from screwsynth.nlp.output.pictures import requirements
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    return solve(load_case("paper-4.1-helical"), starts=3)
+
+
+@pytest.fixture(scope="module")
+def certified() -> Certified:
+    return certify(load_case("paper-4.2-rotation"), starts=2, gap=1e-2)
+
+
+def image(html: str) -> ElementTree.Element:
+    """The drawing of a value that a notebook shows."""
+    (data,) = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', html)
+    return ElementTree.fromstring(base64.b64decode(data))
+
+
+def cells(html: str) -> list[str]:
+    return re.findall(r"<t[dh][^>]*>([^<]*)</t[dh]>", html)
+
+
+def test_values_show_in_a_line(solution: Solution, certified: Certified) -> None:
+    values = [load_case(name) for name in shipped_cases()]
+    models = [stewart_gough(), hexapod(), three_upu()]
+    program = formulate(solution.case)
+    searched = solve_program(program, solution.case.search.but(2, 0))
+    for value in (*values, *models, solution, certified, certified.certificate, program, program.program, searched):
+        text = repr(value)
+        assert len(text) <= 240
+        assert "\n" not in text
+        assert str(value) == text
+    assert repr(solution.case) == ("<Case 'paper-4.1-helical': robot 'stewart-gough', 4 free numbers, 1 task, 1 pose>")
+    assert repr(hexapod()) == "<Model 'hexapod': 12 parameters, 6 limbs, 6 rows>"
+    assert repr(solution) == "<Solution of 'paper-4.1-helical': optimal, F = 407.2107>"
+    failed = solve(replace(solution.case, search=Search(starts=1, max_iterations=1)))
+    assert "F =" not in repr(failed)
+    assert failed.status.value in repr(failed)
+    averaged = solve(load_case("paper-4.2"), starts=2)
+    assert "tasks by average" in repr(averaged)
+    assert len(repr(averaged)) <= 240
+
+
+def test_a_name_with_a_line_break_stays_in_its_line() -> None:
+    case = Case(
+        stewart_gough(), {"x1": 2, "x2": 1, "x3": 0, "x4": 0.2}, [0, 0, 3], [Task([0, 0, 1, 0, 0, 0])], name="a\nb\x1b"
+    )
+    assert repr(case).startswith(r"<Case 'a\nb\x1b'")
+
+
+def test_a_notebook_shows_table_and_drawing(solution: Solution, certified: Certified) -> None:
+    pytest.importorskip("matplotlib")
+    values: dict[str, tuple[Model | Case | Solution | Certified | object, list[str]]] = {
+        "model": (stewart_gough(), ["x1", "x2"]),
+        "case": (solution.case, ["x1", "p_x", "-10 .. 10", "-30 .. 30"]),
+        "solution": (solution, ["p_x", "33.7 %", "-10 .. 10"]),
+        "certified": (certified, ["p_z"]),
+    }
+    for name, (value, words) in values.items():
+        html = value._repr_html_()  # type: ignore[union-attr, attr-defined]
+        assert html == html_of(value), name
+        assert set(words) <= set(cells(html)), name
+        assert image(html).tag.endswith("svg"), name
+    certificate = certified.certificate
+    assert certificate is not None
+    html = certificate._repr_html_() or ""
+    assert "no point of the box" in html
+    assert image(html).tag.endswith("svg")
+    assert html_of(3) is None
+
+
+@pytest.mark.parametrize("name", shipped_cases())
+def test_every_case_and_its_robot_are_drawn(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    case = load_case(name)
+    for value in (case, case.model):
+        assert image(value._repr_html_() or "").tag.endswith("svg")
+
+
+def test_text_of_a_case_is_escaped() -> None:
+    case = Case(
+        stewart_gough(),
+        {"x1": 2, "x2": 1, "x3": 0, "x4": 0.2},
+        [0, 0, 3],
+        [Task([0, 0, 1, 0, 0, 0], name="<script>alert(1)</script>")],
+        title="<b>bold</b>",
+        limits=Limits(RateShare(0.9)),
+    )
+    for value in (case, solve(case)):
+        html = value._repr_html_() or ""
+        assert "<script>" not in html
+        assert "<b>" not in html
+        assert "&lt;b&gt;" in html
+
+
+def test_without_matplotlib_a_sentence_stands_in_the_place_of_the_drawing(
+    solution: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(requirements, "find_spec", lambda _: None)
+    html = solution._repr_html_() or ""
+    assert "pictures need matplotlib" in html
+    assert "p_x" in cells(html)
+    with pytest.raises(InputError, match="pictures need matplotlib"):
+        solution.plot()
+
+
+def test_without_the_package_that_draws_a_notebook_shows_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shown, "GROUP", "screwsynth.no-such-group")
+    shown._view.cache_clear()
+    try:
+        assert stewart_gough()._repr_html_() is None
+    finally:
+        shown._view.cache_clear()
+
+
+def test_the_table_is_what_the_command_prints(cli: Run) -> None:
+    for name in ("paper-4.1-helical", "paper-4.2"):
+        _, out, _ = cli("solve", name, "--starts", "2")
+        printed = [line.rstrip() for line in out.splitlines()]
+        assert solve(load_case(name), starts=2).table().splitlines() == printed
+    narrow = solve(load_case("paper-4.1-helical"), starts=2).table(width=70)
+    assert max(map(len, narrow.splitlines())) <= 70
+
+
+def test_the_dictionary_is_the_result(solution: Solution, certified: Certified) -> None:
+    for found in (solution, certified):
+        assert found.to_dict() == json_data(result_of(found))
+        json.dumps(found.to_dict(), allow_nan=False)
+    assert certified.to_dict()["certificate"]
+
+
+def test_a_solution_draws_itself(solution: Solution, certified: Certified, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    picture = solution.plot()
+    assert picture._repr_svg_() == picture.svg
+    assert ElementTree.fromstring(picture.svg).tag.endswith("svg")
+    assert len(repr(picture)) < 80
+    assert solution.plot(tmp_path / "robot.svg").svg == (tmp_path / "robot.svg").read_text(encoding="utf-8")
+    solution.plot(tmp_path / "robot.png")
+    assert (tmp_path / "robot.png").read_bytes()[1:4] == b"PNG"
+    assert certified.plot().svg
+    with pytest.raises(InputError, match="ends in"):
+        solution.plot(tmp_path / "robot.txt")
+    assert not (tmp_path / "robot.txt").exists()
+
+
+def test_a_solution_writes_its_page_with_its_case(solution: Solution, tmp_path: Path) -> None:
+    pytest.importorskip("plotly")
+    file = tmp_path / "page.html"
+    page = solution.report(file)
+    assert page == file.read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "starts = 32" not in solution.case.to_toml()
+    assert "[robot.parameters]" in page
+    with pytest.raises(InputError, match="cannot be written"):
+        solution.report(tmp_path / "no-folder" / "page.html")
+
+
+def test_a_solve_loads_nothing_that_shows() -> None:
+    code = (
+        "import sys; from screwsynth.nlp import load_case, solve; s = solve(load_case('paper-4.2-rotation'), starts=1);"
+        "repr(s); print(*(n for n in sys.modules if n.startswith('screwsynth.nlp.output') or n == 'rich'))"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

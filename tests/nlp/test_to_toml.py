@@ -1,0 +1,270 @@
+"""Cases written as case files: what is read again is the same case."""
+
+import enum
+import math
+import subprocess
+import sys
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.models import Dimension, Displacement, Model, hexapod, screw_displacement, stewart_gough, three_upu
+from screwsynth.models.screws import Screw
+from screwsynth.nlp import (
+    Actuator,
+    BaseJointAngle,
+    Case,
+    CaseError,
+    ConditionNumber,
+    Expectation,
+    Footprint,
+    Free,
+    JointSpacing,
+    LegClearance,
+    LegLength,
+    Limits,
+    Method,
+    MountingPose,
+    OverPoses,
+    PlatformJointAngle,
+    Pose,
+    Published,
+    QuantityLimit,
+    RadiusRatio,
+    RateShare,
+    Relations,
+    Rotation,
+    Search,
+    Sense,
+    SmallestSingularValue,
+    Task,
+    Units,
+    along_screw,
+    case_from_tables,
+    load_case,
+    over_grid,
+    shipped_cases,
+)
+
+#: One unit in the last place of a number near 1: the rounding of an angle that no number of degrees gives exactly.
+ULP = 2.3e-16
+
+
+def read(text: str, case: Case) -> Case:
+    return case_from_tables(tomllib.loads(text), name=case.name, source=case.source or "written")
+
+
+def differences(one: Any, two: Any, slack: float, where: str = "case") -> list[str]:  # noqa: ANN401 - any value
+    """Where two values differ, by all their parts; numbers by more than a part of their size."""
+    if isinstance(one, Model):
+        one, two = (one.name, dict(one.options)), (two.name, dict(two.options))
+    if is_dataclass(one) and type(one) is type(two):
+        found = []
+        # The file's name is no part of the case.
+        for item in (item for item in fields(one) if item.name != "source"):
+            found += differences(getattr(one, item.name), getattr(two, item.name), slack, f"{where}.{item.name}")
+        return found
+    if isinstance(one, Mapping):
+        pairs = [(one[key], two.get(key), key) for key in one]
+        return [each for a, b, key in pairs for each in differences(a, b, slack, f"{where}.{key}")]
+    if isinstance(one, np.ndarray | list | tuple):
+        if len(one) != len(two):
+            return [f"{where}: {len(one)} and {len(two)} entries"]
+        pairs = [(a, b, index) for index, (a, b) in enumerate(zip(one, two, strict=True))]
+        return [each for a, b, index in pairs for each in differences(a, b, slack, f"{where}[{index}]")]
+    if isinstance(one, float | int) and not isinstance(one, bool | enum.Enum):
+        return [] if one == two or abs(one - two) <= slack * abs(one) else [f"{where}: {one!r} and {two!r}"]
+    return [] if one == two else [f"{where}: {one!r} and {two!r}"]
+
+
+@pytest.mark.parametrize("name", shipped_cases())
+def test_a_shipped_case_is_the_same_to_the_last_bit(name: str) -> None:
+    case = load_case(name)
+    text = case.to_toml()
+    again = read(text, case)
+    assert differences(case, again, 0.0) == []
+    # The text is the case's own: writing what was read changes nothing.
+    assert again.to_toml() == text
+
+
+def number(rng: np.random.Generator, dimension: Dimension, units: Units, low: float, high: float) -> float | Free:
+    """A fixed or free number, with few digits or with all of them."""
+    lower, upper = sorted(rng.uniform(low, high, 2))
+    if dimension is Dimension.ANGLE and units.angle == "deg" and rng.random() < 0.5:
+        lower, upper = (math.radians(round(math.degrees(each), 2)) for each in (lower, upper))
+    elif rng.random() < 0.5:
+        lower, upper = round(float(lower), 3), round(float(upper), 3)
+    if rng.random() < 0.5 or lower == upper:
+        return float(lower)
+    return Free(float(lower), float(upper), float(lower + (upper - lower) / 3) if rng.random() < 0.5 else None)
+
+
+def displacements(rng: np.random.Generator, tasks: list[Task]) -> tuple[Displacement, ...]:
+    kind = rng.integers(4)
+    if kind == 0:
+        return Pose((0, 0, 0)).displacements
+    if kind == 1:
+        return along_screw(rng.choice(tasks).twist, [float(each) for each in np.linspace(-0.3, 0.4, 4)])
+    if kind == 2:
+        return over_grid([[-1.0, 0.0, 1.0], [0.0], [float(each) for each in np.linspace(-2, 0.3, 4)]])
+    screws = [Screw(axis=each.axis, point=each.point, pitch=each.pitch, intensity=1.0) for each in axes(rng, 3)]
+    return tuple(screw_displacement(screw, float(rng.normal())) for screw in screws)
+
+
+def axes(rng: np.random.Generator, count: int) -> list[Screw]:
+    found = []
+    for _ in range(count):
+        axis = rng.normal(size=3)
+        found.append(Screw(axis / np.linalg.norm(axis), rng.normal(size=3), float(rng.normal()), 1.0))
+    return found
+
+
+def limits(rng: np.random.Generator, model: Model) -> Limits:
+    home = MountingPose((0.0, 1.0, 20.0), (0.0, 1.0, 1.0), 0.3)
+    every = [
+        LegLength(min=20.5),
+        Actuator(stroke_max=20, dead_length=5.25 if rng.random() < 0.5 else None),
+        BaseJointAngle(0.9, home if rng.random() < 0.5 else None),
+        PlatformJointAngle(0.7, ((0.0, 0.1, 1.0),) * int(rng.choice([1, 6])) if rng.random() < 0.5 else home),
+        JointSpacing(1),
+        Footprint(platform=15),
+        RadiusRatio(min=0.1, max=0.9),
+        LegClearance(0.5),
+    ]
+    # A robot without legs has its measures limited by their own names.
+    own = [QuantityLimit(item.name, max=1.25) for item in model.quantities]
+    general = [ConditionNumber(500, 20), SmallestSingularValue(1e-3, 20), RateShare(0.9)]
+    chosen = [*(every if model.legs else own), *general]
+    if "base_radius" in {item.name for item in model.parameters}:
+        chosen.append(Relations("base_radius - platform_radius >= 0", "base_radius^2 >= 1"))
+    return Limits(*(each for each in chosen if rng.random() < 0.6))
+
+
+def random_case(seed: int) -> Case:
+    rng = np.random.default_rng(seed)
+    units = Units(str(rng.choice(["mm", "in", 'a "unit"'])), "deg" if rng.random() < 0.6 else "rad")
+    models = [stewart_gough(), stewart_gough(layout="octahedral"), hexapod(), three_upu(), three_upu(axes="snu")]
+    model = models[rng.integers(len(models))]
+    parameters: dict[str, Any] = {}
+    for item in model.parameters:
+        low = [max(item.lower, value - 0.4) for value in item.typical]
+        high = [min(item.upper, value + 0.4) for value in item.typical]
+        values = [number(rng, item.dimension, units, a, b) for a, b in zip(low, high, strict=True)]
+        if item.is_direction and rng.random() < 0.7:
+            values = [float(each) for each in (rng.normal(size=3) if rng.random() < 0.5 else rng.integers(1, 9, 3))]
+        parameters[item.name] = values[0] if len(values) == 1 else values
+    names = ["drive", 'a "quoted"\\ name\nwith\x7f and \u202e', "schräg \U0001d6fc"][: int(rng.integers(1, 4))]
+    tasks = []
+    for name in names:
+        twist = rng.normal(size=6) if rng.random() < 0.5 else np.array([0.0, 0, 0, *rng.integers(1, 4, 3)])
+        tasks.append(Task(twist, Sense(str(rng.choice(["max", "min"]))), name, float(rng.choice([1.0, 0.3]))))
+    poses = []
+    for _ in range(int(rng.integers(1, 4))):
+        axis = None if rng.random() < 0.4 else [float(each) for each in rng.normal(size=3)]
+        angle = number(rng, Dimension.ANGLE, units, 0.1, 1.0)
+        position = [number(rng, Dimension.LENGTH, units, -3.0, 30.0) for _ in range(3)]
+        rotation = Rotation() if rng.random() < 0.3 else Rotation(axis, angle)
+        poses.append(Pose(position, rotation, displacements(rng, tasks)))
+    several = sum(len(pose.displacements) for pose in poses) > 1
+    return Case(
+        model=model,
+        parameters=parameters,
+        position=poses[0].position,
+        rotation=poses[0].rotation,
+        displacements=poses[0].displacements,
+        further=poses[1:],
+        tasks=tasks,
+        units=units,
+        characteristic_length=float(rng.uniform(1, 2)) if model.has_couples else 1.0,
+        limits=limits(rng, model),
+        over_poses=OverPoses.MEAN if several else OverPoses.SUM,
+        joint_centre_tolerance=0.01 if model.built else None,
+        search=Search(starts=int(rng.integers(1, 99)), seed=int(rng.integers(9)), max_iterations=77),
+        method=Method.WORST_CASE if len(tasks) > 1 else Method.AVERAGE,
+        title=str(rng.choice(["", "Näme = \t#", "[title]"])),
+        name="mine",
+        expect=Expectation(1.5, 1e-3, singular=True),
+        published=(Published("pose.axis", (0.0, 0.5, 1.0), "a book", reproduced=False, because="a misprint"),),
+    )
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_case_built_in_python_is_the_same(seed: int) -> None:
+    case = random_case(seed)
+    again = read(case.to_toml(), case)
+    assert differences(case, again, ULP) == []
+    if case.units.angle == "rad":
+        assert differences(case, again, 0.0) == []
+
+
+def test_the_random_cases_differ_where_they_should() -> None:
+    # The comparison itself can fail: another number anywhere is a difference.
+    case = random_case(3)
+    for other in (
+        replace(case, title="another"),
+        replace(case, position=[1.0, 2.0, 3.0]),
+        replace(case, limits=Limits(RateShare(0.5))),
+        replace(case, tasks=[replace(case.tasks[0], weight=3.0), *case.tasks[1:]]),
+        replace(case, search=Search(starts=100)),
+    ):
+        assert differences(case, other, ULP)
+
+
+def test_poses_are_written_as_they_were_stated() -> None:
+    text = load_case("paper-4.1-helical").to_toml()
+    along = "along_task = { first = -15, last = 15, count = 5 }"
+    grid = "grid = { x = { min = -1, max = 3, count = 3 } }"
+    stated = text.replace("rotation = { angle", f"{along}\nrotation = {{ angle")
+    stated = stated.replace("[[task]]", '[combine]\nover_poses = "mean"\n\n[[task]]')
+    written = case_from_tables(tomllib.loads(stated), name="x", source="x").to_toml()
+    assert 'along_task = { task = "drive the screw", first = -15, last = 15, count = 5 }' in written
+    stated = stated.replace(along, grid)
+    written = case_from_tables(tomllib.loads(stated), name="x", source="x").to_toml()
+    assert grid in written
+
+
+def test_displacements_of_a_file_are_rotations() -> None:
+    case = load_case("paper-4.1-helical")
+    text = case.to_toml()
+
+    def with_displacements(line: str) -> Case:
+        return read(text.replace("rotation = { angle", f"{line}\nrotation = {{ angle"), case)
+
+    turned = "[[0, -1, 0], [1, 0, 0], [0, 0, 1]]"
+    line = f"displacements = [{{ translation = [0, 0, 1] }}, {{ rotation = {turned}, translation = [0, 0, 0] }}]"
+    assert with_displacements(line).pose_count == 2
+    with pytest.raises(CaseError, match=r"pose.displacements\[1\].rotation: must be a rotation matrix"):
+        with_displacements(line.replace("[1, 0, 0]", "[1.1, 0, 0]"))
+    with pytest.raises(CaseError, match=r"pose.displacements\[1\].rotation: must be a rotation matrix"):
+        with_displacements(line.replace("[0, 0, 1]]", "[0, 0, -1]]"))
+    with pytest.raises(CaseError, match=r"pose\.displacements: cannot stand beside grid; write two poses"):
+        with_displacements(f"{line}\ngrid = {{ x = {{ min = 0, max = 1, count = 2 }} }}")
+
+
+def test_what_no_case_file_can_state_is_refused() -> None:
+    case = load_case("hexapod-machining")
+    cone = BaseJointAngle(0.9, MountingPose((0.0, 0.0, 20.0)))
+    other = PlatformJointAngle(0.9, MountingPose((0.0, 0.0, 21.0)))
+    model = replace(case.model, name="my-own")
+    renamed = replace(case.model, wrenches=case.model.wrenches[::-1], built=case.model.built[::-1])
+    for wrong, fault in (
+        (replace(case, model=model), "robot.model.*my-own.*cannot be written to a case file: no such robot"),
+        (replace(case, model=renamed), "the robot of this name, with these options, is another one"),
+        (replace(case, limits=Limits(cone, other)), "limits.home: cannot be written to a case file"),
+        (replace(case, units=Units("")), "units.length.*cannot be written to a case file"),
+    ):
+        with pytest.raises(CaseError, match=fault):
+            wrong.to_toml()
+
+
+def test_a_case_is_made_and_used_without_the_tables_of_files() -> None:
+    code = (
+        "import sys; from screwsynth.models import stewart_gough; from screwsynth.nlp import Case, Task; "
+        "case = Case(stewart_gough(), dict(x1=2, x2=1, x3=0, x4=0.2), [0, 0, 3], [Task([0, 0, 1, 0, 0, 0])]); "
+        "repr(case); sys.exit('pydantic' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
