@@ -42,11 +42,15 @@ def checks_as_markdown(checks: Sequence[CaseCheck]) -> str:
 
 
 def markdown(table: TextTable) -> str:
-    """Return a table in Markdown."""
-    lines = [_row(table.headers), f"|{'---|' * len(table.headers)}", *(_row(row) for row in table.rows)]
+    """Return a table in Markdown; the words of a case are escaped in its cells."""
+    rows = ([one_line(_words(cell)) for cell in row] for row in table.rows)
+    lines = [_row(table.headers), f"|{'---|' * len(table.headers)}", *map(_row, rows)]
     return "\n".join(lines) + "\n"
 
 
-def _row(cells: Sequence[str | Line]) -> str:
-    texts = (cell.words if isinstance(cell, Line) else cell for cell in cells)
-    return "| " + " | ".join(one_line(text).replace("|", "\\|") for text in texts) + " |"
+def _words(cell: str | Line) -> str:
+    return cell.words if isinstance(cell, Line) else cell
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(text.replace("|", "\\|") for text in cells) + " |"
