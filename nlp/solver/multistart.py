@@ -162,7 +162,8 @@ def _search(
         done.append(start)
         if start.status is StartStatus.CONVERGED and (best is None or nlp.sign * start.F < nlp.sign * best):
             if best is None:
-                examine(nlp, start.x)  # what this compiles is at hand when the search is interrupted
+                # The evidence needs it: it is at hand then where the search is interrupted.
+                _ = nlp.program.kernels.hessian
             best = start.F
         reached(Milestone.START)
         if progress is not None:
