@@ -170,7 +170,7 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "has_optimum": str(int(solution.status is Status.OPTIMAL)),
         # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
         "optimum": f"{solution.F:.9g}" if solution.status is Status.OPTIMAL else "0",
-        "optimum_scale": f"{nlp.objective_scale:.9g}",
+        "optimum_scale": f"{nlp.objective_size:.9g}",
         "references": references,
         "operations": "\n".join(f"| `{f.name()[size:]}` | {f.n_instructions()} |" for f in functions),
     }

@@ -43,12 +43,16 @@ def checks_as_markdown(checks: Sequence[CaseCheck]) -> str:
 
 
 def markdown(table: TextTable) -> str:
-    """Return a table in Markdown."""
-    lines = [_row(table.headers), f"|{'---|' * len(table.headers)}", *(_row(row) for row in table.rows)]
+    """Return a table in Markdown; the words of a case are escaped in its cells."""
+    rows = ([_words(cell) for cell in row] for row in table.rows)
+    lines = [_row(table.headers), f"|{'---|' * len(table.headers)}", *map(_row, rows)]
     return "\n".join(lines) + "\n"
 
 
-def _row(cells: Sequence[str | Line]) -> str:
+def _words(cell: str | Line) -> str:
+    return cell.words if isinstance(cell, Line) else cell
+
+
+def _row(cells: Sequence[str]) -> str:
     """Return a row of a Markdown table."""
-    texts = (cell.words if isinstance(cell, Line) else cell for cell in cells)
-    return "| " + " | ".join(one_line(text).replace("|", "\\|") for text in texts) + " |"
+    return "| " + " | ".join(one_line(text).replace("|", "\\|") for text in cells) + " |"

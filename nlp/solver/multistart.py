@@ -197,7 +197,7 @@ def _search(
         # Interrupted searches end before the last point.
         for k, start in zip(left, search_from(nlp, points[left], search, jobs, solver), strict=False):
             if not found and start.status is StartStatus.CONVERGED:
-                examine(nlp, start.x)  # what this compiles is at hand when the search is interrupted
+                _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
             found[k] = start
             reached(Milestone.START)
             if progress is not None:

@@ -277,9 +277,9 @@ def spectral(target: Path) -> tuple[Path, Nlp]:
 def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
     where, nlp = spectral(tmp_path)
     assert sum(path.stat().st_size for path in where.glob("screwsynth_spectra*")) <= 400_000
-    began = time.process_time()
+    began = time.monotonic()
     assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -fPIC", "test")
-    assert time.process_time() - began < 60
+    assert time.monotonic() - began < 60
     objects = sorted(str(path) for path in where.glob("screwsynth_spectra*.o"))
     lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
     wanted = {line.split()[-1] for line in lines if " U " in line}

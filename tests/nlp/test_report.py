@@ -36,6 +36,7 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Task, case_from_tables, evaluate, formulate, load_case, result_of, solve
+from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -834,3 +835,18 @@ def test_browser_is_where_ci_installs_it() -> None:
     assert "[chromium]=chromium" in text
     assert "[chromedriver]=chromium-driver" in text
     assert shutil.which("bash")
+
+
+def test_a_page_with_a_refused_certificate(tmp_path: Path, cli: Callable[..., tuple[int, str, str]]) -> None:
+    path, page = tmp_path / "case.toml", tmp_path / "page.html"
+    # A power that no rule covers stands in for any limit that a proof cannot treat.
+    text = find_case("paper-4.1-helical").read_text(encoding="utf-8")
+    path.write_text(text.replace("[[task]]", '[limits]\ncustom = ["p_z^0.3 >= 1"]\n[[task]]', 1), encoding="utf-8")
+    code, out, err = cli("report", str(path), "--certify", "--starts", "2", "--out", str(page))
+    assert (code, err) == (1, "")
+    assert "limits.custom[0]" in out
+    shown = page.read_text(encoding="utf-8")
+    assert re.search(r"Refused: no bound can be proved: [^<]*limits\.custom\[0\]", shown)
+    assert "407.2107" in shown
+    assert cli("report", str(path), "--starts", "2", "--out", str(page))[0] == 0
+    assert "Refused" not in page.read_text(encoding="utf-8")

@@ -314,7 +314,8 @@
     });
     document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => layout && turn(button.dataset.turn)));
     tell();
-    for (const id of ["task", "pose"]) if (byId(id)) byId(id).addEventListener("input", choose);
+    if (byId("task")) byId("task").addEventListener("change", choose);
+    if (byId("pose")) byId("pose").addEventListener("input", choose);
     if (byId("worst")) byId("worst").addEventListener("click", () => { byId("pose").value = worst(); choose(); });
     if (byId("pose")) tellPose();
   }
