@@ -25,6 +25,8 @@ _STYLES = {
 _GAP, _NARROW_GAP = 3, 2
 #: Words in a column wrap at this width or a larger one, so that a column never becomes a word a line.
 _WRAPPED = 14
+#: The same where a table goes on below itself, and has room for longer lines.
+_COMFORTABLE = 28
 
 
 def show(console: Console, items: Iterable[Line | TextTable]) -> None:
@@ -80,6 +82,8 @@ class _Column:
         self.narrow = max(inside, *(cell_len(word) for word in header.split()), 0)
         #: Least width.
         self.least = min(self.narrow, max(words, _WRAPPED))
+        #: Width in a table that goes on below itself.
+        self.comfortable = min(self.narrow, max(words, _COMFORTABLE))
 
 
 def _parts(columns: Sequence[_Column], width: int) -> Iterator[Sequence[_Column]]:
@@ -90,8 +94,7 @@ def _parts(columns: Sequence[_Column], width: int) -> Iterator[Sequence[_Column]
         return
     part = [first]
     for column in others:
-        # Columns of a part keep their cells in one line, where the width allows that for a column alone.
-        if len(part) > 1 and not _fits([each.narrow for each in (*part, column)], width):
+        if len(part) > 1 and not _fits([each.comfortable for each in (*part, column)], width):
             yield part
             part = [first]
         part.append(column)

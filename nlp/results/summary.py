@@ -60,6 +60,9 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     """Yield the result of a solve of several tasks."""
     combined, point = result.combined, result.combined.method_point
     yield title_line(case)
+    for own in result.tasks:
+        if own.robot is not None and own.robot.task is not None:
+            yield from task_lines(own.robot.task, case.units)
     yield from combined_lines(result)
     robot = None if point is None else point.robot
     if robot is not None:
