@@ -8,6 +8,7 @@ from pathlib import Path
 
 from screwsynth.models import model_names
 from screwsynth.nlp import build_model, load_case, plot, solve
+from screwsynth.nlp.case.robots import model_options
 
 FOLDER = Path(__file__).parent / "figures"
 CASES = {
@@ -30,4 +31,6 @@ FOLDER.mkdir(exist_ok=True)
 for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in model_names():
-    plot(build_model(model), FOLDER / f"model-{model}.png")
+    choices = next(((option.name, option.choices) for option in model_options(model) if option.choices), None)
+    variants = [build_model(model)] if choices is None else [build_model(model, {choices[0]: each}) for each in choices[1]]
+    plot(variants, FOLDER / f"model-{model}.png")
