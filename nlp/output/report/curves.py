@@ -31,10 +31,10 @@ def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mappin
 
 
 def tradeoff_rows(result: TradeoffResult) -> Markup:
-    """Return the table of a trade-off, with what is active at all of its values in the caption."""
+    """Return the table of a trade-off, and below it what is active at all of its values."""
     throughout = throughout_words(result)
-    more = f". Active throughout: {throughout}" if throughout else ""
-    return html_table(tradeoff_table(result), f"{over_words(result)}{more}")
+    below = tag("p", f"Active throughout: {throughout}.") if throughout else None
+    return joined([html_table(tradeoff_table(result), over_words(result)), *([] if below is None else [below])])
 
 
 def tradeoff_page(case: Case, result: TradeoffResult) -> str:
