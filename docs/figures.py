@@ -32,5 +32,7 @@ for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in model_names():
     choices = next(((option.name, option.choices) for option in model_options(model) if option.choices), None)
-    variants = [build_model(model)] if choices is None else [build_model(model, {choices[0]: each}) for each in choices[1]]
+    variants = (
+        [build_model(model)] if choices is None else [build_model(model, {choices[0]: each}) for each in choices[1]]
+    )
     plot(variants, FOLDER / f"model-{model}.png")

@@ -34,7 +34,7 @@ def tradeoff_rows(result: TradeoffResult) -> Markup:
     """Return the table of a trade-off, and below it what is active at all of its values."""
     throughout = throughout_words(result)
     below = tag("p", f"Active throughout: {throughout}.") if throughout else None
-    return joined([html_table(tradeoff_table(result), over_words(result)), *([] if below is None else [below])])
+    return join_markup([html_table(tradeoff_table(result), over_words(result)), below])
 
 
 def tradeoff_page(case: Case, result: TradeoffResult) -> str:
