@@ -17,8 +17,9 @@ from .evaluation import EvaluationResult
 from .jsondata import JsonObject, Mark, Size
 from .parts import SCHEMA
 from .schema import RESULTS
+from .tradeoff import TradeoffResult
 
-Result: TypeAlias = SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult
+Result: TypeAlias = SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult | TradeoffResult
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.
 _LARGEST = 64_000_000
@@ -46,7 +47,7 @@ class _WrongValueError(ValueError):
 
 
 def load_result(file: str | Path) -> Result:
-    """Read a result that ``solve``, ``evaluate``, ``certify`` or ``check`` wrote with ``--json``.
+    """Read a result that ``solve``, ``evaluate``, ``certify``, ``check`` or ``tradeoff`` wrote with ``--json``.
 
     Args:
         file: path of the file.

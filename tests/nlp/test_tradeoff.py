@@ -20,12 +20,14 @@ from screwsynth.nlp import (
     Task,
     json_data,
     load_case,
+    load_result,
     result_of,
     solve,
     tradeoff,
     tradeoff_result,
 )
 from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.tradeoff import TradeoffResult
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -158,6 +160,9 @@ def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
         code, _, err = cli("tradeoff", small, "--over", f"{LIMIT}=12:40:5", "--plot", str(files[kind]), *arguments)
         assert (code, err) == (0, "")
     result = json.loads(files["json"].read_text(encoding="utf-8"))
+    again = load_result(files["json"])
+    assert isinstance(again, TradeoffResult)
+    assert json.loads(json.dumps(json_data(again))) == result
     rows = list(csv.DictReader(io.StringIO(files["csv"].read_text(encoding="utf-8"))))
     assert len(rows) == 5
     for row, point in zip(rows, result["points"], strict=True):
