@@ -45,7 +45,11 @@ def checks_as_markdown(checks: Sequence[CaseCheck]) -> str:
 def markdown(table: TextTable) -> str:
     """Return a table in Markdown; the words of a case are escaped in its cells."""
     rows = ([_words(cell) for cell in row] for row in table.rows)
-    lines = [_row(table.headers), f"|{'---|' * len(table.headers)}", *map(_row, rows)]
+    lines = [
+        _row([header.replace("\n", ", ") for header in table.headers]),
+        f"|{'---|' * len(table.headers)}",
+        *map(_row, rows),
+    ]
     return "\n".join(lines) + "\n"
 
 

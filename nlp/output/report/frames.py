@@ -8,6 +8,8 @@ from typing import NamedTuple, TypedDict
 import numpy as np
 
 from ....models import Dimension, FloatArray
+from ...evidence.state import ZERO_F
+from ...results.rounding import settled
 from ...units import Units, rate_unit
 from ..pictures.drawing import Drawing, Motion
 from ..pictures.posture import Posture
@@ -134,6 +136,7 @@ class PoseView(NamedTuple):
         poses: number of poses of the case.
         is_worst: whether F is the worst there.
         views: number of views of the page, which share its size.
+        size: of F without cancellation: F is shown as 0 where it is rounding error beside this.
     """
 
     task: int = 0
@@ -141,6 +144,7 @@ class PoseView(NamedTuple):
     poses: int = 1
     is_worst: bool = False
     views: int = 1
+    size: float = 0.0
 
 
 def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView()) -> ViewData:  # noqa: B008 - immutable
@@ -153,12 +157,13 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
+    F = settled(float(rates @ rates), shown.size, ZERO_F)  # noqa: N806 - the objective's name
     postures, zero = _postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
     return {
         "name": "" if motion is None else motion.name,
         "task": shown.task,
         "pose": shown.pose,
-        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {float(rates @ rates):.7g}",
+        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {F:.7g}",
         "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
