@@ -157,7 +157,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
-    F = settled(float(rates @ rates), shown.size, ZERO_F)  # noqa: N806 - the objective's name
+    F = settled(float(rates @ rates), shown.size, ZERO_F)
     postures, zero = _postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
     return {
         "name": "" if motion is None else motion.name,
