@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from screwsynth.nlp import InputError
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.files import MANIFEST, write_folder
 
 Run = Callable[..., tuple[int, str, str]]

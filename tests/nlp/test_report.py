@@ -36,7 +36,7 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Task, case_from_tables, evaluate, formulate, load_case, result_of, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
