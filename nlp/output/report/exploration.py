@@ -128,7 +128,7 @@ def _slice(part: Part, each: Slice) -> Markup:
     inside = np.where(each.inside > 0, each.F, np.nan)
     width = values[-1] - values[0]
     at = settled(units.shown(float(x[each.variable]), variable.dimension), width)
-    here = settled(nlp.evaluate(x)[0], nlp.objective_scale, ZERO_F)
+    here = settled(nlp.evaluate(x)[0], nlp.objective_size, ZERO_F)
     unit = units.label(variable.dimension)
     finite = np.isfinite(each.F)
     if finite.any():
