@@ -20,7 +20,7 @@ from .pose import Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
 from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
 from .settings import Expectation, ExpectedValue, Published, Search
-from .source import case_text, find_case, inputs_of, tables_of
+from .source import find_case, inputs_of, read_text, tables_of
 from .task import Method, Sense, Task, unit_twist
 from .tomltext import toml_text
 
@@ -58,7 +58,8 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
 
 def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     """Read a case from its file, with a text that states it; arguments and errors are those of :func:`load_case`."""
-    path, text = find_case(name), case_text(name)
+    path = find_case(name)
+    text = read_text(path)
     tables = tables_of(path, text)
     inputs = inputs_of(path, tables)  # the names of files leave the tables when a case is made of these
     case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)

@@ -60,16 +60,12 @@ def _file_of(name: str) -> Path | None:
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
-def case_text(name: str) -> str:
+def read_text(path: Path) -> str:
     """Return the text of a case's file; a byte order mark is left out, and line ends are those of Unix.
-
-    Args:
-        name: as for :func:`find_case`.
 
     Raises:
         InputError: the file cannot be read, is too large, or is no UTF-8 text.
     """
-    path = find_case(name)
     try:
         with path.open("rb") as file:
             content = file.read(_LARGEST_FILE + 1)
@@ -113,4 +109,4 @@ def case_inputs(name: str) -> Mapping[Path, str]:
         InputError: the file cannot be read, or is not valid TOML.
     """
     path = find_case(name)
-    return inputs_of(path, tables_of(path, case_text(name)) if path.is_file() else {})
+    return inputs_of(path, tables_of(path, read_text(path)) if path.is_file() else {})
