@@ -10,7 +10,7 @@ import sys
 import tomllib
 
 from screwsynth.nlp import case_from_tables, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 
 rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 5
 tables = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))

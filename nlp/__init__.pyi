@@ -26,11 +26,11 @@ from .case.pose import along_screw as along_screw
 from .case.pose import over_grid as over_grid
 from .case.reader import case_from_tables as case_from_tables
 from .case.reader import load_case as load_case
-from .case.reader import shipped_cases as shipped_cases
 from .case.robots import build_model as build_model
 from .case.settings import Expectation as Expectation
 from .case.settings import Published as Published
 from .case.settings import Search as Search
+from .case.source import shipped_cases as shipped_cases
 from .case.task import Method as Method
 from .case.task import Sense as Sense
 from .case.task import Task as Task

@@ -28,6 +28,7 @@ class Milestone(enum.Enum):
 
     START = "a start of a search is done"
     BOUND = "the search of the whole box has begun"
+    VALUE = "a value of a trade-off is solved"
 
 
 #: Held while a file is written, so that none is left half written.

@@ -127,9 +127,15 @@ class TableOrigins:
         return CaseError(f"row {row}{where}", error.fault, error.value, source.file)
 
 
-def names_files(tables: Mapping[str, Any]) -> bool:
-    """Return whether a document names CSV files."""
-    return any(name in tables for name in _KINDS)
+def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
+    """Return the CSV files that a document names.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it.
+        folder: folder of the document, beside which the files are.
+    """
+    files = (tables.get(name) for name in _KINDS)
+    return tuple(folder / file for file in files if isinstance(file, str))
 
 
 def insert_rows(tables: dict[str, Any], folder: Path) -> TableOrigins:

@@ -1,21 +1,17 @@
-"""Reader of case files: TOML becomes a :class:`~screwsynth.nlp.case.case.Case`, and degrees become radians.
-
-A case is named by its path; a shipped case also by its bare name.
-"""
+"""Reader of case files: TOML becomes a :class:`~screwsynth.nlp.case.case.Case`, and degrees become radians."""
 
 from __future__ import annotations
 
 import math
-import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ... import cases
 from ...models import Dimension
-from ..errors import CaseError, InputError, nearest
+from ..errors import CaseError
 from ..units import Units
 from .case import Case
-from .csvrows import TableOrigins, insert_rows, names_files
+from .csvrows import TableOrigins, insert_rows
 from .displacements import read_displacements
 from .limits.limits import Limits
 from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
@@ -24,53 +20,9 @@ from .pose import Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
 from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
 from .settings import Expectation, ExpectedValue, Published, Search
+from .source import find_case, inputs_of, read_text, tables_of
 from .task import Method, Sense, Task, unit_twist
 from .tomltext import toml_text
-
-#: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
-_LARGEST_FILE = 4 * 2**20
-_SHIPPED = Path(cases.__file__).parent
-
-
-def shipped_cases() -> tuple[str, ...]:
-    """Return the names of the cases that come with the package, in order."""
-    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
-
-
-def find_case(name: str) -> Path:
-    """Return the file of a case.
-
-    Args:
-        name: path of the file, or the bare name of a shipped case.
-
-    Raises:
-        InputError: there is no such file.
-    """
-    try:
-        path = _file_of(name)
-    except OSError as error:  # such as a name that is too long
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
-    if path is None:
-        beside = Path(f"{name}.toml")
-        hint = f"did you mean {beside}?" if name and beside.is_file() else nearest(name, shipped_cases())
-        raise InputError(
-            f"{name or 'an empty name'}: no such file, and no case of this name comes with screwsynth; {hint}"
-        )
-    return path
-
-
-def _file_of(name: str) -> Path | None:
-    """Return the file with a path or a bare name, or None where there is none.
-
-    Raises:
-        InputError: the path is a folder's.
-    """
-    path = Path(name)
-    if name and path.is_dir():
-        raise InputError(f"{name}: is a folder, not a case file")
-    if name and path.exists():
-        return path
-    return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
 class CaseFile(NamedTuple):
@@ -80,10 +32,12 @@ class CaseFile(NamedTuple):
         case: the case.
         text: TOML that states this case by itself: the text of the file, unless settings change it or other files
             belong to it.
+        inputs: the files that it is read from, and the words for each in messages: its own, and those that it names.
     """
 
     case: Case
     text: str
+    inputs: Mapping[Path, str]
 
 
 def load_case(name: str, settings: Settings | None = None) -> Case:
@@ -104,38 +58,12 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
 
 def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     """Read a case from its file, with a text that states it; arguments and errors are those of :func:`load_case`."""
-    path, text = find_case(name), case_text(name)
-    try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-    is_whole = not settings and not names_files(tables)
-    case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
-    return CaseFile(case, text if is_whole else toml_text(tables))
-
-
-def case_text(name: str) -> str:
-    """Return the text of a case's file; a byte order mark is left out, and line ends are those of Unix.
-
-    Args:
-        name: as for :func:`load_case`.
-
-    Raises:
-        InputError: the file cannot be read, is too large, or is no UTF-8 text.
-    """
     path = find_case(name)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    if len(content) > _LARGEST_FILE:
-        raise InputError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    text = read_text(path)
+    tables = tables_of(path, text)
+    inputs = inputs_of(path, tables)  # the names of files leave the tables when a case is made of these
+    case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
+    return CaseFile(case, text if len(inputs) == 1 and not settings else toml_text(tables), inputs)
 
 
 def case_from_tables(

@@ -89,7 +89,7 @@ class Certificate(Whole, Shown):
         # A gap that is not relative is one beside 0: the bound 0 proves it.
         met = self.status is CertificateStatus.PROVED and not self.is_relative
         floor = 0.0 if math.isnan(self.incumbent) else _OBVIOUS * abs(self.incumbent)
-        reached = abs(self.incumbent) <= ZERO_F * self.nlp.objective_scale
+        reached = abs(self.incumbent) <= ZERO_F * self.nlp.objective_size
         return self.nlp.sense is Sense.MIN and self.bound <= floor and not (met or reached)
 
     @property
@@ -105,7 +105,7 @@ class Certificate(Whole, Shown):
     def _bound_statement(self) -> str:
         """The statement of a bound."""
         word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
-        value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_scale else self.incumbent
+        value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_size else self.incumbent
         best = "" if math.isnan(value) else f"; the best point known has {value:.10g}"
         beaten = ", better than the one given" if self.was_beaten else ""
         if self.above is not None and self.status is CertificateStatus.PROVED:
@@ -118,7 +118,7 @@ class Certificate(Whole, Shown):
                 f"nothing useful is proved yet ({self.reason or 'the gap asked for allows it'}): F is at least 0{best}"
             )
         # A lower bound may be rounded down to 0, an upper one may not.
-        is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_scale
+        is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_size
         bound = 0.0 if is_noise else self.bound + 0.0
         what = f"no point of the box within the limits has F {word} than {bound:.10g}{best}{beaten}"
         if self.status is CertificateStatus.PROVED:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, JsonFile, SettingTexts, check_outputs, console, read_settings, write_json
+from .options import CaseName, Jobs, JsonFile, SettingTexts, console, read_settings, write_json
 
 
 def certify(
@@ -28,7 +28,7 @@ def certify(
     from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
-    from ..output.files import write_text
+    from ..output.files import check_outputs, write_text
     from ..results.certified import certified_of
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
@@ -38,8 +38,8 @@ def certify(
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":
             raise InputError("standard output can take one of --json - and --proof - only")
-        loaded, text = read_case(case, read_settings(settings))
-        check_outputs([case], {"--json": json_file, "--proof": proof})
+        loaded, text, inputs = read_case(case, read_settings(settings))
+        check_outputs(inputs, {"--json": json_file, "--proof": proof})
         certified = certify_with_progress(
             loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
         )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonFile, check_outputs, console, write_json
+from .options import JsonFile, console, write_json
 
 
 def check(
@@ -18,16 +18,17 @@ def check(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
 ) -> None:
     """Hold cases to their expected and published values."""
-    from ..case.reader import shipped_cases
+    from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
     from ..output.checks import checks_as_junit, checks_as_markdown
-    from ..output.files import write_text
+    from ..output.files import check_outputs, write_text
     from ..results.checks import checks_of
     from ..results.regression import check as check_cases
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
         raise InputError("standard output can take one of --json -, --junit - and --markdown only")
-    check_outputs(cases or shipped_cases(), {"--json": json_file, "--junit": junit})
+    inputs = {path: words for each in cases or shipped_cases() for path, words in case_inputs(each).items()}
+    check_outputs(inputs, {"--json": json_file, "--junit": junit})
     checks = check_cases(cases)
     if json_file is not None:
         write_json(json_file, checks_of(checks))

@@ -11,7 +11,6 @@ from .options import (
     JsonFile,
     SettingTexts,
     check_csv,
-    check_outputs,
     console,
     read_settings,
     write_csv,
@@ -30,15 +29,17 @@ def evaluate(
 
     What is free stands at its start, or in the middle of its range.
     """
-    from ..case.reader import load_case
+    from ..case.reader import read_case
     from ..evidence import state
     from ..evidence.kkt import close_equations
+    from ..output.files import check_outputs
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    loaded = load_case(case, read_settings(settings))
-    check_outputs([case], {"--json": json_file, "--csv": csv_file})
+    given = read_case(case, read_settings(settings))
+    loaded = given.case
+    check_outputs(given.inputs, {"--json": json_file, "--csv": csv_file})
     check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))

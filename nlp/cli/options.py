@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from rich.console import Console
 
@@ -58,22 +58,6 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
     if not (name and equals and numbers):
         raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
     return name, numbers[0] if len(numbers) == 1 else numbers
-
-
-def check_outputs(cases: Iterable[str], outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that cannot be written, that are a case file, or that are each other, before the work begins.
-
-    Args:
-        cases: names of the cases that are read.
-        outputs: files to write, by the option that names them; None where it is not given.
-
-    Raises:
-        InputError: an output is refused.
-    """
-    from ..case.reader import find_case
-    from ..output.files import check_outputs as check
-
-    check([find_case(each) for each in cases], outputs)
 
 
 def check_picture(target: str | None) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, check_outputs, read_settings
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings
 
 
 def report(
@@ -24,14 +24,14 @@ def report(
     """Solve a case and write a page about it: one file that opens without a network."""
     from ..case.reader import load_case, read_case
     from ..errors import UncoveredError, one_line
-    from ..output.files import write_text
+    from ..output.files import check_outputs, write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
     fixed = read_settings(settings)
-    loaded, text = read_case(case, fixed)
+    loaded, text, inputs = read_case(case, fixed)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
-    check_outputs([case], {"--out": out})
+    check_outputs(inputs, {"--out": out})
     check_library("plotly", "reports")
     check_library("matplotlib", "reports")
     from ..output.report.report import report_of

@@ -18,7 +18,6 @@ from .options import (
     SettingTexts,
     Starts,
     check_csv,
-    check_outputs,
     check_picture,
     console,
     read_settings,
@@ -46,20 +45,21 @@ def solve(
     ] = False,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
-    from ..case.reader import load_case
+    from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
+    from ..output.files import check_outputs
     from ..results.result import result_of
     from .progress import solve_with_progress
 
     # With --certify, an interrupt would leave the proof undone, and the answer would look like a refused one.
     if not certify:
         answer_after(Milestone.START)
-    loaded = load_case(case, read_settings(settings))
-    loaded = replace(loaded, search=loaded.search.but(starts, seed, compiled=compiled))
+    given = read_case(case, read_settings(settings))
+    loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
     check_csv(csv_file, table, json_file, loaded, at_point=False)
     check_picture(plot)
-    check_outputs([case], {"--json": json_file, "--plot": plot, "--csv": csv_file})
+    check_outputs(given.inputs, {"--json": json_file, "--plot": plot, "--csv": csv_file})
     if pose > loaded.pose_count:
         raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)

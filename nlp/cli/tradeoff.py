@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -15,18 +15,16 @@ from .options import (
     Seed,
     SettingTexts,
     Starts,
-    check_outputs,
     check_picture,
     console,
     read_settings,
     write_json,
 )
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 #: Largest number of values.
 _MOST = 200
+#: Leaves the cursor at the beginning of an empty line.
+_CLEAR_LINE = "\r\033[K"
 
 
 def tradeoff(
@@ -47,29 +45,37 @@ def tradeoff(
     page: Annotated[str | None, typer.Option("--page", metavar="FILE", help="Write the curve as an HTML page.")] = None,
 ) -> None:
     """Solve again along one limit or number, and show F against it."""
-    from ..case.reader import load_case
+    from ..case.reader import read_case
     from ..errors import InputError
-    from ..output.files import write_bytes, write_text
+    from ..interruption import Milestone, answer_after, is_requested
+    from ..output.files import check_outputs, write_bytes, write_text
     from ..results.tradeoff import tradeoff_result
     from ..results.tradeoffwording import tradeoff_csv, tradeoff_summary
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
 
+    answer_after(Milestone.VALUE)
     name, values = _read_range(over)
     fixed = read_settings(settings)
     if [json_file, csv_file, page].count("-") > 1:
         raise InputError("standard output can take one of --json -, --csv - and --page - only")
     check_picture(plot)
-    check_outputs([case], {"--json": json_file, "--csv": csv_file, "--page": page, "--plot": plot})
+    read = {value: read_case(case, {**fixed, name: value}) for value in values}
+    check_outputs(read[values[0]].inputs, {"--json": json_file, "--csv": csv_file, "--page": page, "--plot": plot})
+    show_progress = sys.stderr.isatty()
     found = solve_along(
-        lambda value: load_case(case, {**fixed, name: value}),
+        lambda value: read[value].case,
         values,
         name=name,
         starts=starts,
         seed=seed,
         jobs=jobs,
-        progress=_progress() if sys.stderr.isatty() else None,
+        progress=_write_progress if show_progress else None,
     )
+    if show_progress:
+        sys.stderr.write(_CLEAR_LINE)
+    if is_requested() and not found.unsolved:
+        typer.echo("interrupted: every value is solved, but not all from the optima beside it", err=True)
     loaded, result = found.points[0].solution.case, tradeoff_result(found)
     if json_file is not None:
         write_json(json_file, result)
@@ -127,11 +133,7 @@ def _read_range(text: str) -> _Range:
     return _Range(name, [first, *values[1:-1], last])
 
 
-def _progress() -> Callable[[int, int], None]:
-    """Return a function that writes how far the solves are, on one line of standard error."""
-
-    def show(done: int, total: int) -> None:
-        sys.stderr.write(f"\r{done} of {total} values solved" if done < total else "\r\033[K")
-        sys.stderr.flush()
-
-    return show
+def _write_progress(done: int, total: int) -> None:
+    """Write how far the solves are, on one line of standard error."""
+    sys.stderr.write(f"\r{done} of {total} values solved")
+    sys.stderr.flush()

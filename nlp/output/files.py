@@ -109,13 +109,13 @@ def check_folder(target: str, files: Iterable[str] = ()) -> None:
         )
 
 
-def check_outputs(inputs: Iterable[str | Path], outputs: Mapping[str, str | None]) -> None:
+def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None]) -> None:
     """Refuse outputs that cannot be written, that are an input, or that are each other, before the work begins.
 
     Links are resolved first. Pipes and devices take any number of outputs.
 
     Args:
-        inputs: files that are read.
+        inputs: files that are read, and the words for each in messages.
         outputs: files to write by the option that names them; None and ``-`` are left out.
 
     Raises:
@@ -125,10 +125,10 @@ def check_outputs(inputs: Iterable[str | Path], outputs: Mapping[str, str | None
     for target in outputs.values():
         if target is not None:
             check_target(target)
-    read = [Path(each) for each in inputs]
     for option, path in chosen.items():
-        if any(_is_same_file(path, each) for each in read):
-            raise InputError(f"{option} {path}: is the case file, which would be lost; choose another name")
+        for read, words in inputs.items():
+            if _is_same_file(path, read):
+                raise InputError(f"{option} {path}: is {words}, which would be lost; choose another name")
     for (option, path), (other, second) in combinations(chosen.items(), 2):
         if _is_same_file(path, second):
             raise InputError(f"{option} {path}: is the file of {other} too; choose another name")
@@ -212,7 +212,7 @@ def _is_same_file(one: Path, other: Path) -> bool:
         first, second = one.resolve(), other.resolve()
         if first.exists() and second.exists():
             return first.is_file() and first.samefile(second)
-    except (OSError, RuntimeError):  # such as a circle of links
+    except (OSError, RuntimeError, ValueError):  # such as a circle of links, or a name that no file can have
         return False
     return first == second
 

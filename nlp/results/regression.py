@@ -23,8 +23,9 @@ from typing import TypeAlias
 from ...models import component_names
 from ..case.case import Case
 from ..case.overrides import Settings
-from ..case.reader import load_case, shipped_cases
+from ..case.reader import load_case
 from ..case.settings import Published, Search
+from ..case.source import shipped_cases
 from ..errors import CaseError, EvaluationError, InputError
 from ..program.formulation import formulate_each
 from ..solver.multistart import solve_program

@@ -50,7 +50,7 @@ class TradeoffResult(JsonObject):
         unit: of the number; empty for a plain number.
         senses: of each task.
         tasks: name of each task.
-        points: one for each value.
+        points: one for each value; the status is "interrupted" for those that an interrupted command has not solved.
         seed: of the starting points.
         versions: of the programs.
         seconds: wall time.
@@ -77,7 +77,10 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
         unit=_unit(found.name, case, results),
         senses=tuple(task.sense for task in case.tasks),
         tasks=tuple(task.name for task in case.tasks),
-        points=tuple(_point(found.name, point, result) for point, result in zip(found.points, results, strict=True)),
+        points=(
+            *(_point(found.name, point, result) for point, result in zip(found.points, results, strict=True)),
+            *(_unsolved(value, len(case.tasks)) for value in found.unsolved),
+        ),
         seed=found.points[0].solution.seed,
         versions=versions(),
         seconds=found.seconds,
@@ -108,6 +111,20 @@ def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPoint
         active=_active(point.solution, result) if is_answer else (),
         parameters=None if robot is None else robot.parameters,
         pose=None if robot is None else robot.pose,
+    )
+
+
+def _unsolved(value: float, tasks: int) -> TradeoffPointData:
+    """Return the row of a value that an interrupted command has not solved."""
+    return TradeoffPointData(
+        value=value,
+        status=Status.INTERRUPTED,
+        F=None,
+        slope=None,
+        tasks=(None,) * tasks,
+        active=(),
+        parameters=None,
+        pose=None,
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ...models import component_names, frozen_array
 from ..case.case import Case
+from ..solver.status import Status
 from ..units import rate_unit
 from .rounding import number
 from .text import Line, TextTable, Tone
@@ -76,12 +77,15 @@ def _listed(names: Iterable[str]) -> str:
 def tradeoff_words(result: TradeoffResult) -> list[str]:
     """Return sentences about values without an answer."""
     missing = [point for point in result.points if not point.status.is_answer]
-    statuses = dict.fromkeys(point.status for point in missing)
-    return [
-        f"{status.value} at {', '.join(f'{point.value:.5g}' for point in missing if point.status is status)} "
-        f"{result.unit}".rstrip()
-        for status in statuses
-    ]
+    return [_status_words(result, status) for status in dict.fromkeys(point.status for point in missing)]
+
+
+def _status_words(result: TradeoffResult, status: Status) -> str:
+    """Return the values of a status; of those that an interrupted command has not solved, the last ones, the number."""
+    own = [point.value for point in result.points if point.status is status]
+    if status is Status.INTERRUPTED:
+        return f"interrupted: {len(result.points) - len(own)} of {len(result.points)} values are solved"
+    return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
 
 
 def objective_label(case: Case) -> str:

@@ -10,11 +10,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
 from ..errors import InputError
+from ..interruption import Milestone, is_requested, reached
 from ..program.formulation import formulate_each
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -44,13 +46,15 @@ class Tradeoff:
 
     Attributes:
         name: of the number, such as ``limits.leg_length.max``.
-        points: one for each value, in order.
+        points: one for each value that is solved, in order.
         seconds: wall time.
+        unsolved: the values after these, which an interrupted command has not solved; none otherwise.
     """
 
     name: str
     points: tuple[TradeoffPoint, ...]
     seconds: float
+    unsolved: tuple[float, ...] = ()
 
 
 def tradeoff(
@@ -88,13 +92,30 @@ def tradeoff(
     solutions: list[Solution] = []
     for done, case in enumerate(cases, 1):
         before = solutions[-1:] and _start_from(solutions[-1])
-        solutions.append(_solve(case, case.search.but(starts, seed), [*first, *before], jobs))
+        found = _whole(partial(_solve, case, case.search.but(starts, seed), [*first, *before], jobs))
+        if found is None:
+            break
+        solutions.append(found)
+        reached(Milestone.VALUE)
         if progress is not None:
             progress(done, len(cases))
-    for k in range(len(cases) - 2, -1, -1):
-        solutions[k] = _improved(solutions[k], solutions[k + 1], cases[k].search.but(starts, seed), jobs)
-    points = tuple(TradeoffPoint(float(value), found) for value, found in zip(values, solutions, strict=True))
-    return Tradeoff(name, points, time.perf_counter() - began)
+    for k in range(len(solutions) - 2, -1, -1):
+        better = _whole(partial(_improved, solutions[k], solutions[k + 1], cases[k].search.but(starts, seed), jobs))
+        if better is None:
+            break
+        solutions[k] = better
+    solved, unsolved = values[: len(solutions)], values[len(solutions) :]
+    points = tuple(TradeoffPoint(float(value), found) for value, found in zip(solved, solutions, strict=True))
+    return Tradeoff(name, points, time.perf_counter() - began, tuple(map(float, unsolved)))
+
+
+def _whole(solve: Callable[[], Solution]) -> Solution | None:
+    """Return the outcome of a solve; None where the work is requested to stop, before the solve or during it.
+
+    An interrupted search has some of its starts only, and its best point is not the optimum of its value.
+    """
+    found = None if is_requested() else solve()
+    return None if is_requested() else found
 
 
 def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | None) -> Solution:

@@ -21,6 +21,36 @@ from screwsynth.nlp.embedding.ctext import identifier
 Run = Callable[..., tuple[int, str, str]]
 
 
+THREE_POSES = """
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = { min = 5, max = 20 }
+[[pose]]
+position = [0, 0, 30]
+[[pose]]
+position = [6, 0, 33]
+[[pose]]
+position = [0, 5, 24]
+[[task]]
+sense = "SENSE"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+[solve]
+starts = 2
+"""
+
+
+@pytest.fixture
+def three_poses() -> Callable[[str], str]:
+    """The text of a case with three poses, by the sense of its task."""
+    return lambda sense: THREE_POSES.replace("SENSE", sense)
+
+
 @pytest.fixture
 def cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
     """The command line in this process: exit status, standard output, standard error."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, case_from_tables, formulate, load_case, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.certificate import bounding, quadratic
 from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify_program

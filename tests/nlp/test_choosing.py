@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.nlp import Case, RobotState, Solution, case_from_tables, evaluate, formulate, load_case, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 
 Array = NDArray[np.float64]
 PAGE = (Path(__file__).parents[2] / "docs" / "choosing.md").read_text(encoding="utf-8")

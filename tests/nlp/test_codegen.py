@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import Nlp, case_from_tables, formulate, load_case, shipped_cases, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.embedding.codegen import generate_c, size_words
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.program.sampling import starting_points

@@ -315,32 +315,8 @@ def test_both_layouts_of_a_robot_are_drawn(tmp_path: Path, cli: Run) -> None:
     assert wide > 1.5 * high
 
 
-POSES = """
-[robot]
-model = "stewart-gough"
-[robot.parameters]
-x1 = 12
-x2 = 8
-x3 = 30
-x4 = { min = 5, max = 20 }
-[[pose]]
-position = [0, 0, 30]
-[[pose]]
-position = [6, 0, 33]
-[[pose]]
-position = [0, 5, 24]
-[[task]]
-sense = "max"
-axis = [2, 2, 1]
-point = [2, 3, 6]
-pitch = 1
-[solve]
-starts = 2
-"""
-
-
-def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run) -> None:
-    case = case_from_tables(tomllib.loads(POSES), name="poses", source="poses.toml")
+def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, three_poses: Callable[[str], str]) -> None:
+    case = case_from_tables(tomllib.loads(three_poses("max")), name="poses", source="poses.toml")
     solution = solve(case)
     values = [evaluate(solution.nlp, solution.x, k).F for k in range(3)]
     drawn = [drawings_of(solution, k + 1)[0] for k in range(3)]
@@ -350,7 +326,7 @@ def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run) -> N
         assert f"pose {k + 1}, F = {values[k]:.7g} there" in robot.headline
         assert ("the worst" in robot.headline) == (values[k] == min(values))
     file = tmp_path / "poses.toml"
-    file.write_text(POSES, encoding="utf-8")
+    file.write_text(three_poses("max"), encoding="utf-8")
     code, _, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3")
     assert (code, err) == (0, "")
     code, out, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from screwsynth.nlp import generate_c, load_case
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 
 Run = Callable[..., tuple[int, str, str]]
 

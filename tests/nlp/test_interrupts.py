@@ -1,5 +1,7 @@
 """Ctrl-C in a pseudo-terminal: at any moment, at the first time, at once."""
 
+import csv
+import math
 import os
 import pty
 import re
@@ -11,6 +13,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+
+from screwsynth.nlp import Status, load_result
+from screwsynth.nlp.results.tradeoff import TradeoffResult
 
 # Eight poses of a hexapod with twelve free numbers and an actuator: long set-up, long starts.
 _ANGLES = [-35, 25, 85, 95, 155, 215]
@@ -25,6 +30,7 @@ CASE = "\n".join(
         "[solve]\nstarts = 3000",
     ]
 )
+OVER = ("--over", "limits.leg_length.max=400:500:200")
 pytestmark = pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="watches the threads of a process")
 
 #: Seconds from the key to the end of the process, on a busy machine.
@@ -88,10 +94,11 @@ def case(tmp_path: Path) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.4, 1.8, 2.2, 2.6, 3.5])
-@pytest.mark.parametrize("command", ["solve", "report", "certify", "check"])
+@pytest.mark.parametrize("command", ["solve", "report", "certify", "check", "tradeoff"])
 def test_at_any_moment(command: str, after: float, case: str, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    ended = interrupted(after, command, case, *(["--out", str(page)] if command == "report" else []))
+    options = {"report": ["--out", str(page)], "tradeoff": ["--page", str(page), *OVER]}
+    ended = interrupted(after, command, case, *options.get(command, []))
     assert ended.status == 130, ended
     assert ended.seconds <= _AT_ONCE, ended
     assert "Traceback" not in ended.shown
@@ -117,3 +124,27 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
         assert word in words
     text = result.read_text(encoding="utf-8")
     assert '"status": "interrupted"' in text
+
+
+def test_an_interrupted_tradeoff_keeps_what_is_solved(case: str, tmp_path: Path) -> None:
+    files = {option: tmp_path / f"curve.{option}" for option in ("json", "csv", "page")}
+    outputs = [word for option, path in files.items() for word in (f"--{option}", str(path))]
+    ended = interrupted("\r2 of 200 values solved", "tradeoff", case, *OVER, "--starts", "2", *outputs)
+    assert ended.status == 130
+    assert ended.seconds <= _AT_ONCE, ended
+    result = load_result(files["json"])
+    assert isinstance(result, TradeoffResult)
+    points = result.points
+    solved = [point for point in points if point.status is Status.OPTIMAL]
+    assert 2 <= len(solved) < len(points) == 200
+    assert list(points[: len(solved)]) == solved
+    assert all(point.F is not None and math.isfinite(point.F) and point.parameters for point in solved)
+    rest = points[len(solved) :]
+    assert {(point.status, point.F, point.tasks, point.parameters) for point in rest} == {
+        (Status.INTERRUPTED, None, (None,), None)
+    }
+    words = f"interrupted: {len(solved)} of 200 values are solved"
+    assert words in plain(ended.shown)
+    assert words in files["page"].read_text(encoding="utf-8")
+    rows = list(csv.DictReader(files["csv"].read_text(encoding="utf-8").splitlines()))
+    assert [row["status"] for row in rows] == [point.status.value for point in points]

@@ -15,8 +15,8 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, json_data, result_of, solve
-from screwsynth.nlp.case.reader import find_case
 from screwsynth.nlp.case.settings import Search
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
 from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program

@@ -11,7 +11,23 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.models import Dimension, Model, hexapod, stewart_gough, three_upu
-from screwsynth.nlp import Case, Free, LegLength, Limits, Rotation, Task, formulate, solve
+from screwsynth.nlp import (
+    Case,
+    Free,
+    LegLength,
+    Limits,
+    Rotation,
+    Search,
+    Task,
+    certify,
+    evaluate,
+    formulate,
+    result_of,
+    solve,
+)
+from screwsynth.nlp.output.report.exploration import surroundings
+from screwsynth.nlp.output.report.report import report_of
+from screwsynth.nlp.output.report.slices import slices_of
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.program.sampling import starting_points
 
@@ -176,3 +192,27 @@ def test_narrow_ranges_are_answered_as_by_another_search() -> None:
 def test_a_thousand_narrow_cases() -> None:
     faults = {seed: fault for seed in range(1000) if (fault := fault_of(seed))}
     assert not faults
+
+
+def test_an_f_that_counts_as_zero_is_zero_everywhere() -> None:
+    # Six legs, parallel but for 1e-8, in a translation across them: F is 1e-16 of its terms, and the range so narrow
+    # that F is scaled by less than these.
+    corners = [(100 * math.cos(k), 100 * math.sin(k)) for k in range(6)]
+    parameters = {f"base_{k + 1}": [x + 3e-6, y, 0] for k, (x, y) in enumerate(corners)}
+    parameters |= {f"platform_{k + 1}": [x, y, 0] for k, (x, y) in enumerate(corners)}
+    case = Case(
+        model=hexapod(),
+        parameters=parameters,
+        position=[0, 0, Free(300, 300.001)],
+        rotation=Rotation(),
+        tasks=[Task.screw("min", axis=[1, 0, 0], pitch=math.inf)],
+        search=Search(starts=2),
+    )
+    solution = solve(case)
+    nlp, x = solution.outcomes[0].own.nlp, solution.x
+    F = nlp.evaluate(x)[0]
+    assert 1e-12 * nlp.objective_scale < F < 1e-12 * nlp.objective_size
+    assert evaluate(nlp, x).is_zero
+    assert not np.any(slices_of(nlp, x)[0].F)
+    assert "Here: F = 0 at" in str(surroundings(report_of("", solution, result_of(solution))))
+    assert "smaller than 0; the best point known has 0" in certify(solution).tasks[0].statement

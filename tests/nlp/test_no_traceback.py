@@ -13,7 +13,7 @@ import pytest
 from screwsynth.models import model_names, robot_function, stewart_gough
 from screwsynth.models.catalog import AmbiguousModelError
 from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, build_model, load_case
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 
 Run = Callable[..., tuple[int, str, str]]
 

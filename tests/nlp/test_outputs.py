@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from screwsynth.nlp import InputError
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.files import MANIFEST, write_folder
 
 Run = Callable[..., tuple[int, str, str]]
@@ -61,6 +61,61 @@ def test_a_picture_that_is_the_case_file(tmp_path: Path, cli: Run) -> None:
     path.write_text(TEXT, encoding="utf-8")
     refused(cli("solve", str(path), "--starts", "1", "--plot", str(path)), "--plot", "is the case file")
     assert path.read_text(encoding="utf-8") == TEXT
+
+
+# A robot whose poses and tasks stand in files of their own; the ending is that of a picture.
+NAMED = """\
+poses = "poses.svg"
+tasks = "sub/tasks.svg"
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = 12
+x2 = 8
+x3 = 30
+x4 = { min = 5, max = 20 }
+"""
+ROWS = {
+    "poses.svg": "x,y,z\n0,0,30\n",
+    "sub/tasks.svg": "sense,axis_x,axis_y,axis_z,point_x,point_y,point_z,pitch\nmax,0,0,1,0,0,6,1\n",
+}
+OVER = ("--over", "x1=11:12:2")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *COMMANDS,
+        ("solve", "CASE", "--csv", "OUT"),
+        ("solve", "CASE", "--plot", "OUT"),
+        ("evaluate", "CASE", "--csv", "OUT"),
+        *(("tradeoff", "CASE", *OVER, option, "OUT") for option in ("--json", "--csv", "--page", "--plot")),
+    ],
+    ids=" ".join,
+)
+def test_an_output_that_is_a_file_that_the_case_names(command: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
+    case, link = tmp_path / "case.toml", tmp_path / "link.svg"
+    (tmp_path / "sub").mkdir()
+    case.write_text(NAMED, encoding="utf-8")
+    for name, rows in ROWS.items():
+        (tmp_path / name).write_text(rows, encoding="utf-8")
+    link.symlink_to(tmp_path / "sub" / "tasks.svg")
+    for out in (tmp_path / "poses.svg", tmp_path / "sub" / "tasks.svg", link):
+        answer = cli(*[{"CASE": str(case), "OUT": str(out)}.get(word, word) for word in command])
+        refused(answer, command[-2], out.name, "is a file that the case names")
+    assert {name: (tmp_path / name).read_text(encoding="utf-8") for name in ROWS} == ROWS
+
+
+def test_codegen_over_a_file_that_the_case_names(tmp_path: Path, cli: Run) -> None:
+    case = tmp_path / "case.toml"
+    made = tmp_path / "made"
+    made.mkdir()
+    name = "Makefile"
+    (made / name).write_text(ROWS["poses.svg"], encoding="utf-8")
+    case.write_text(NAMED.replace("poses.svg", f"made/{name}").replace("sub/", ""), encoding="utf-8")
+    (tmp_path / "tasks.svg").write_text(ROWS["sub/tasks.svg"], encoding="utf-8")
+    refused(cli("codegen", str(case), "--out", str(made), "--force"), name, "is a file that the case names")
+    assert [(each.name, each.read_text(encoding="utf-8")) for each in made.iterdir()] == [(name, ROWS["poses.svg"])]
 
 
 @pytest.mark.parametrize(

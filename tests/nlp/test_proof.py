@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, read_proof
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.certificate.prooftree import TreeReader, read_claims

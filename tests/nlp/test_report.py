@@ -36,7 +36,7 @@ from screwsynth.models import (
     force_along,
 )
 from screwsynth.nlp import Case, Task, case_from_tables, evaluate, formulate, load_case, result_of, solve
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import judgement
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -684,33 +684,9 @@ def test_the_drawing_needs_no_script(page: Callable[..., Page]) -> None:
     assert "limb 1-" in drawn
 
 
-POSES = """
-[robot]
-model = "stewart-gough"
-[robot.parameters]
-x1 = 12
-x2 = 8
-x3 = 30
-x4 = { min = 5, max = 20 }
-[[pose]]
-position = [0, 0, 30]
-[[pose]]
-position = [6, 0, 33]
-[[pose]]
-position = [0, 5, 24]
-[[task]]
-sense = "SENSE"
-axis = [2, 2, 1]
-point = [2, 3, 6]
-pitch = 1
-[solve]
-starts = 2
-"""
-
-
 @pytest.mark.parametrize("sense", ["max", "min"])
-def test_page_has_every_pose_and_marks_the_worst(sense: str) -> None:
-    case = case_from_tables(tomllib.loads(POSES.replace("SENSE", sense)), name="poses", source="poses.toml")
+def test_page_has_every_pose_and_marks_the_worst(sense: str, three_poses: Callable[[str], str]) -> None:
+    case = case_from_tables(tomllib.loads(three_poses(sense)), name="poses", source="poses.toml")
     solution = solve(case)
     values = [evaluate(solution.nlp, solution.x, k).F for k in range(3)]
     found = Page(page_of(report_of("", solution, result_of(solution))))
@@ -728,9 +704,9 @@ def test_page_has_every_pose_and_marks_the_worst(sense: str) -> None:
 
 
 @pytest.mark.browser
-def test_slider_shows_each_pose(browser: Any, tmp_path: Path) -> None:
+def test_slider_shows_each_pose(browser: Any, tmp_path: Path, three_poses: Callable[[str], str]) -> None:
     case = tmp_path / "poses.toml"
-    case.write_text(POSES.replace("SENSE", "max"), encoding="utf-8")
+    case.write_text(three_poses("max"), encoding="utf-8")
     assert made(str(case), tmp_path / "page.html").returncode == 0
     browser.get((tmp_path / "page.html").as_uri())
     until(lambda: browser.execute_script("return document.documentElement.dataset.drawn === 'yes'"))

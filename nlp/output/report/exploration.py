@@ -17,7 +17,7 @@ from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
 from .curves import tradeoff_figures, tradeoff_rows
-from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 
@@ -128,7 +128,7 @@ def _slice(part: Part, each: Slice) -> Markup:
     inside = np.where(each.inside > 0, each.F, np.nan)
     width = values[-1] - values[0]
     at = settled(units.shown(float(x[each.variable]), variable.dimension), width)
-    here = settled(nlp.evaluate(x)[0], nlp.objective_scale, ZERO_F)
+    here = settled(nlp.evaluate(x)[0], nlp.objective_size, ZERO_F)
     unit = units.label(variable.dimension)
     finite = np.isfinite(each.F)
     if finite.any():
@@ -175,13 +175,6 @@ def _maps(report: Report, parts: Sequence[int]) -> Markup:
         "p", tag("label", "Variables: ", for_="pair"), tag("select", *options, id="pair"), class_="controls script"
     )
     shown, every = len(options), sum(part.pairs for part in report.parts)
-    picture = tag(
-        "div",
-        tag("p", "The map appears when its script has started.", class_="waiting script"),
-        id="map",
-        class_="map",
-        role="img",
-        aria_label="Map of F over two variables",
-    )
+    picture = script_frame("map", "map", "Map of F over two variables")
     few = tag("p", f"The first {shown} of {every} pairs are here.") if shown < every else None
     return join_markup([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])

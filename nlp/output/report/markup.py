@@ -89,6 +89,18 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
     return join_markup([shown, folded])
 
 
+def script_frame(key: str, name: str, words: str) -> Markup:
+    """Return the frame of a picture that a script draws, with words in its place until then.
+
+    Args:
+        key: identifier and class of the frame.
+        name: of the picture, for these words: ``"map"``.
+        words: text in place of the picture, for readers who do not see it.
+    """
+    waiting = tag("p", f"The {name} appears when its script has started.", class_="waiting script")
+    return tag("div", waiting, id=key, class_=key, role="img", aria_label=words)
+
+
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
     """Return JSON for a script element, with ``<``, ``>`` and ``&`` escaped: no text can end the element."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))

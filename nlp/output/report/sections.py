@@ -27,7 +27,7 @@ from ..pictures.style import RATE_COLOURS
 from .exploration import optima, surroundings
 from .frames import ViewData
 from .judgement import certificate_section, evidence_section, published_section
-from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
 from .poseviews import drawings, pose_controls
 from .report import Report
 
@@ -144,14 +144,7 @@ def _robot(report: Report) -> Markup:
     )
     picture = tag(
         "figure",
-        tag(
-            "div",
-            tag("p", "The picture appears when its script has started.", class_="waiting script"),
-            id="view",
-            class_="view",
-            role="img",
-            aria_label="The robot in three dimensions; the table below says the same in numbers.",
-        ),
+        script_frame("view", "picture", "The robot in three dimensions; the table below says the same in numbers."),
         drawings(report),
         buttons,
         # A copy of the picture is for printing, because browsers do not print WebGL.

@@ -169,6 +169,6 @@ def _values(nlp: Nlp, points: FloatArray) -> _Values:
         low = g >= (nlp.g_lower - _WITHIN * size)[:, None]
         high = g <= (nlp.g_upper + _WITHIN * size)[:, None]
     # What rounding leaves of F is 0.
-    settled = np.where(np.abs(F[0]) > ZERO_F * nlp.objective_scale, F[0], 0.0)
+    settled = np.where(np.abs(F[0]) > ZERO_F * nlp.objective_size, F[0], 0.0)
     values = np.where(np.isfinite(F[0]), settled, np.nan)
     return _Values(values, np.asarray(np.all(low & high, axis=0) & np.isfinite(values), dtype=np.float64))

@@ -1,0 +1,112 @@
+"""Files of cases: found by name, read as text and as tables, with the CSV files that they name.
+
+A case is named by its path; a shipped case also by its bare name.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ... import cases
+from ..errors import InputError, nearest
+from .csvrows import named_files
+
+#: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
+_LARGEST_FILE = 4 * 2**20
+_SHIPPED = Path(cases.__file__).parent
+
+
+def shipped_cases() -> tuple[str, ...]:
+    """Return the names of the cases that come with the package, in order."""
+    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
+
+
+def find_case(name: str) -> Path:
+    """Return the file of a case.
+
+    Args:
+        name: path of the file, or the bare name of a shipped case.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    try:
+        path = _file_of(name)
+    except OSError as error:  # such as a name that is too long
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if path is None:
+        beside = Path(f"{name}.toml")
+        hint = f"did you mean {beside}?" if name and beside.is_file() else nearest(name, shipped_cases())
+        raise InputError(
+            f"{name or 'an empty name'}: no such file, and no case of this name comes with screwsynth; {hint}"
+        )
+    return path
+
+
+def _file_of(name: str) -> Path | None:
+    """Return the file with a path or a bare name, or None where there is none.
+
+    Raises:
+        InputError: the path is a folder's.
+    """
+    path = Path(name)
+    if name and path.is_dir():
+        raise InputError(f"{name}: is a folder, not a case file")
+    if name and path.exists():
+        return path
+    return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a case's file; a byte order mark is left out, and line ends are those of Unix.
+
+    Raises:
+        InputError: the file cannot be read, is too large, or is no UTF-8 text.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if len(content) > _LARGEST_FILE:
+        raise InputError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def tables_of(path: Path, text: str) -> dict[str, Any]:
+    """Return the tables of a case file's text.
+
+    Raises:
+        InputError: the text is not valid TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def inputs_of(path: Path, tables: Mapping[str, Any]) -> Mapping[Path, str]:
+    """Return the files that a case is read from, as :func:`case_inputs`, from its file and that file's tables."""
+    return {**dict.fromkeys(named_files(tables, path.parent), "a file that the case names"), path: "the case file"}
+
+
+def case_inputs(name: str) -> Mapping[Path, str]:
+    """Return the files that a case is read from, and the words for each in messages: its own, and those that it names.
+
+    A pipe or device can be read once only, and is left to who reads the case: the files that it names are not known.
+
+    Args:
+        name: as for :func:`find_case`.
+
+    Raises:
+        InputError: the file cannot be read, or is not valid TOML.
+    """
+    path = find_case(name)
+    return inputs_of(path, tables_of(path, read_text(path)) if path.is_file() else {})
