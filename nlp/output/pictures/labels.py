@@ -28,6 +28,8 @@ _ROOM, _HALF_LIMB = 2.0, 4.0
 _OVERLAP, _COVERED, _FAR = 50.0, 6.0, 0.12
 #: A word on a limb that is not its own is wrong, and a leader line across one misleads.
 _ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 6.0
+#: A leader line that ends where another limb is too might mean that one.
+_AMBIGUOUS = 30.0
 #: A word beyond the axes is cut off, which is worse than an overlap.
 _OUTSIDE = 600.0
 #: A leader line is drawn where the word is farther from its place than this, in points.
@@ -46,7 +48,8 @@ class Label:
         size: of the letters, points.
         bold: whether they are bold.
         name: ``gid`` of the artist.
-        owner: name of the limb that the word belongs to; it then has a leader line.
+        owner: name of the limb that the word belongs to; empty for none.
+        is_led: whether a leader line joins the word to its place.
     """
 
     text: str
@@ -57,6 +60,7 @@ class Label:
     bold: bool = False
     name: str = ""
     owner: str = ""
+    is_led: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +139,7 @@ def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obs
         place, start = _best_place(label, half, axes.transData.transform(label.at), sheet)
         text.set_position(tuple(back.transform(place)))
         sheet.taken.append((*(place - half), *(place + half)))
-        if label.owner:
+        if label.is_led:
             end = _edge_towards(place, half, start)
             if np.linalg.norm(end - start) > _LED * sheet.per_point:
                 sheet.leaders.append((*start, *end))
@@ -153,7 +157,14 @@ def _draw_leader(axes: Axes, line: FloatArray, label: Label) -> None:
         )
     )
     axes.add_line(
-        Line2D(line[:, 0], line[:, 1], color=label.color, linewidth=0.8, zorder=99, gid=f"leader {label.owner}")
+        Line2D(
+            line[:, 0],
+            line[:, 1],
+            color=label.color,
+            linewidth=0.8,
+            zorder=99,
+            gid=f"leader {label.owner or label.text}",
+        )
     )
     axes.plot([line[0, 0]], [line[0, 1]], marker="o", markersize=2.6, color=label.color, zorder=99, gid="leader dot")
 
@@ -175,7 +186,7 @@ def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Shee
         sheet: what is already on the paper.
     """
     best, at, least = places[0], places[0], math.inf
-    distances = (*_DISTANCES, *_LED_DISTANCES) if label.owner else _DISTANCES
+    distances = (*_DISTANCES, *_LED_DISTANCES) if label.is_led else _DISTANCES
     for place in places:
         for distance in distances:
             for step in range(_DIRECTIONS):
@@ -213,10 +224,14 @@ def _cost(label: Label, middle: FloatArray, half: FloatArray, place: FloatArray,
     cost += _COVERED * int(np.count_nonzero(segments_in_box(sheet.segments[~limbs], box)))
     if sheet.leaders:
         cost += _OVERLAP * int(np.count_nonzero(segments_in_box(np.array(sheet.leaders), box)))
-    if label.owner:
+    if label.is_led:
         leader = np.array([*place, *_edge_towards(middle, half, place)])
         others = sheet.segments[limbs & (sheet.owners != label.owner)]
         cost += _LEADER_CROSSES * int(np.count_nonzero(segments_cross(others, leader)))
+        if label.owner:
+            # Where two limbs cross on paper, a line to one of them might mean the other.
+            near = (*(place - 1.5 * room), *(place + 1.5 * room))
+            cost += _AMBIGUOUS * int(np.count_nonzero(segments_in_box(others, near)))
         if sheet.leaders:
             cost += _OVERLAP * int(np.count_nonzero(segments_cross(np.array(sheet.leaders), leader)))
         for other in sheet.taken:

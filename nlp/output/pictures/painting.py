@@ -250,7 +250,8 @@ class Panel:
         for mark, points in zip(self.drawing.model.scene.marks, self.drawing.posture.marks, strict=True):
             name, colour = f"mark {mark.parameter}", RED
             if mark.kind is MarkKind.POINT:
-                self._canvas.label(mark.parameter, points[0], self._canvas.outwards(points[0]), colour, 9.0, bold=True)
+                away = self._canvas.outwards(points[0])
+                self._canvas.label(mark.parameter, points[0], away, colour, 9.0, bold=True, is_led=True)
             elif mark.kind is MarkKind.LENGTH:
                 self._canvas.arrow(points[0], points[1], name, colour, 1.6, 55)
                 self._canvas.label(mark.parameter, points.mean(axis=0), np.array([0.0, 1.0]), colour, 11.0, bold=True)
