@@ -159,7 +159,7 @@ def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedPr
         ("p_z", "max"),
     ]
     for side in evidence["active"]:
-        assert set(side) == {"name", "bound", "value", "multiplier"}
+        assert set(side) == {"name", "bound", "value", "unit", "multiplier"}
     assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
     starts = result["starts"]
     assert (starts["run"], starts["converged"]) == (4, 4)
