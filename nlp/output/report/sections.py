@@ -194,7 +194,7 @@ def _rates(view: ViewData) -> Markup:
         part = rate / largest
         bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
         share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
-        cells = [f"{frame['lengths'][k]:.6g}", f"{rate:+.6g}", bar, share]
+        cells = [f"{frame['lengths'][k]:.5g}", f"{rate:+.6g}", bar, share]
         kinds = ["length number", "rate number", "bars", "share number"]
         body.append(
             tag(
