@@ -83,3 +83,14 @@ def rate_unit(twist: Iterable[float], units: Units) -> str:
     if omega == 0 and abs(v - 1) <= _UNIT:
         return f"{units.length}/{units.length}"
     return f"{units.length} per unit of time"
+
+
+def objective_unit(twists: Iterable[Iterable[float]], units: Units) -> str:
+    """Return the unit of F: that of the rates, squared; an empty text where tasks do not agree in it.
+
+    Args:
+        twists: (6,) of each task over which F is taken.
+        units: units of the case.
+    """
+    found = {rate_unit(twist, units) for twist in twists}
+    return f"({found.pop()})²" if len(found) == 1 else ""

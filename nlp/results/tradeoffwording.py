@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...models import component_names, frozen_array
 from ..case.case import Case
 from ..solver.status import Status
-from ..units import rate_unit
+from ..units import objective_unit
 from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
@@ -96,8 +96,8 @@ def objective_label(case: Case, task: int | None = None) -> str:
         task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
     """
     tasks = case.tasks if task is None else [case.tasks[task]]
-    units = {rate_unit(frozen_array(each.twist, (6,)), case.units) for each in tasks}
-    return f"F, ({units.pop()})²" if len(units) == 1 else "F"
+    unit = objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
+    return f"F, {unit}" if unit else "F"
 
 
 def tradeoff_csv(result: TradeoffResult) -> str:

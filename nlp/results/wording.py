@@ -11,7 +11,7 @@ from ..case.task import Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import CURVED, PointKind
 from ..solver.status import Status
-from ..units import Units
+from ..units import Units, objective_unit
 from .rounding import number, robot_size, settled, task_F
 from .text import Line, Tone
 
@@ -104,21 +104,23 @@ def _triple(values: Sequence[float], size: float) -> str:
     return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 
-def headline(result: SolveResult, case: Case | None = None) -> Line:
-    """Return F, or the status of a solve without an answer.
+def headline(result: SolveResult, case: Case) -> Line:
+    """Return F with its unit, or the status of a solve without an answer.
 
     A singular answer has another tone, unless its case expects it.
 
     Args:
         result: of a task.
-        case: the case; None where the tone does not matter.
+        case: the case.
     """
     robot = result.robot
+    task = None if robot is None else robot.task
+    unit = "" if task is None else f" {objective_unit([task.motion.twist], case.units)}"
     if result.status is Status.INTERRUPTED:
         best = (
             ""
             if result.reached is None or result.reached.F is None
-            else f": best F so far = {number(result.reached.F)}"
+            else f": best F so far = {number(result.reached.F)}{unit}"
         )
         return Line(f"interrupted{best}", tone=Tone.NO_ANSWER)
     if result.F is None:
@@ -135,12 +137,12 @@ def headline(result: SolveResult, case: Case | None = None) -> Line:
     tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER
     # What is left of an F that nothing resists is rounding.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
-    return Line(number(F), tone=tone, before=f"{word} F = ", after=f"   ({status}{over})")
+    return Line(number(F), tone=tone, before=f"{word} F = ", after=f"{unit}   ({status}{over})")
 
 
-def is_unasked_singularity(robot: RobotData | None, case: Case | None) -> bool:
+def is_unasked_singularity(robot: RobotData | None, case: Case) -> bool:
     """Return whether a robot is singular, at one of its poses at least, and its case does not expect that."""
-    if robot is None or (case is not None and case.expect.singular):
+    if robot is None or case.expect.singular:
         return False
     return robot.singular or (robot.several is not None and any(pose.singular for pose in robot.several.poses))
 

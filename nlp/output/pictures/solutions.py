@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from ....models import frozen_array
 from ...case.task import Sense
-from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ...solver.status import Status
+from ...units import objective_unit
 from .drawing import Drawing, drawing_of
 from .poses import pose_index, states_at_poses, worst_pose
 
@@ -39,11 +40,11 @@ def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
 def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
     """Return the result for one task in one line."""
     if found.combination is None:
-        return _headline(outcome.own)
+        return _headline(outcome)
     if not found.all_solved:
         return f"{found.status.value}: this is not what was asked for"
     method, count = found.combination.method.value, len(found.outcomes)
-    return f"{outcome.task.name}: F = {outcome.F:.7g}, {method} of {count} tasks"
+    return f"{outcome.task.name}: F = {outcome.F:.7g} {_unit(outcome)}, {method} of {count} tasks"
 
 
 def _pose_words(outcome: TaskOutcome, index: int) -> str:
@@ -57,12 +58,18 @@ def _pose_words(outcome: TaskOutcome, index: int) -> str:
     return f" ({case.over_poses.value} over {len(states)} poses). Shown: pose {index + 1}{own}{worst}"
 
 
-def _headline(solution: ProgramSolution) -> str:
+def _headline(outcome: TaskOutcome) -> str:
     """Return the result in one line."""
+    solution = outcome.own
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"
     value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F
+    words = f"F = {value:.7g} {_unit(outcome)}"
     if solution.status is not Status.OPTIMAL:
-        return f"F = {value:.7g}"
-    word = "largest" if solution.nlp.sense is Sense.MAX else "smallest"
-    return f"{word} F = {value:.7g}"
+        return words
+    return f"{'largest' if solution.nlp.sense is Sense.MAX else 'smallest'} {words}"
+
+
+def _unit(outcome: TaskOutcome) -> str:
+    """Return the unit of F of a task."""
+    return objective_unit([frozen_array(outcome.task.twist, (6,))], outcome.own.nlp.case.units)

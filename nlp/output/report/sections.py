@@ -53,7 +53,7 @@ def answer(report: Report) -> Markup:
     """Return the answer for the top of the page, or the sentence that there is no answer."""
     result = report.result
     if isinstance(result, SolveResult):
-        lines = [headline(result).words]
+        lines = [headline(result, report.case).words]
     else:
         combined = result.combined
         value = "" if combined.value is None else f", value {number(combined.value)}"
@@ -240,7 +240,7 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"“{report.parts[k].name}” by itself"))
-        parts.append(paragraphs([headline(own)]))
+        parts.append(paragraphs([headline(own, case)]))
         parts += _task_tables(case, own, f"design-{k + 1}")
     return join_markup(parts)
 
