@@ -31,6 +31,7 @@ from ...units import Units
 from ..table import Table, Vector
 from ..toml import TomlValue
 from .constraint import BoundedConstraint, Reading, between
+from .form import Call, Form
 from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
 
 #: Three numbers.
@@ -49,6 +50,12 @@ def _slope(value: float) -> float:
 
 def _minus_cosine(angle: SX) -> SX:
     return -ca.cos(angle)
+
+
+def _minus_cosine_of_leg(axis_and_span: SX) -> SX:
+    """Return minus the cosine, (1, 1), of the angle between a unit axis and a leg's span, (6, 1) together."""
+    axis, span = axis_and_span[:3], axis_and_span[3:]
+    return -(ca.dot(axis, span) / ca.norm_2(span))
 
 
 #: ``-cos(angle)`` read as the angle.
@@ -207,8 +214,8 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         """Return the cosine of each joint's angle."""
         robot = pose.robot
         for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
-            cosine = ca.dot(self._to_world(axis, robot.rotation), leg.span) / ca.norm_2(leg.span)
-            yield between(f"{self.key} limb {leg.name}{pose.where}", -cosine, _ANGLE, self.key, upper=self.max)
+            cosine = Call(Form(_minus_cosine_of_leg), ca.vertcat(self._to_world(axis, robot.rotation), leg.span))
+            yield between(f"{self.key} limb {leg.name}{pose.where}", cosine, _ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
         """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""
