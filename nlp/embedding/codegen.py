@@ -22,15 +22,14 @@ from ...models import Dimension, FloatArray
 from .. import __version__
 from ..case.case import Case
 from ..case.task import Sense
-from ..errors import CaseError, InputError
+from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from ..program.program import Program
 from ..program.sampling import starting_points
-from ..solver.multistart import solve_program
-from ..solver.status import Status
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .looptext import casadi_work, loop_texts, loop_work
 from .stages import StagedFunctions, stage_functions
+from .subject import Subject, find_subject, magnitude_of
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Endings of the files whose names begin with the case's prefix, and their templates.
@@ -42,8 +41,6 @@ _PARTS = {
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
 }
-#: Ending of the file that a case with limits on singular values needs in addition.
-_SPECTRUM = "-spectrum.c"
 #: Number of starting points in the solver's table.
 _SEEDS = 16
 #: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
@@ -60,7 +57,7 @@ _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """Generate the files of a case's C folder.
 
-    The twist is a run-time argument, as is everything fixed; its default is that of the case's first task.
+    Twists and weights of tasks are run-time arguments, as is everything fixed.
 
     Args:
         case: the case.
@@ -70,15 +67,17 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         Text by file name.
 
     Raises:
-        CaseError: the case contradicts itself, or has several poses.
+        CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
         InputError: the case's functions have no finite value at any point that is tried.
     """
-    if case.pose_count > 1:
-        raise CaseError("pose", "gives several poses; C is generated for one", case.pose_count, case.source)
-    nlp = formulate(case)
-    staged = stage_functions(nlp.program, f"{identifier(case.name)}_CASADI")
-    names = _substitutions(nlp, staged)
-    parts = _PARTS | ({_SPECTRUM: "spectrum.c"} if int(names["nspectra"]) else {})
+    subject = find_subject(case)
+    staged = stage_functions(subject.nlp.program, magnitude_of(subject.nlp), f"{identifier(case.name)}_CASADI")
+    names = _substitutions(subject, staged)
+    parts = dict(_PARTS)
+    if staged.loops:
+        parts["-loops.c"] = "loops.c"
+    if staged.loops.spectra:
+        parts["-spectrum.c"] = "spectrum.c"
     files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _fill_template(f"{name}.in", names)
@@ -124,17 +123,18 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
         return {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
 
 
-def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
+def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     """Return the texts for the templates' placeholders."""
+    nlp, optimum = subject
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
     size = len(prefix) + len("_CASADI_")
     functions = staged.all
-    solution = solve_program(nlp, case.search)
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
-    work = max(1, *(function.sz_w() for function in functions))
+    rows = len(program.model.wrenches)
+    work = casadi_work(staged) + loop_work(staged, rows, n)
     # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
     solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
@@ -147,14 +147,14 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "length": comment_text(case.units.length),
         "n": str(n),
         "np": str(len(program.arguments)),
-        "m": str(len(program.model.wrenches)),
+        "m": str(rows),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
         "twist": str(program.places.twists[0].start),
         "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
-        **_spectrum_texts(program, prefix),
+        **loop_texts(staged, prefix),
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
@@ -167,29 +167,12 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix),
         "count": str(points),
-        "has_optimum": str(int(solution.status is Status.OPTIMAL)),
+        "has_optimum": str(int(optimum is not None)),
         # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
-        "optimum": f"{solution.F:.9g}" if solution.status is Status.OPTIMAL else "0",
+        "optimum": "0" if optimum is None else f"{optimum:.9g}",
         "optimum_scale": f"{nlp.objective_size:.9g}",
         "references": references,
         "operations": "\n".join(f"| `{f.name()[size:]}` | {f.n_instructions()} |" for f in functions),
-    }
-
-
-def _spectrum_texts(program: Program, prefix: str) -> dict[str, str]:
-    """Return the texts for the placeholders about limits on singular values."""
-    found = [(k, each.spectral) for k, each in enumerate(program.constraints) if each.spectral is not None]
-    row = f"| `{prefix}{_SPECTRUM}` | limits on singular values of J, with their derivatives, by loops |\n"
-    return {
-        "nspectra": str(len(found)),
-        "spectrum_lengths": ", ".join(repr(float(spectral.length)) for _, spectral in found),
-        "spectrum_places": ", ".join(str(k) for k, _ in found),
-        "spectrum_kinds": ", ".join(str(spectral.end.value) for _, spectral in found),
-        "spectrum_object": f" {prefix}-spectrum.o" if found else "",
-        "spectrum_source": f" {prefix}{_SPECTRUM}" if found else "",
-        "spectrum_row": row if found else "",
-        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
-        "limits_close": "1e-10" if found else "1e-12",
     }
 
 

@@ -1,0 +1,114 @@
+"""C text of a program's loops: their tables, the calls of their functions, and the sizes of their workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import casadi as ca
+from casadi import SX
+
+from .ctext import short_table
+from .loops import Loop
+from .stages import StagedFunctions
+
+
+def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
+    """Return the texts for the placeholders about loops.
+
+    Args:
+        staged: the functions.
+        prefix: beginning of the names in C.
+    """
+    loops, parts = staged.loops, []
+    if loops:
+        parts.append("loops")
+    if loops.spectra:
+        parts.append("spectrum")
+    explained = {
+        "loops": "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`",
+        "spectrum": "limits on singular values of J, with their derivatives, by loops",
+    }
+    return {
+        "has_loops": str(int(bool(loops))),
+        "nspectra": str(len(loops.spectra)),
+        "spectrum_lengths": ", ".join(repr(float(each.spectral.length)) for each in loops.spectra),
+        "spectrum_kinds": ", ".join(str(each.spectral.end.value) for each in loops.spectra),
+        "loop_objects": "".join(f" {prefix}-{part}.o" for part in parts),
+        "loop_sources": "".join(f" {prefix}-{part}.c" for part in parts),
+        "loop_rows": "".join(f"| `{prefix}-{part}.c` | {explained[part]} |\n" for part in parts),
+        "nentries": str(loops.entries.numel()),
+        "nslots": str(loops.slot_count),
+        "nplain": str(len(loops.plain)),
+        "ninner": str(len(loops.inner)),
+        "nloops": str(len(loops.all)),
+        "has_objective": str(int(loops.has_objective)),
+        "by_direction": str(int(staged.by_direction)),
+        "constants_at": str(staged.prepare.numel_out(0) - loops.constants.numel()),
+        "loop_tables": _tables(staged),
+        "loop_cases": _cases(staged.of_loops),
+        "most_inputs": str(_most(loop.inputs for loop in loops.all)),
+        "most_constants": str(_most(loop.constants for loop in loops.all)),
+        "most_values": str(_most(loop.values for loop in loops.all)),
+        "casadi_work": str(casadi_work(staged)),
+        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
+        "limits_close": "1e-10" if loops.spectra else "1e-12",
+    }
+
+
+def casadi_work(staged: StagedFunctions) -> int:
+    """Return the number of doubles in the workspace of CasADi's functions."""
+    return max(1, *(function.sz_w() for function in staged.all))
+
+
+def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
+    """Return the number of doubles that ``loops.c`` divides its workspace into, beside CasADi's own; see there."""
+    loops = staged.loops
+    if not loops:
+        return 0
+    k, q, r = (
+        _most(each)
+        for each in (
+            [loop.inputs for loop in loops.all],
+            [loop.constants for loop in loops.all],
+            [loop.values for loop in loops.all],
+        )
+    )
+    plain, slots = len(loops.plain), loops.slot_count
+    first = slots * (1 + n) + k + q + r + r * k + plain * (1 + n)
+    second = slots + plain + loops.entries.numel() + k * k + k * n + n * n + n
+    of_j = 6 * rows
+    return first + second + (3 * of_j + 2 * of_j * n + n * n if loops.spectra else 0)
+
+
+def _most(vectors: Iterable[SX]) -> int:
+    """Return the largest length of vectors (k, 1), at least 1."""
+    return max((int(each.numel()) for each in vectors), default=0) or 1
+
+
+def _tables(staged: StagedFunctions) -> str:
+    """Return the constant tables of slots, constants and outputs."""
+    loops, blocks, lines = staged.loops, [], []
+    for index, loop in enumerate(loops.all):
+        names = [f"{name}{index}" for name in ("slots", "constants", "outputs")]
+        for name, table in zip(names, (loop.slots, loop.constant_places, loop.outputs), strict=True):
+            blocks.append(short_table(name, [value for row in table for value in row]))
+        lines.append(f"    {{{_counts(loop)}, {', '.join(names)}}},")
+    lines.append("    {0, 0, 0, 0, 0, 0, 0}};")
+    blocks.append("static const loop loops[LOOPS + 1] = {\n" + "\n".join(lines))
+    blocks.append(short_table("plain_places", loops.plain))
+    if loops.spectra:
+        blocks.append(short_table("spectral_places", [each.place for each in loops.spectra]))
+        blocks.append(short_table("spectral_slots", [slot for each in loops.spectra for slot in each.slots]))
+    return "\n".join(blocks) + "\n"
+
+
+def _counts(loop: Loop) -> str:
+    """Return the numbers of calls, inputs, constants and values."""
+    sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
+    return ", ".join(str(size) for size in sizes)
+
+
+def _cases(functions: Sequence[tuple[ca.Function, ca.Function]]) -> str:
+    """Return the cases of the switch that calls the loops' functions."""
+    flat = [function for pair in functions for function in pair]
+    return "".join(f"    case {i}: return {each.name()}(arg, res, 0, work, 0);\n" for i, each in enumerate(flat))
