@@ -7,16 +7,16 @@ row and the sums of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import SX
 
 from ...models import Model, RobotInstance, Substitution, WrenchKind, homogenised, instantiate
-from ...models.instance import magnitude, objective, rates
-from ...models.wrench import Wrench
+from ...models.instance import LegInstance, magnitude, objective, rates
+from ...models.wrench import Wrench, force_along
 from ..case.limits.form import Call, Form
 from ..program.program import Program
 
@@ -25,6 +25,10 @@ _DEPTH = 1000
 #: Operations of the second derivatives of all calls of one form up to which they stay single operations in C. A loop
 #: saves little then, and single operations are faster.
 _FEW = 2000
+
+
+#: A row of J from its inputs, as :func:`_inputs_of_row` returns them.
+RowBuild: TypeAlias = Callable[[SX], Wrench]
 
 
 class InnerCall(NamedTuple):
@@ -99,31 +103,20 @@ def find_calls(program: Program) -> Calls:
     several = len(program.robots) > 1
     is_spectral = any(each.spectral is not None for each in program.constraints)
     matrices = tuple(_central_rows(robot) for robot in program.robots) if is_spectral else ()
-    if several:
-        inner = _calls_at_poses(program.robots, program.model, matrices)
-    else:
-        inner = _calls_of_rows(program.robot)
-    values = {
-        each.element_hash()
-        for item in inner
-        for each in ca.vertsplit(item.values)
-        if not each.is_constant()
-    }
+    inner = _inner_calls(program, matrices)
+    values = {each.element_hash() for item in inner for each in ca.vertsplit(item.values) if not each.is_constant()}
     final = []
     for place, constraint in enumerate(program.constraints):
         if several and constraint.spectral is None and constraint.expression.element_hash() in values:
             final.append(FinalCall(Call(Form(_same), constraint.expression), place))
         elif constraint.call is not None:
             final.append(FinalCall(constraint.call, place))
-    of_objective = program.objective_call
-    if several:
-        chosen = [each for members in by_form(final) if _is_worthwhile(program, members, values) for each in members]
-        takes_F = of_objective is not None
-    else:
-        chosen = [each for members in by_form(final) if _is_worthwhile(program, members, set()) for each in members]
-        takes_F = any(each.element_hash() in values for item in chosen for each in ca.vertsplit(item.call.inputs))
-    if of_objective is not None and takes_F:
-        chosen.append(FinalCall(of_objective, len(program.constraints)))
+    taken = values if several else set()
+    chosen = [each for members in by_form(final) if _is_worthwhile(program, members, taken) for each in members]
+    of_F = {each.element_hash() for robot in program.robots for each in ca.vertsplit(robot.F)}
+    takes_F = several or any(each.element_hash() in of_F for item in chosen for each in ca.vertsplit(item.call.inputs))
+    if program.objective_call is not None and takes_F:
+        chosen.append(FinalCall(program.objective_call, len(program.constraints)))
     return Calls(inner, tuple(chosen), matrices)
 
 
@@ -136,65 +129,98 @@ def _central_rows(robot: RobotInstance) -> SX:
     return ca.vec(ca.horzcat(*homogenised(robot.jacobian, robot.position, 1.0)).T)
 
 
-def _calls_at_poses(robots: Sequence[RobotInstance], model: Model, matrices: Sequence[SX]) -> tuple[InnerCall, ...]:
-    """Return the calls that give each robot's numbers, and the spans of its legs."""
-    calls, form, span = [], Form(RobotValues(model)), Form(span_of_leg)
-    for k, robot in enumerate(robots):
-        values = robot_values(robot)
-        if matrices:
-            values[values.numel() - matrices[k].numel() :] = matrices[k]
-        calls.append(InnerCall(Call(form, robot.inputs), values))
-        for leg, first in zip(robot.legs, robots[0].legs, strict=True):
-            # No pose changes the joint centres, but they are other expressions at each.
-            platform, base = _first_if_same(leg.platform, first.platform), _first_if_same(leg.base, first.base)
-            inputs = ca.veccat(robot.position, robot.rotation, platform, base)
-            calls.append(InnerCall(Call(span, inputs), leg.span))
-    return tuple(calls)
+def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, ...]:
+    """Return the calls that give spans of legs, rates, F, and with several poses the robot's other numbers.
 
-
-def _calls_of_rows(robot: RobotInstance) -> tuple[InnerCall, ...]:
-    """Return the calls that give each row's rates, and those that give F and F without cancellation from them."""
-    at = robot.inputs.numel() - 6 * robot.F.numel()
-    length, calls, terms = robot.inputs[at - 1], [], []
-    for i, row in enumerate(robot.rows):
-        form = Form(_of_force if row.kind is WrenchKind.FORCE else _of_couple)
-        for j in range(robot.F.numel()):
-            twist = robot.inputs[at + 6 * j : at + 6 * j + 6]
-            inputs = ca.vertcat(row.force, row.moment, row.square, robot.position, length, twist)
-            term = SX.sym("term", 2)
-            calls.append(InnerCall(Call(form, inputs), ca.vertcat(robot.rates[i, j], term)))
-            terms.append(term)
-    for j in range(robot.F.numel()):
-        own = terms[j :: robot.F.numel()]
-        for k, total in enumerate((robot.F[j], robot.magnitude[j])):
-            calls.append(InnerCall(Call(Form(ca.sum1), ca.vertcat(*[term[k] for term in own])), total))
-    return tuple(calls)
-
-
-def _of_force(inputs: SX) -> SX:
-    """Return a row's rate, its square, and the row's part of F without cancellation, from force, moment, square and twist.
-
-    The position and the characteristic length are before the twist.
+    Of two calls with the same value the first one is used.
     """
-    return _of_row(WrenchKind.FORCE, inputs)
+    calls: list[InnerCall] = []
+    first = program.robots[0].legs
+    for k, robot in enumerate(program.robots):
+        legs = [_with_first_joints(leg, own) for leg, own in zip(robot.legs, first, strict=True)]
+        for leg in legs:
+            inputs = ca.veccat(robot.position, robot.rotation, leg.platform, leg.base)
+            calls.append(InnerCall(Call(Form(span_of_leg), inputs), leg.span))
+        rows = [_inputs_of_row(row, legs) for row in robot.rows]
+        if len(program.robots) == 1 or all(row.form == _FORCE_OF_LEG for row in rows):
+            calls += _calls_of_rows(robot, rows)
+        if len(program.robots) > 1:
+            values = robot_values(robot)
+            if matrices:
+                values[values.numel() - matrices[k].numel() :] = matrices[k]
+            calls.append(InnerCall(Call(Form(RobotValues(program.model)), robot.inputs), values))
+    return tuple(calls)
 
 
-def _of_couple(inputs: SX) -> SX:
-    """Return the same as :func:`_of_force` of a couple."""
-    return _of_row(WrenchKind.COUPLE, inputs)
+def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
+    """Return a leg with the expressions of its joint centres at the first pose: no pose changes the centres."""
+    same = all(ca.is_equal(here, there, _DEPTH) for here, there in ((leg.base, first.base), (leg.platform, first.platform)))
+    return replace(leg, base=first.base, platform=first.platform) if same else leg
 
 
-def _of_row(kind: WrenchKind, inputs: SX) -> SX:
-    row = [Wrench("", kind, inputs[:3], inputs[3:6], inputs[6])]
-    position, length, twist = inputs[7:10], inputs[10], inputs[11:]
-    return ca.vertcat(
-        rates(row, twist, length), objective(row, twist, length), magnitude(row, twist, position, length)
-    )
+class _RowInputs(NamedTuple):
+    """A row: the form of its rates, and the inputs that determine the row."""
+
+    form: Form
+    inputs: SX
 
 
-def _first_if_same(here: SX, first: SX) -> SX:
-    """Return the expressions at the first pose where they are the same as here."""
-    return first if ca.is_equal(here, first, _DEPTH) else here
+def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> _RowInputs:
+    """Return the inputs of a row: base and span of a leg that it acts along, else force, moment and square."""
+    for leg in legs:
+        along = force_along(leg.name, leg.base, leg.span)
+        if row.kind is WrenchKind.FORCE and row.limb == leg.name:
+            pairs = ((row.force, along.force), (row.moment, along.moment), (row.square, along.square))
+            if all(ca.is_equal(one, other, _DEPTH) for one, other in pairs):
+                return _RowInputs(_FORCE_OF_LEG, ca.vertcat(leg.base, leg.span))
+    form = _FORCE if row.kind is WrenchKind.FORCE else _COUPLE
+    return _RowInputs(form, ca.vertcat(row.force, row.moment, row.square))
+
+
+def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[InnerCall]:
+    """Return the calls that give each row's rates, and those that give F and F without cancellation from them."""
+    tasks = robot.F.numel()
+    at = robot.inputs.numel() - 6 * tasks
+    length, calls = robot.inputs[at - 1], []
+    for j in range(tasks):
+        twist, terms, sizes = robot.inputs[at + 6 * j : at + 6 * j + 6], SX.sym("term", len(rows)), SX.sym("size", len(rows))
+        for i, row in enumerate(rows):
+            inputs = ca.vertcat(length, twist, row.inputs)
+            calls.append(InnerCall(Call(row.form, inputs), ca.vertcat(robot.rates[i, j], terms[i])))
+            form = Form(_size_of_row, row.form.numbers)
+            calls.append(InnerCall(Call(form, ca.vertcat(length, twist, robot.position, row.inputs)), sizes[i]))
+        calls.append(InnerCall(Call(Form(ca.sum1), terms), robot.F[j]))
+        calls.append(InnerCall(Call(Form(ca.sum1), sizes), robot.magnitude[j]))
+    return calls
+
+
+def _force_of_leg(inputs: SX) -> Wrench:
+    return force_along("", inputs[:3], inputs[3:])
+
+
+def _force(inputs: SX) -> Wrench:
+    return Wrench("", WrenchKind.FORCE, inputs[:3], inputs[3:6], inputs[6])
+
+
+def _couple(inputs: SX) -> Wrench:
+    return Wrench("", WrenchKind.COUPLE, inputs[:3], inputs[3:6], inputs[6])
+
+
+def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
+    """Return a row's rate and its part of F, (2, 1), from characteristic length, twist and the row's inputs."""
+    length, twist, rows = inputs[0], inputs[1:7], [row(inputs[7:])]
+    return ca.vertcat(rates(rows, twist, length), objective(rows, twist, length))
+
+
+def _size_of_row(inputs: SX, row: RowBuild) -> SX:
+    """Return a row's part of F without cancellation from characteristic length, twist, position and the row's inputs."""
+    return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
+
+
+_FORCE_OF_LEG, _FORCE, _COUPLE = (Form(_rate_of_row, (row,)) for row in (_force_of_leg, _force, _couple))
+
+
+
 
 
 def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[int]) -> bool:

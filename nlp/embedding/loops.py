@@ -196,11 +196,15 @@ class _Tables:
         return max((1 + self._depth(self._calls.inner[k].call) for k in below), default=0)
 
     def _kinds(self, calls: Sequence[Call]) -> list[float | bool | None]:
-        """Return for each input a number that is the same in all calls, True if none depends on x, else None."""
-        x = self._program.x
+        """Return for each input a number if it is that in all calls or unused, True if none depends on x, else None."""
+        x, form = self._program.x, calls[0].form
+        u = SX.sym("u", calls[0].inputs.numel())
+        used = ca.which_depends(form(u), u, 1, False)
         kinds: list[float | bool | None] = []
-        for row in zip(*(ca.vertsplit(call.inputs) for call in calls), strict=True):
-            if all(each.is_constant() for each in row) and len({float(each) for each in row}) == 1:
+        for i, row in enumerate(zip(*(ca.vertsplit(call.inputs) for call in calls), strict=True)):
+            if not used[i]:
+                kinds.append(0.0)
+            elif all(each.is_constant() for each in row) and len({float(each) for each in row}) == 1:
                 kinds.append(float(row[0]))
             elif any(each.element_hash() in self._values for each in row):
                 kinds.append(None)

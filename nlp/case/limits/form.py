@@ -6,7 +6,7 @@ once, and calls it in a loop.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,11 +19,11 @@ class Form:
 
     Attributes:
         build: function at the top of a module, from a vector (k, 1) and the numbers to the value (r, 1).
-        numbers: constants of the function, the same in each of its calls.
+        numbers: further arguments of the function, the same in each of its calls.
     """
 
     build: Callable[..., SX]
-    numbers: tuple[float, ...] = ()
+    numbers: tuple[Hashable, ...] = ()
 
     def __call__(self, inputs: SX) -> SX:
         """Return the value (r, 1) at a vector (k, 1)."""
