@@ -26,6 +26,7 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
+from .casaditext import without_queries
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .looptext import casadi_work, loop_texts, loop_work
 from .stages import StagedFunctions, stage_functions
@@ -120,7 +121,8 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
     # CasADi writes files only.
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + os.sep)
-        return {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
+        texts = {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
+    return {end: without_queries(text) for end, text in texts.items()}
 
 
 def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
