@@ -30,7 +30,7 @@ from .casaditext import without_queries
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .looptext import casadi_work, loop_texts, loop_work
 from .stages import StagedFunctions, stage_functions
-from .subject import Subject, find_subject, magnitude_of
+from .subject import Subject, find_subject, magnitude_of, objective_words
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Endings of the files whose names begin with the case's prefix, and their templates.
@@ -136,7 +136,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
     rows = len(program.model.wrenches)
-    work = casadi_work(staged) + loop_work(staged, rows, n)
+    poses, inputs = case.pose_count, program.robot.inputs.numel()
+    work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
     solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
@@ -152,6 +153,14 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "m": str(rows),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
+        "nposes": str(poses),
+        "nlegs": str(len(program.robot.legs)),
+        "ninputs": str(inputs),
+        "pose_parameter": "int pose, " if poses > 1 else "",
+        "pose_or_first": "pose" if poses > 1 else "0",
+        "first_pose": "0, " if poses > 1 else "",
+        "objective": comment_text(objective_words(nlp)),
+        "F_by_loops": str(int(poses > 1 and staged.loops.has_objective)),
         "twist": str(program.places.twists[0].start),
         "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
@@ -217,6 +226,9 @@ def _tables(nlp: Nlp, prefix: str) -> str:
             f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])
         ),
     ]
+    if program.places.weights:
+        blocks.append("/* Indices in p of the tasks' weights. */")
+        blocks.append(integer_table(f"{prefix}_weights", T, program.places.weights))
     return "\n".join(blocks) + "\n"
 
 
@@ -228,7 +240,9 @@ def _references(nlp: Nlp) -> _References:
     Raises:
         InputError: no point that is tried has finite values.
     """
-    kernels, p = nlp.program.kernels, nlp.arguments
+    kernels, p, robot = nlp.program.kernels, nlp.arguments, nlp.program.robot
+    centres = ca.horzcat(SX(6, 0), *[ca.vertcat(leg.base, leg.platform) for leg in robot.legs])
+    legs = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(centres)])
     rows: list[dict[str, FloatArray]] = []
     for x in starting_points(nlp, 4 * _POINTS + 1, _SEED)[1:]:
         F, gradient, g, slopes = kernels.derivatives(x, p)
@@ -236,6 +250,10 @@ def _references(nlp: Nlp) -> _References:
         state = kernels.robot_state(x, p)
         row = {"points": x, "F": F, "gradient": gradient, "hessian": hessian, "jacobian": state.jacobian}
         row |= {"rates": state.rates, "limits": g, "slopes": slopes, "rotation": state.rotation}
+        joints = legs(x, p).full()
+        platform = state.position + state.rotation @ joints[3:]
+        row |= {"lengths": np.linalg.norm(platform - joints[:3], axis=0), "base": joints[:3].T, "platform": platform.T}
+        row["matrix"] = np.vstack([np.hstack([state.rotation, state.position]), [[0.0, 0.0, 0.0, 1.0]]])
         if all(np.isfinite(each).all() for each in row.values()):
             rows.append(row)
         if len(rows) == (_POINTS if nlp.n else 1):

@@ -54,8 +54,8 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
 
     * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent with several poses where a
       loop has the objective;
-    * ``jacobian``, ``rates``, ``rotation``, ``geometry``: those of the robot at one pose. With several poses they are
-      functions of the robot's inputs, which ``poses`` returns for all poses;
+    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: those of the robot at
+      one pose. With several poses they are functions of the robot's inputs, which ``poses`` returns for all poses;
     * ``limits``: constraints with their gradients;
     * ``derivatives``: objective, gradient, constraints, and their gradients;
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
@@ -138,12 +138,15 @@ def _robot_expressions(program: Program) -> _RobotExpressions:
     base = ca.horzcat(SX(3, 0), *[leg.base for leg in robot.legs])
     platform = ca.horzcat(SX(3, 0), *[leg.base + leg.span for leg in robot.legs])
     lengths = ca.vertcat(SX(0, 1), *[ca.norm_2(leg.span) for leg in robot.legs])
+    matrix = ca.vertcat(ca.horzcat(robot.rotation, robot.position), SX([[0, 0, 0, 1]]))
     expressions = {
         "jacobian": [robot.jacobian.T],
-        "rates": [robot.rates],
+        "rates": [robot.rates.T],
         "rotation": [robot.rotation.T],
-        "geometry": [lengths, base, platform, ca.vertcat(ca.horzcat(robot.rotation, robot.position), SX([[0, 0, 0, 1]])).T],
+        "geometry": [lengths, base, platform, matrix.T],
     }
+    if len(program.robots) > 1 or robot.F.numel() > 1:
+        expressions["F_of_tasks"] = [robot.F]
     dense = {name: [ca.densify(each) for each in own] for name, own in expressions.items()}
     return _RobotExpressions(dense, inputs)
 

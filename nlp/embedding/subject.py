@@ -111,3 +111,19 @@ def _rounded(nlp: Nlp) -> Nlp:
 
 def _shortened(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
+
+
+def objective_words(nlp: Nlp) -> str:
+    """Return the objective of a program in words."""
+    case, poses = nlp.case, nlp.case.pose_count
+    over = f" over {poses} poses" if poses > 1 else ""
+    if nlp.program.places.weights:
+        if case.method is Method.WEIGHTED_SUM:
+            total = "mean" if poses > 1 and case.over_poses is OverPoses.MEAN else "sum"
+            return f"the weighted sum of F of {len(case.tasks)} tasks" + (f", each the {total}{over}" if over else "")
+        return f"the level of the worst of {len(case.tasks)} tasks, which is the last variable" + over
+    if not over:
+        return "F of the task"
+    if case.over_poses is OverPoses.WORST:
+        return f"the level of the worst F{over}, which is the last variable"
+    return f"the {case.over_poses.value} of F{over}"
