@@ -61,8 +61,7 @@ class Embedded:
             (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
-        sources += [str(folder / name) for name in files if name.endswith("-spectrum.c")]
+        sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
         flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
@@ -96,8 +95,9 @@ class Embedded:
         (value,) = re.findall(rf"#define {self.prefix.upper()}_{name} (\d+)", self.header)
         return int(value)
 
-    def call(self, function: str, *arrays: np.ndarray) -> int:
-        return int(getattr(self._library, f"{self.prefix}_{function}")(*[_address(each) for each in arrays]))
+    def call(self, function: str, *arguments: np.ndarray | int) -> int:
+        given = [each if isinstance(each, int) else _address(each) for each in arguments]
+        return int(getattr(self._library, f"{self.prefix}_{function}")(*given))
 
     def solve(self, *, maximise: int | None = None, seeds: int | None = None, **arrays: np.ndarray) -> Solved:
         """Solve the default problem with some of its arrays replaced."""
