@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -62,63 +61,12 @@ def test_every_shipped_case_compiles_without_a_warning_and_passes_its_test(
     assert int(counts) >= 14
 
 
-def random_points(nlp: Nlp, count: int) -> list[np.ndarray]:
-    return [np.ascontiguousarray(x) for x in starting_points(nlp, count + 1, 7)[1:]] if nlp.n else [nlp.start]
-
-
 @needs_compiler
 @pytest.mark.parametrize("name", CASES)
 def test_compiled_values_are_those_of_the_program_at_a_thousand_points(
     name: str, embedded: Callable[[str], Embedded]
 ) -> None:
-    compare(embedded(name), find_subject(load_case(name)).nlp, 1000)
-
-
-def compare(c: Embedded, nlp: Nlp, count: int, close: float = 1e-14) -> None:
-    """Compare every function with the program's own, at random points."""
-    p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n
-    m, limits = len(nlp.program.model.wrenches), len(nlp.program.constraints)
-    tasks, legs, poses = c.macro("TASKS"), c.macro("LEGS"), c.macro("POSES")
-    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
-    F, gradient, hessian = np.zeros(1), np.zeros(n), np.zeros((n, n))
-    J, rates, g, dg = np.zeros((m, 6)), np.zeros((m, tasks)), np.zeros(limits), np.zeros((limits, n))
-    R, axis, angle, each = np.zeros((3, 3)), np.zeros(3), np.zeros(1), np.zeros(tasks)
-    lengths, base, platform, matrix = np.zeros(legs), np.zeros((legs, 3)), np.zeros((legs, 3)), np.zeros((4, 4))
-    assert c.call("prepare", p, k, work) == 0
-    for i, x in enumerate(random_points(nlp, count)):
-        pose, at = i % poses, ([i % poses] if poses > 1 else [])
-        assert c.call("F", x, k, F, work) == 0
-        alone = F[0]
-        assert c.call("F_gradient", x, k, F, gradient, work) == 0
-        assert F[0] == alone
-        assert c.call("F_hessian", x, k, F, gradient, hessian, work) == 0
-        assert c.call("jacobian", x, k, *at, J, work) == c.call("rates", x, k, *at, rates, work) == 0
-        assert c.call("limits", x, k, g, dg, work) == c.call("rotation", x, k, *at, R, axis, angle, work) == 0
-        assert c.call("geometry", x, k, *at, lengths, base, platform, matrix, work) == 0
-        value, slope, constraint, constraint_slope = kernels.derivatives(x, p)
-        second = kernels.hessian(x, p, 1.0, np.zeros(limits))
-        state, robot = kernels.robot_states[pose](x, p), nlp.program.robots[pose]
-        pairs = [(F, value.ravel()), (gradient, slope.ravel()), (hessian, second), (J, state.jacobian)]
-        pairs += [(rates, state.rates), (g, constraint.ravel()), (dg, constraint_slope), (R, state.rotation)]
-        pairs += [(matrix[:3], np.hstack([state.rotation, state.position])), (matrix[3], np.array([0, 0, 0, 1.0]))]
-        if tasks * poses > 1:
-            assert c.call("F_of_tasks", x, k, *at, each, work) == 0
-            pairs.append((each, state.F.ravel()))
-        if legs and i < 20:
-            ends = [ca.horzcat(*[part for leg in robot.legs for part in (leg.base, leg.base + leg.span)])]
-            ends = ca.Function("ends", [nlp.program.x, nlp.program.p], ends)(x, p).full().T
-            pairs += [(base, ends[::2]), (platform, ends[1::2])]
-            pairs.append((lengths, np.linalg.norm(ends[1::2] - ends[::2], axis=1)))
-        # The same operations: a compiler may still contract or reorder the last digit.
-        for got, wanted in pairs:
-            if got.size:
-                assert np.max(np.abs(got - wanted)) <= close * max(1.0, float(np.max(np.abs(wanted))))
-        turned = np.eye(3) + np.sin(angle[0]) * cross(axis) + (1 - np.cos(angle[0])) * cross(axis) @ cross(axis)
-        assert np.max(np.abs(turned - R)) <= 1e-13
-
-
-def cross(u: np.ndarray) -> np.ndarray:
-    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+    embedded(name).compare(find_subject(load_case(name)).nlp, 1000)
 
 
 @needs_compiler
@@ -319,7 +267,7 @@ def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
     generator = np.random.default_rng(5)
     singular = [j for j, each in enumerate(nlp.program.constraints) if each.spectral is not None]
     assert len(singular) == 2
-    for x in random_points(nlp, 100):
+    for x in starting_points(nlp, 101, 7)[1:]:
         g, dg, H, weight = np.zeros(limits), np.zeros((limits, n)), np.zeros((n, n)), np.array([0.7])
         assert c[f"{prefix}_limits"](at(x), at(k), at(g), at(dg), at(work)) == 0
         _, _, constraint, slopes = nlp.program.kernels.derivatives(x, p)
