@@ -154,7 +154,9 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
 
 def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
     """Return a leg with the expressions of its joint centres at the first pose: no pose changes the centres."""
-    same = all(ca.is_equal(here, there, _DEPTH) for here, there in ((leg.base, first.base), (leg.platform, first.platform)))
+    same = all(
+        ca.is_equal(here, there, _DEPTH) for here, there in ((leg.base, first.base), (leg.platform, first.platform))
+    )
     return replace(leg, base=first.base, platform=first.platform) if same else leg
 
 
@@ -183,7 +185,11 @@ def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[Inn
     at = robot.inputs.numel() - 6 * tasks
     length, calls = robot.inputs[at - 1], []
     for j in range(tasks):
-        twist, terms, sizes = robot.inputs[at + 6 * j : at + 6 * j + 6], SX.sym("term", len(rows)), SX.sym("size", len(rows))
+        twist, terms, sizes = (
+            robot.inputs[at + 6 * j : at + 6 * j + 6],
+            SX.sym("term", len(rows)),
+            SX.sym("size", len(rows)),
+        )
         for i, row in enumerate(rows):
             inputs = ca.vertcat(length, twist, row.inputs)
             calls.append(InnerCall(Call(row.form, inputs), ca.vertcat(robot.rates[i, j], terms[i])))
@@ -218,9 +224,6 @@ def _size_of_row(inputs: SX, row: RowBuild) -> SX:
 
 
 _FORCE_OF_LEG, _FORCE, _COUPLE = (Form(_rate_of_row, (row,)) for row in (_force_of_leg, _force, _couple))
-
-
-
 
 
 def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[int]) -> bool:

@@ -28,6 +28,7 @@ from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from .casaditext import without_queries
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words
@@ -99,9 +100,9 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
         return words
     program = formulate(case).program
     operations: dict[str, int] = {}
-    for constraint in program.constraints:
-        expression = SX(0) if constraint.spectral else constraint.expression
-        slopes = ca.Function("slopes", [program.x, program.p], [ca.jacobian(expression, program.x)])
+    for place in find_loops(program).plain:
+        constraint = program.constraints[place]
+        slopes = ca.Function("slopes", [program.x, program.p], [ca.jacobian(constraint.expression, program.x)])
         key = next((key.partition(".")[0] for key in constraint.keys if key), constraint.name)
         operations[key] = operations.get(key, 0) + slopes.n_instructions()
     key = max(operations, key=lambda name: operations[name], default="F")

@@ -247,7 +247,9 @@ class _Tables:
             constants=ca.vertcat(SX(0, 1), *[symbols[i] for i in constant]),
             values=ca.vertcat(*[values[i] for i in group.wanted]),
             slots=tuple(tuple(self._slot(call.inputs[i]) for i in varying) for call in group.calls),
-            constant_places=tuple(tuple(self._constant_place(call.inputs[i]) for i in constant) for call in group.calls),
+            constant_places=tuple(
+                tuple(self._constant_place(call.inputs[i]) for i in constant) for call in group.calls
+            ),
             outputs=tuple(outputs),
         )
 
@@ -256,6 +258,5 @@ def _canonical(expressions: Sequence[SX]) -> dict[int, SX]:
     """Return one expression (1, 1) for all equal ones, by the hash of each."""
     joined = ca.vertcat(SX(0, 1), *expressions)
     return {
-        each.element_hash(): same
-        for each, same in zip(ca.vertsplit(joined), ca.vertsplit(ca.cse(joined)), strict=True)
+        each.element_hash(): same for each, same in zip(ca.vertsplit(joined), ca.vertsplit(ca.cse(joined)), strict=True)
     }

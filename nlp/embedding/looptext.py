@@ -8,7 +8,6 @@ import casadi as ca
 from casadi import SX
 
 from .ctext import short_table
-from .loops import Loop
 from .stages import StagedFunctions
 
 
@@ -87,25 +86,24 @@ def _most(vectors: Iterable[SX]) -> int:
 
 def _tables(staged: StagedFunctions) -> str:
     """Return the constant tables of slots, constants and outputs."""
-    loops, blocks, lines = staged.loops, [], []
-    for index, loop in enumerate(loops.all):
-        names = [f"{name}{index}" for name in ("slots", "constants", "outputs")]
-        for name, table in zip(names, (loop.slots, loop.constant_places, loop.outputs), strict=True):
-            blocks.append(short_table(name, [value for row in table for value in row]))
-        lines.append(f"    {{{_counts(loop)}, {', '.join(names)}}},")
-    lines.append("    {0, 0, 0, 0, 0, 0, 0}};")
-    blocks.append("static const loop loops[LOOPS + 1] = {\n" + "\n".join(lines))
+    loops = staged.loops
+    slots: list[int] = []
+    constants: list[int] = []
+    outputs: list[int] = []
+    lines = []
+    for loop in loops.all:
+        sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
+        lines.append(", ".join(map(str, (*sizes, len(slots), len(constants), len(outputs)))))
+        for into, table in ((slots, loop.slots), (constants, loop.constant_places), (outputs, loop.outputs)):
+            into.extend(value for row in table for value in row)
+    rows = ",\n".join(f"    {{{line}}}" for line in (*lines, "0, 0, 0, 0, 0, 0, 0"))
+    blocks = [short_table("slots", slots), short_table("constant_places", constants), short_table("outputs", outputs)]
+    blocks.append(f"static const loop loops[LOOPS + 1] = {{\n{rows}}};")
     blocks.append(short_table("plain_places", loops.plain))
     if loops.spectra:
         blocks.append(short_table("spectral_places", [each.place for each in loops.spectra]))
         blocks.append(short_table("spectral_slots", [slot for each in loops.spectra for slot in each.slots]))
     return "\n".join(blocks) + "\n"
-
-
-def _counts(loop: Loop) -> str:
-    """Return the numbers of calls, inputs, constants and values."""
-    sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
-    return ", ".join(str(size) for size in sizes)
 
 
 def _cases(functions: Sequence[tuple[ca.Function, ca.Function]]) -> str:

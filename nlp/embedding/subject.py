@@ -14,9 +14,10 @@ from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
 from ..errors import CaseError
-from ..program.formulation import formulate
+from ..program.formulation import formulate, formulate_weighted
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
+from ..solver.compromise import scale_weights
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
@@ -37,25 +38,27 @@ class Subject(NamedTuple):
 def find_subject(case: Case) -> Subject:
     """Return the program of a case that C is generated for.
 
-    Several tasks are solved first, each by itself: a worst case is relative to their own optima.
+    For a worst case each task is solved first by itself: the worst one is relative to their own optima.
 
     Raises:
         CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
         InputError: its functions have no finite value at any point that is tried.
     """
-    if len(case.tasks) == 1:
-        own = solve_program(formulate(case), case.search)
-        return Subject(_with_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
-    if case.method is Method.AVERAGE:
+    if len(case.tasks) > 1 and case.method is Method.AVERAGE:
         fault = "optimises nothing, so C is not generated for it: must be 'weighted-sum' or 'worst-case'"
         raise CaseError("combine.method", fault, case.method.value, case.source)
+    _check_pairs(formulate(case))
+    if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
+        several = len(case.tasks) > 1
+        nlp = formulate_weighted(case, scale_weights(case).values) if several else formulate(case)
+        own = solve_program(nlp, case.search)
+        return Subject(with_all_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:
         fault = "has a task without an optimum of its own, so there is nothing to combine"
         raise CaseError("combine.method", fault, case.method.value, case.source)
-    nlp = _rounded(_with_pairs(combined.nlp))
-    return Subject(nlp, combined.F if combined.status is Status.OPTIMAL else None)
+    return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
 
 
 def magnitude_of(nlp: Nlp) -> SX:
@@ -76,18 +79,19 @@ def magnitude_of(nlp: Nlp) -> SX:
     return ca.mmax(size)
 
 
-def _with_pairs(nlp: Nlp) -> Nlp:
-    """Return a program with every pair of its families.
+def _check_pairs(nlp: Nlp) -> None:
+    """Refuse a program with too many pairs of poses.
 
     Raises:
         CaseError: there are too many.
     """
     counts = [family.values.numel() for family in nlp.families]
-    pairs = sum(count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, nlp.families, strict=True))
+    pairs = sum(
+        count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, nlp.families, strict=True)
+    )
     if pairs > _MOST_PAIRS:
-        fault = f"gives {pairs} constraints on pairs of poses over this many; C is generated for at most {_MOST_PAIRS}"
+        fault = f"gives {pairs} constraints on pairs of poses, and C is generated for at most {_MOST_PAIRS}"
         raise CaseError("pose", fault, nlp.case.pose_count, nlp.case.source)
-    return with_all_pairs(nlp)
 
 
 def _rounded(nlp: Nlp) -> Nlp:

@@ -298,7 +298,7 @@ def test_size_is_said_before_the_folder_is_written(tmp_path: Path, cli: Run, mon
     assert words == "kB of C"
     monkeypatch.setattr("screwsynth.nlp.embedding.codegen._LARGE", 100_000)
     case = load_case("hexapod-machining")
-    assert "most of it for rate_share" in size_words(case, {"a.c": " " * 200_000})
+    assert "most of it for joint_spacing" in size_words(case, {"a.c": " " * 200_000})
 
 
 def test_the_same_case_gives_the_same_bytes() -> None:

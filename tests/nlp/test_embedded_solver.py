@@ -33,7 +33,9 @@ def kkt(nlp: Nlp, x: np.ndarray) -> tuple[float, float]:
     return at.violation, multipliers(at, at.active(1e-6))[1]
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_cases() if name.startswith("paper-") and name != "paper-4.2"])
+@pytest.mark.parametrize(
+    "name", [name for name in shipped_cases() if name.startswith("paper-") and name != "paper-4.2"]
+)
 def test_a_thousand_random_starts_end_at_the_global_optimum(name: str, embedded: EmbeddedCase) -> None:
     c, case = embedded(name), load_case(name)
     nlp = formulate(case)
