@@ -1,8 +1,7 @@
 """A program as calls of few functions: those that repeat for legs, pairs of legs, joints, tasks and poses.
 
-A call of a limit or of the objective is a *final* call. It may take values of *inner* calls. With several poses these are
-F and the other numbers of the robot at each pose, and the spans of the legs there; at a single pose, the rates of each
-row and the sums of them.
+A call of a limit or of the objective is a *final* call. It may take values of *inner* calls: spans of legs, rates of
+rows, their sums, and with several poses the other numbers of the robot at each pose.
 """
 
 from __future__ import annotations
@@ -219,7 +218,7 @@ def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
 
 
 def _size_of_row(inputs: SX, row: RowBuild) -> SX:
-    """Return a row's part of F without cancellation from characteristic length, twist, position and the row's inputs."""
+    """Return a row's part of F without cancellation, (1, 1), from length, twist, position and the row's inputs."""
     return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
 
 

@@ -81,7 +81,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     if staged.loops.spectra:
         parts["-spectrum.c"] = "spectrum.c"
     files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
-    for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
+    for name in ("selftest.c", "stack.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _fill_template(f"{name}.in", names)
     casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
     return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
@@ -172,6 +172,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nseeds": str(_SEEDS),
         "iterations": str(_ITERATIONS),
         "trials": str(_TRIALS),
+        "most_iterations": str((_SEEDS + 1) * _ITERATIONS),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),

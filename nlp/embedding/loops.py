@@ -7,7 +7,7 @@ by its inputs; the chain rule gives those by the variables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from casadi import SX
 from ..case.limits.constraint import Spectral
 from ..case.limits.form import Call
 from ..program.program import Program
-from .calls import Calls, FinalCall, InnerCall, by_form, find_calls
+from .calls import Calls, by_form, find_calls
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +101,10 @@ class _Group(NamedTuple):
 
 
 class _Value(NamedTuple):
-    """Value of an inner call: index of the call, and index in its values."""
+    """Value of an inner call: index of the call, and place in its values."""
 
     call: int
-    index: int
+    place: int
 
 
 class _Tables:
@@ -127,7 +127,9 @@ class _Tables:
             for place, each in enumerate(program.constraints)
             if each.spectral is not None
         ]
-        self._same = _canonical([*calls.matrices, *(item.call.inputs for item in (*calls.inner, *calls.final))])
+        self._same = _canonical(
+            [*calls.matrices, *(each.call.inputs for each in calls.inner), *(each.call.inputs for each in calls.final)]
+        )
         self._entries: dict[int, SX] = {}
         self._constants: dict[int, SX] = {}
         self._slots: dict[_Value, int] = {}
@@ -135,7 +137,7 @@ class _Tables:
     def loops(self) -> Loops:
         """Return the loops."""
         final = [
-            _Group([item.call for item in members], [0], [item.place for item in members])
+            _Group([each.call for each in members], [0], [each.place for each in members])
             for members in by_form(self._calls.final)
         ]
         inner = self._inner_groups(final)
@@ -152,7 +154,8 @@ class _Tables:
             for index in group.targets:
                 for i in group.wanted:
                     self._slots[_Value(index, i)] = len(self._entries) + len(self._slots)
-        made = [self._loop(group, kind, k < len(inner)) for k, (group, kind) in enumerate(zip((*inner, *final), kinds))]
+        groups = zip((*inner, *final), kinds, strict=True)
+        made = [self._loop(group, kind, k < len(inner)) for k, (group, kind) in enumerate(groups)]
         places = {item.place for item in self._calls.final} | {place for place, _, _ in self._spectral}
         count = len(self._program.constraints)
         return Loops(
@@ -179,7 +182,7 @@ class _Tables:
                 if value is not None:
                     if value.call not in wanted:
                         inputs.append(self._calls.inner[value.call].call.inputs)
-                    wanted.setdefault(value.call, set()).add(value.index)
+                    wanted.setdefault(value.call, set()).add(value.place)
         groups: dict[tuple[int, object], _Group] = {}
         for index in sorted(wanted):
             call = self._calls.inner[index].call

@@ -17,7 +17,7 @@ from ..program.program import Program
 from .calls import RobotValues
 from .loops import Loop, Loops, find_loops
 
-#: Operations of a Hessian, beside loops, above which C has its product with a direction and calls it for each: less code.
+#: Operations of a Hessian, beside loops, above which C has its product with a direction instead: a third of the code.
 _LARGE_HESSIAN = 3000
 
 
@@ -54,16 +54,16 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
 
     * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent with several poses where a
       loop has the objective;
-    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: those of the robot at
-      one pose. With several poses they are functions of the robot's inputs, which ``poses`` returns for all poses;
+    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: those of the
+      robot at one pose. With several poses they are functions of the robot's inputs, which ``poses`` returns for all;
     * ``limits``: constraints with their gradients;
     * ``derivatives``: objective, gradient, constraints, and their gradients;
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation.
 
-    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns in addition the entries
-    with their gradients, ``limits`` is absent, and ``curvature`` takes a multiplier for each entry at the end. A Hessian
-    of very many operations is returned as its product with a direction, which is one more input then.
+    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries with their
+    gradients too, ``limits`` is absent, and ``curvature`` takes a multiplier for each entry at the end. A Hessian of
+    very many operations is returned as its product with a direction, which is one more input then.
 
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 

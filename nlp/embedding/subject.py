@@ -24,7 +24,7 @@ from ..solver.status import Status
 
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
-#: Digits of numbers that come from a solve: fewer than rounding error leaves, so that they are the same on every machine.
+#: Digits of numbers that come from a solve: few enough to be the same on every machine.
 _DIGITS = 9
 
 

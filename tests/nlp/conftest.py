@@ -57,7 +57,7 @@ class Solved:
 class Embedded:
     """The C of a case, compiled and loaded."""
 
-    def __init__(self, case: Case, folder: Path) -> None:
+    def __init__(self, case: Case, folder: Path, level: str = "-O2") -> None:
         files = generate_c(case, "")
         for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
@@ -66,7 +66,7 @@ class Embedded:
         sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
-        flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
+        flags = ["-std=c99", level, "-shared", "-fPIC"]
         subprocess.run([compiler, *flags, *sources, "-lm", "-o", library], check=True)
         self._library = ctypes.CDLL(library)
         self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
@@ -188,14 +188,14 @@ def _address(array: np.ndarray) -> ctypes.c_void_p:
 
 
 @pytest.fixture(scope="session")
-def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Case], Embedded]:
+def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Embedded]:
     """The C of any case."""
     if not any(shutil.which(name) for name in ("gcc", "clang", "cc")):
         pytest.skip("no C compiler is installed")
-    return lambda case: Embedded(case, tmp_path_factory.mktemp("c"))
+    return lambda case, level="-O2": Embedded(case, tmp_path_factory.mktemp("c"), level)
 
 
 @pytest.fixture(scope="session")
-def embedded(embed: Callable[[Case], Embedded]) -> Callable[[str], Embedded]:
+def embedded(embed: Callable[..., Embedded]) -> Callable[[str], Embedded]:
     """The C of a shipped case, made once."""
     return cache(lambda name: embed(load_case(name)))

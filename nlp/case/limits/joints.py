@@ -64,7 +64,7 @@ def _minus_cosine_from_home(inputs: SX, to_world: Turn, from_home: Turn) -> SX:
     """Return minus the cosine, (1, 1), of the angle between a leg and its joint's axis, which is the leg's at home.
 
     Args:
-        inputs: rotation column after column and position at home, platform joint, base joint, rotation and span, (30, 1).
+        inputs: rotation column after column and position at home, platform joint, base joint, rotation, span, (30, 1).
         to_world: of a direction of the joint's plate.
         from_home: its inverse.
     """
