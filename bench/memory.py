@@ -1,7 +1,7 @@
 """Measure generated C: machine code, workspace, stack and compile time of shipped cases, as a table in Markdown.
 
 The stack is bounded from the compiler's own call graph (``gcc -fcallgraph-info=su``): the deepest sum of frames from
-``..._solve``, with both functions of the search behind its two pointers. It is also measured: ``stack.c`` of the folder.
+``..._solve``, with both functions of the search behind its two pointers. ``stack.c`` of the folder measures it too.
 
     python bench/memory.py CASE ...
 """
@@ -77,8 +77,9 @@ def measure(name: str, folder: Path) -> str:
     work = int(re.findall(r"_SOLVERWORK (\d+)", files[f"{prefix}.h"])[0])
     solve = re.findall(r"solve from one point +([\d.]+) us", run["bench"])[0]
     bound = stack_bound(folder, prefix)
-    cells = [f"`{name}`", f"{flash / 1000:.0f}", f"{work * 8 / 1000:.1f}", f"{bound}", painted, f"{seconds:.1f}", *times]
-    return f"| {' | '.join([*cells, solve])} |"
+    sizes_in_kb = [f"{flash / 1000:.0f}", f"{work * 8 / 1000:.1f}"]
+    cells = [f"`{name}`", *sizes_in_kb, f"{bound}", painted, f"{seconds:.1f}", *times, solve]
+    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
@@ -86,8 +87,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cases", nargs="+")
     given = parser.parse_args()
-    print("| case | code kB | workspace kB | stack bound | stack | compile s | F ns | gradient ns | Hessian ns | solve us |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    columns = (
+        "case, code kB, workspace kB, stack bound, stack, compile s, F ns, gradient ns, Hessian ns, solve us".split(
+            ", "
+        )
+    )
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for name in given.cases:
         with tempfile.TemporaryDirectory() as folder:
             print(measure(name, Path(folder)), flush=True)
