@@ -87,11 +87,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cases", nargs="+")
     given = parser.parse_args()
-    columns = (
-        "case, code kB, workspace kB, stack bound, stack, compile s, F ns, gradient ns, Hessian ns, solve us".split(
-            ", "
-        )
-    )
+    columns = [
+        "case",
+        "code kB",
+        "workspace kB",
+        "stack bound",
+        "stack",
+        "compile s",
+        "F ns",
+        "gradient ns",
+        "Hessian ns",
+        "solve us",
+    ]
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for name in given.cases:
         with tempfile.TemporaryDirectory() as folder:
