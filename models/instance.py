@@ -91,6 +91,9 @@ class RobotInstance:
         quantities: (n, 1) values of each of the model's quantities.
         legs: the model's legs.
         closure: (c, 1) left sides of the closure equations, zero where the loops are closed.
+        rows: the rows before normalisation.
+        inputs: (k, 1) all that these depend on: parameters, unknowns, rotation column after column, position,
+            characteristic length, twists.
     """
 
     parameters: SX
@@ -104,6 +107,8 @@ class RobotInstance:
     quantities: tuple[SX, ...]
     legs: tuple[LegInstance, ...]
     closure: SX
+    rows: tuple[Wrench, ...]
+    inputs: SX
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -142,6 +147,8 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
         closure=closure,
+        rows=tuple(rows),
+        inputs=ca.veccat(*substitution.all, length, *twists),
     )
 
 

@@ -22,15 +22,16 @@ from ...models import Dimension, FloatArray
 from .. import __version__
 from ..case.case import Case
 from ..case.task import Sense
-from ..errors import CaseError, InputError
+from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from ..program.program import Program
 from ..program.sampling import starting_points
-from ..solver.multistart import solve_program
-from ..solver.status import Status
+from .casaditext import without_queries
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .loops import find_loops
+from .looptext import casadi_work, loop_texts, loop_work
 from .stages import StagedFunctions, stage_functions
+from .subject import Subject, find_subject, magnitude_of, objective_words
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Endings of the files whose names begin with the case's prefix, and their templates.
@@ -42,8 +43,6 @@ _PARTS = {
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
 }
-#: Ending of the file that a case with limits on singular values needs in addition.
-_SPECTRUM = "-spectrum.c"
 #: Number of starting points in the solver's table.
 _SEEDS = 16
 #: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
@@ -60,7 +59,7 @@ _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """Generate the files of a case's C folder.
 
-    The twist is a run-time argument, as is everything fixed; its default is that of the case's first task.
+    Twists and weights of tasks are run-time arguments, as is everything fixed.
 
     Args:
         case: the case.
@@ -70,17 +69,19 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         Text by file name.
 
     Raises:
-        CaseError: the case contradicts itself, or has several poses.
+        CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
         InputError: the case's functions have no finite value at any point that is tried.
     """
-    if case.pose_count > 1:
-        raise CaseError("pose", "gives several poses; C is generated for one", case.pose_count, case.source)
-    nlp = formulate(case)
-    staged = stage_functions(nlp.program, f"{identifier(case.name)}_CASADI")
-    names = _substitutions(nlp, staged)
-    parts = _PARTS | ({_SPECTRUM: "spectrum.c"} if int(names["nspectra"]) else {})
+    subject = find_subject(case)
+    staged = stage_functions(subject.nlp.program, magnitude_of(subject.nlp), f"{identifier(case.name)}_CASADI")
+    names = _substitutions(subject, staged)
+    parts = dict(_PARTS)
+    if staged.loops:
+        parts["-loops.c"] = "loops.c"
+    if staged.loops.spectra:
+        parts["-spectrum.c"] = "spectrum.c"
     files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
-    for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
+    for name in ("selftest.c", "stack.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
         files[name] = _fill_template(f"{name}.in", names)
     casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
     return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
@@ -99,9 +100,9 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
         return words
     program = formulate(case).program
     operations: dict[str, int] = {}
-    for constraint in program.constraints:
-        expression = SX(0) if constraint.spectral else constraint.expression
-        slopes = ca.Function("slopes", [program.x, program.p], [ca.jacobian(expression, program.x)])
+    for place in find_loops(program).plain:
+        constraint = program.constraints[place]
+        slopes = ca.Function("slopes", [program.x, program.p], [ca.jacobian(constraint.expression, program.x)])
         key = next((key.partition(".")[0] for key in constraint.keys if key), constraint.name)
         operations[key] = operations.get(key, 0) + slopes.n_instructions()
     key = max(operations, key=lambda name: operations[name], default="F")
@@ -121,20 +122,23 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
     # CasADi writes files only.
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + os.sep)
-        return {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
+        texts = {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
+    return {end: without_queries(text) for end, text in texts.items()}
 
 
-def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
+def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     """Return the texts for the templates' placeholders."""
+    nlp, optimum = subject
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
     size = len(prefix) + len("_CASADI_")
     functions = staged.all
-    solution = solve_program(nlp, case.search)
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
-    work = max(1, *(function.sz_w() for function in functions))
+    rows = len(program.model.wrenches)
+    poses, inputs = case.pose_count, program.robot.inputs.numel()
+    work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
     solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
@@ -147,19 +151,28 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "length": comment_text(case.units.length),
         "n": str(n),
         "np": str(len(program.arguments)),
-        "m": str(len(program.model.wrenches)),
+        "m": str(rows),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
+        "nposes": str(poses),
+        "nlegs": str(len(program.robot.legs)),
+        "ninputs": str(inputs),
+        "pose_parameter": "int pose, " if poses > 1 else "",
+        "pose_or_first": "pose" if poses > 1 else "0",
+        "first_pose": "0, " if poses > 1 else "",
+        "objective": comment_text(objective_words(nlp)),
+        "F_by_loops": str(int(poses > 1 and staged.loops.has_objective)),
         "twist": str(program.places.twists[0].start),
         "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
-        **_spectrum_texts(program, prefix),
+        **loop_texts(staged, prefix),
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
         "iterations": str(_ITERATIONS),
         "trials": str(_TRIALS),
+        "most_iterations": str((_SEEDS + 1) * _ITERATIONS),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
@@ -167,29 +180,12 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix),
         "count": str(points),
-        "has_optimum": str(int(solution.status is Status.OPTIMAL)),
+        "has_optimum": str(int(optimum is not None)),
         # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
-        "optimum": f"{solution.F:.9g}" if solution.status is Status.OPTIMAL else "0",
+        "optimum": "0" if optimum is None else f"{optimum:.9g}",
         "optimum_scale": f"{nlp.objective_size:.9g}",
         "references": references,
         "operations": "\n".join(f"| `{f.name()[size:]}` | {f.n_instructions()} |" for f in functions),
-    }
-
-
-def _spectrum_texts(program: Program, prefix: str) -> dict[str, str]:
-    """Return the texts for the placeholders about limits on singular values."""
-    found = [(k, each.spectral) for k, each in enumerate(program.constraints) if each.spectral is not None]
-    row = f"| `{prefix}{_SPECTRUM}` | limits on singular values of J, with their derivatives, by loops |\n"
-    return {
-        "nspectra": str(len(found)),
-        "spectrum_lengths": ", ".join(repr(float(spectral.length)) for _, spectral in found),
-        "spectrum_places": ", ".join(str(k) for k, _ in found),
-        "spectrum_kinds": ", ".join(str(spectral.end.value) for _, spectral in found),
-        "spectrum_object": f" {prefix}-spectrum.o" if found else "",
-        "spectrum_source": f" {prefix}{_SPECTRUM}" if found else "",
-        "spectrum_row": row if found else "",
-        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
-        "limits_close": "1e-10" if found else "1e-12",
     }
 
 
@@ -232,6 +228,9 @@ def _tables(nlp: Nlp, prefix: str) -> str:
             f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])
         ),
     ]
+    if program.places.weights:
+        blocks.append("/* Indices in p of the tasks' weights. */")
+        blocks.append(integer_table(f"{prefix}_weights", T, program.places.weights))
     return "\n".join(blocks) + "\n"
 
 
@@ -243,7 +242,9 @@ def _references(nlp: Nlp) -> _References:
     Raises:
         InputError: no point that is tried has finite values.
     """
-    kernels, p = nlp.program.kernels, nlp.arguments
+    kernels, p, robot = nlp.program.kernels, nlp.arguments, nlp.program.robot
+    centres = ca.horzcat(SX(6, 0), *[ca.vertcat(leg.base, leg.platform) for leg in robot.legs])
+    legs = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(centres)])
     rows: list[dict[str, FloatArray]] = []
     for x in starting_points(nlp, 4 * _POINTS + 1, _SEED)[1:]:
         F, gradient, g, slopes = kernels.derivatives(x, p)
@@ -251,6 +252,10 @@ def _references(nlp: Nlp) -> _References:
         state = kernels.robot_state(x, p)
         row = {"points": x, "F": F, "gradient": gradient, "hessian": hessian, "jacobian": state.jacobian}
         row |= {"rates": state.rates, "limits": g, "slopes": slopes, "rotation": state.rotation}
+        joints = legs(x, p).full()
+        platform = state.position + state.rotation @ joints[3:]
+        row |= {"lengths": np.linalg.norm(platform - joints[:3], axis=0), "base": joints[:3].T, "platform": platform.T}
+        row["matrix"] = np.vstack([np.hstack([state.rotation, state.position]), [[0.0, 0.0, 0.0, 1.0]]])
         if all(np.isfinite(each).all() for each in row.values()):
             rows.append(row)
         if len(rows) == (_POINTS if nlp.n else 1):

@@ -36,6 +36,11 @@ def integer_table(name: str, size: str, values: Iterable[int]) -> str:
     return f"static const int {name}[{size} + 1] = {{{', '.join(map(str, [*values, 0]))}}};"
 
 
+def short_table(name: str, values: Iterable[int]) -> str:
+    """Return a constant table of small whole numbers; it ends with a zero, so that it is never empty."""
+    return f"static const short {name}[] = {{{', '.join(map(str, [*values, 0]))}}};"
+
+
 def matrix_table(declaration: str, rows: Iterable[FloatArray]) -> str:
     """Return a constant table of rows of numbers; each row ends with a zero."""
     cells = (", ".join(repr(float(value)) for value in [*row, 0.0]) for row in rows)

@@ -14,6 +14,11 @@ import casadi as ca
 from casadi import SX
 
 from ..program.program import Program
+from .calls import RobotValues
+from .loops import Loop, Loops, find_loops
+
+#: Operations of a Hessian, beside loops, above which C has its product with a direction instead: a third of the code.
+_LARGE_HESSIAN = 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,78 +26,146 @@ class StagedFunctions:
     """Functions in two stages.
 
     Attributes:
-        prepare: first stage, ``p -> k``: (count, 1) numbers that depend on the arguments alone.
+        prepare: first stage, ``p -> k``: (count, 1) numbers that depend on the arguments alone; the last ones are the
+            constants of the loops.
         functions: second stage, by name: functions of ``(x, k)`` and of further inputs, with dense results.
+        of_loops: two functions of each loop, as :func:`_loop_functions` returns them.
+        of_robot: with several poses, functions of the robot's inputs at one of them.
+        loops: the program's loops.
+        by_direction: whether ``curvature`` is the Hessian's product with a direction.
     """
 
     prepare: ca.Function
     functions: Mapping[str, ca.Function]
+    of_loops: tuple[tuple[ca.Function, ca.Function], ...]
+    of_robot: Mapping[str, ca.Function]
+    loops: Loops
+    by_direction: bool
 
     @property
     def all(self) -> tuple[ca.Function, ...]:
         """Every function, the first stage first."""
-        return (self.prepare, *self.functions.values())
+        of_loops = (function for pair in self.of_loops for function in pair)
+        return (self.prepare, *self.functions.values(), *self.of_robot.values(), *of_loops)
 
 
-def stage_functions(program: Program, prefix: str) -> StagedFunctions:
+def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     """Return the functions that the generated C calls.
 
-    * ``F``, ``F_gradient``: the objective, and the objective with its gradient;
-    * ``jacobian``, ``rates``, ``rotation``: those of the robot;
+    * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent with several poses where a
+      loop has the objective;
+    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: those of the
+      robot at one pose. With several poses they are functions of the robot's inputs, which ``poses`` returns for all;
     * ``limits``: constraints with their gradients;
     * ``derivatives``: objective, gradient, constraints, and their gradients;
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation.
 
-    A constraint on singular values of J is 0 here. ``derivatives`` returns in addition the entries of J, row after row,
-    with their gradients; ``curvature`` takes a multiplier for each of these entries at the end and a direction, and
-    returns the Hessian's product with the direction. There is no ``limits`` then.
+    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries with their
+    gradients too, ``limits`` is absent, and ``curvature`` takes a multiplier for each entry at the end. A Hessian of
+    very many operations is returned as its product with a direction, which is one more input then.
 
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 
     Args:
         program: the program.
+        size: (1, 1) size of the objective without cancellation.
         prefix: beginning of the functions' names.
     """
-    x, F = program.x, program.objective
-    spectra = [constraint.spectral for constraint in program.constraints]
-    # The C computes estimates of eigenvalues itself, from the entries of J: unrolled they would be megabytes.
-    expressions = [SX(0) if each.spectral else each.expression for each in program.constraints]
-    g = ca.vertcat(SX(0, 1), *expressions)
-    # C is generated for one pose, and all of these constraints are on its J.
-    matrix = next((each.matrix for each in spectra if each is not None), SX(0, 0))
-    entries = ca.vec(matrix.T)
-    lifted = [entries, ca.jacobian(entries, x).T] if entries.numel() else []
-    gradient = ca.gradient(F, x)
-    slopes = ca.jacobian(g, x).T
-    weight, multipliers = SX.sym("weight"), SX.sym("multipliers", g.numel() + entries.numel())
-    lagrangian = weight * F + ca.dot(multipliers, ca.vertcat(g, entries))
+    x, loops = program.x, find_loops(program)
+    several = len(program.robots) > 1
+    objective = SX(0) if loops.has_objective else program.objective
+    g = ca.vertcat(SX(0, 1), *[program.constraints[place].expression for place in loops.plain])
+    gradient, slopes = ca.gradient(objective, x), ca.jacobian(g, x).T
+    weight, multipliers = SX.sym("weight"), SX.sym("multipliers", g.numel() + loops.entries.numel())
+    direction = SX.sym("direction", x.numel())
+    lagrangian = weight * objective + ca.dot(multipliers, ca.vertcat(g, loops.entries))
+    hessian = ca.cse(ca.hessian(lagrangian, x)[0])
     inputs = {"curvature": [weight, multipliers]}
-    outputs = {
-        "F": [F],
-        "F_gradient": [F, gradient],
-        "jacobian": [program.robot.jacobian.T],
-        "rates": [program.robot.rates],
-        "limits": [g, slopes],
-        "rotation": [program.robot.rotation.T],
-        "derivatives": [F, gradient, g, slopes, *lifted],
-        "curvature": [] if lifted else [ca.hessian(lagrangian, x)[0]],
-        "magnitude": [ca.mmax(program.robot.magnitude)],
-    }
-    if lifted:
-        # What ``limits`` returns is part of what ``derivatives`` returns; and the whole Hessian of J's entries would be
-        # three times as much code as its product with a direction.
-        del outputs["limits"]
-        direction = SX.sym("direction", x.numel())
-        outputs["curvature"] = [ca.jtimes(ca.gradient(lagrangian, x), x, direction)]
+    whole = ca.Function("H", [x, program.p, weight, multipliers], [hessian])
+    by_direction = bool(loops) and whole.n_instructions() > _LARGE_HESSIAN
+    if by_direction:
+        hessian = ca.jtimes(ca.gradient(lagrangian, x), x, direction)
         inputs["curvature"].append(direction)
-    dense = {name: [ca.densify(each) for each in expressions] for name, expressions in outputs.items()}
+    outputs = {
+        "F": [program.objective],
+        "F_gradient": [program.objective, ca.gradient(program.objective, x)],
+        "limits": [g, slopes],
+        "derivatives": [objective, gradient, g, slopes],
+        "curvature": [hessian],
+        "magnitude": [size],
+    }
+    if loops:
+        del outputs["limits"]
+        outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T]
+    if several and loops.has_objective:
+        del outputs["F"], outputs["F_gradient"]
+    robots = _robot_expressions(program)
+    if len(program.robots) == 1:
+        outputs |= robots.expressions
+    else:
+        outputs["poses"] = [ca.veccat(*[robot.inputs for robot in program.robots])]
+    dense = {name: ca.cse([ca.densify(each) for each in expressions]) for name, expressions in outputs.items()}
     rest, k, prepared = _extract(program.p, [each for expressions in dense.values() for each in expressions])
+    k, prepared = ca.vertcat(k, SX.sym("c", loops.constants.numel())), ca.vertcat(prepared, loops.constants)
     functions = {}
     for name, expressions in dense.items():
         own, rest = rest[: len(expressions)], rest[len(expressions) :]
         functions[name] = ca.Function(f"{prefix}_{name}", [x, k, *inputs.get(name, [])], own)
-    return StagedFunctions(ca.Function(f"{prefix}_prepare", [program.p], [prepared]), functions)
+    of_robot = {} if len(program.robots) == 1 else robots.expressions
+    return StagedFunctions(
+        ca.Function(f"{prefix}_prepare", [program.p], [prepared]),
+        functions,
+        tuple(_loop_functions(loop, f"{prefix}_loop{i}") for i, loop in enumerate(loops.all)),
+        {name: ca.Function(f"{prefix}_{name}", [robots.inputs], own) for name, own in of_robot.items()},
+        loops,
+        by_direction,
+    )
+
+
+class _RobotExpressions(NamedTuple):
+    """Expressions of the robot by function, and the symbols (k, 1) that they depend on with several poses."""
+
+    expressions: Mapping[str, list[SX]]
+    inputs: SX
+
+
+def _robot_expressions(program: Program) -> _RobotExpressions:
+    """Return the robot's expressions: of the program's symbols, or with several poses of symbols of one pose."""
+    robot, inputs = program.robot, SX.sym("inputs", program.robot.inputs.numel())
+    if len(program.robots) > 1:
+        robot = RobotValues(program.model).robot(inputs)
+    base = ca.horzcat(SX(3, 0), *[leg.base for leg in robot.legs])
+    platform = ca.horzcat(SX(3, 0), *[leg.base + leg.span for leg in robot.legs])
+    lengths = ca.vertcat(SX(0, 1), *[ca.norm_2(leg.span) for leg in robot.legs])
+    matrix = ca.vertcat(ca.horzcat(robot.rotation, robot.position), SX([[0, 0, 0, 1]]))
+    expressions = {
+        "jacobian": [robot.jacobian.T],
+        "rates": [robot.rates.T],
+        "rotation": [robot.rotation.T],
+        "geometry": [lengths, base, platform, matrix.T],
+    }
+    if len(program.robots) > 1 or robot.F.numel() > 1:
+        expressions["F_of_tasks"] = [robot.F]
+    dense = {name: [ca.densify(each) for each in own] for name, own in expressions.items()}
+    return _RobotExpressions(dense, inputs)
+
+
+def _loop_functions(loop: Loop, name: str) -> tuple[ca.Function, ca.Function]:
+    """Return the functions of a loop.
+
+    * ``(inputs, constants) -> (values, Jacobian)``, row after row;
+    * ``(inputs, constants, multipliers) -> (gradient, Hessian)`` of the sum of the values times their multipliers.
+    """
+    u, values = loop.inputs, loop.values
+    multipliers = SX.sym("multipliers", values.numel())
+    hessian, gradient = ca.hessian(ca.dot(multipliers, values), u)
+    first = ca.cse([ca.densify(values), ca.densify(ca.jacobian(values, u).T)])
+    second = ca.cse([ca.densify(gradient), ca.densify(hessian)])
+    return (
+        ca.Function(f"{name}_values", [u, loop.constants], first),
+        ca.Function(f"{name}_curvature", [u, loop.constants, multipliers], second),
+    )
 
 
 class _Extraction(NamedTuple):

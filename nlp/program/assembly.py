@@ -10,6 +10,7 @@ from casadi import SX
 
 from ...models import frozen_vector, reason_for_zero_row
 from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.form import Call
 from ..case.task import Sense
 from ..errors import CaseError
 from .layout import Layout
@@ -20,19 +21,21 @@ from .program import Program
 
 def assemble(
     layout: Layout,
-    objective: SX,
+    objective: SX | Call,
     sense: Sense,
     constraints: Sequence[BoundedConstraint] = (),
     epigraph: Epigraph | None = None,
+    weights: tuple[int, ...] = (),
 ) -> Nlp:
     """Return the program of a layout.
 
     Args:
         layout: the case as symbols.
-        objective: (1, 1) expression in them.
+        objective: (1, 1) expression in them, or the call whose value it is.
         sense: whether the objective is maximised or minimised.
         constraints: constraints in addition to those of the layout.
         epigraph: places of the epigraph, where the objective is an epigraph variable.
+        weights: indices in ``p`` of the tasks' weights; empty for one task.
 
     Raises:
         CaseError: a limb has zero length at every point of the box.
@@ -44,11 +47,12 @@ def assemble(
         arguments=tuple(table.arguments),
         x=table.variables_vector,
         p=table.arguments_vector,
-        objective=objective,
+        objective=objective.value if isinstance(objective, Call) else objective,
         constraints=tuple(item.constraint for item in bounded),
         robots=layout.robots,
         model=case.model,
-        places=replace(layout.places, epigraph=epigraph),
+        places=replace(layout.places, epigraph=epigraph, weights=weights),
+        objective_call=objective if isinstance(objective, Call) else None,
     )
     nlp = Nlp(
         program=program,

@@ -26,6 +26,7 @@ from casadi import SX
 from ...models import Dimension, FloatArray
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.form import Call, Form
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from .assembly import assemble
@@ -79,8 +80,8 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     ceiling = max([*sizes, whole.objective_size])
     epigraph = _EpigraphBuilder(layout, Free(-ceiling, _LEVEL_BOUND * ceiling, ceiling / 2), ceiling)
     for k, robot in enumerate(layout.robots):
-        slack = robot.F[0] - epigraph.level if sense is Sense.MAX else epigraph.level - robot.F[0]
-        epigraph.add(f"F pose {k + 1}", slack)
+        form = Form(_above_level if sense is Sense.MAX else _below_level, (False,))
+        epigraph.add(f"F pose {k + 1}", form, robot.F[0], SX(1))
     return epigraph.program(sense)
 
 
@@ -97,22 +98,23 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
     """
     layout = lay_out(case, case.tasks)
-    F = total_over_poses([robot.F for robot in layout.robots], case.over_poses)
+    F = ca.horzcat(*[robot.F for robot in layout.robots])
+    is_mean = case.over_poses is OverPoses.MEAN
     senses = {task.sense for task in case.tasks}
     epigraph = _EpigraphBuilder(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
-    own_places = []
+    own_places, weight_places = [], []
     for j, task in enumerate(case.tasks):
-        weight = layout.table.add(f"weight{j}", Dimension.NUMBER, weights[j]).symbols
+        weight, (weight_place,) = layout.table.add(f"weight{j}", Dimension.NUMBER, weights[j])
+        weight_places.append(weight_place.index)
         own, (place,) = layout.table.add(f"best{j}", Dimension.NUMBER, best[j])
         own_places.append(place.index)
-        if senses == {Sense.MAX}:
-            slack = F[j] - weight * epigraph.level
-        elif senses == {Sense.MIN}:
-            slack = epigraph.level - weight * F[j]
+        if len(senses) > 1:
+            form = Form(_loss_of_maximum if task.sense is Sense.MAX else _loss_of_minimum, (is_mean,))
+            epigraph.add(f"task {task.name}", form, F[j, :].T, weight, own)
         else:
-            slack = epigraph.level - weight * (own - F[j] if task.sense is Sense.MAX else F[j] - own)
-        epigraph.add(f"task {task.name}", slack)
-    return epigraph.program(Sense.MAX if senses == {Sense.MAX} else Sense.MIN, tuple(own_places))
+            form = Form(_above_level if task.sense is Sense.MAX else _below_level, (is_mean,))
+            epigraph.add(f"task {task.name}", form, F[j, :].T, weight)
+    return epigraph.program(Sense.MAX if senses == {Sense.MAX} else Sense.MIN, tuple(own_places), tuple(weight_places))
 
 
 def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float], best: Sequence[float]) -> float:
@@ -164,6 +166,41 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
     return levels.ravel()
 
 
+def _above_level(numbers: SX, is_mean: bool) -> SX:
+    """Return ``(F - weight level) / ceiling`` from ceiling, level, weight and F at each pose."""
+    ceiling, level, weight = ca.vertsplit(numbers[:3])
+    return (_total(numbers[3:], is_mean) - weight * level) / ceiling
+
+
+def _below_level(numbers: SX, is_mean: bool) -> SX:
+    """Return ``(level - weight F) / ceiling`` from ceiling, level, weight and F at each pose."""
+    ceiling, level, weight = ca.vertsplit(numbers[:3])
+    return (level - weight * _total(numbers[3:], is_mean)) / ceiling
+
+
+def _loss_of_maximum(numbers: SX, is_mean: bool) -> SX:
+    """Return ``(level - weight (own - F)) / ceiling`` from ceiling, level, own optimum, weight and F at each pose."""
+    ceiling, level, own, weight = ca.vertsplit(numbers[:4])
+    return (level - weight * (own - _total(numbers[4:], is_mean))) / ceiling
+
+
+def _loss_of_minimum(numbers: SX, is_mean: bool) -> SX:
+    """Return ``(level - weight (F - own)) / ceiling`` from ceiling, level, own optimum, weight and F at each pose."""
+    ceiling, level, own, weight = ca.vertsplit(numbers[:4])
+    return (level - weight * (_total(numbers[4:], is_mean) - own)) / ceiling
+
+
+def weighted_total(numbers: SX, tasks: int, is_mean: bool) -> SX:
+    """Return ``sum w_j F_j`` from the tasks' weights and F of each task at each pose, pose after pose."""
+    weights, F = numbers[:tasks], ca.reshape(numbers[tasks:], tasks, -1)
+    return sum((weights[j] * _total(F[j, :].T, is_mean) for j in range(tasks)), SX(0))
+
+
+def _total(values: SX, is_mean: bool) -> SX:
+    """Return the sum or the mean, (1, 1), of values (N, 1) at N poses."""
+    return total_over_poses(ca.vertsplit(values), OverPoses.MEAN if is_mean else OverPoses.SUM)
+
+
 def _constant(slope: float, value: float) -> float:  # noqa: ARG001 - a slope is a function of the bound
     return slope
 
@@ -186,17 +223,25 @@ class _EpigraphBuilder:
         )
         self._constraints: list[BoundedConstraint] = []
 
-    def add(self, name: str, slack: SX) -> None:
-        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1."""
-        constraint = Constraint(name, slack / self._size, self._reading)
+    def add(self, name: str, slack: Form, *inputs: SX) -> None:
+        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1.
+
+        Args:
+            name: of the constraint.
+            slack: form of ceiling, level and inputs.
+            inputs: F of a task at each pose, then the task's own numbers.
+        """
+        call = Call(slack, ca.vertcat(self._size, self.level, *reversed(inputs)))
+        constraint = Constraint(name, call.value, self._reading, call=call)
         self._constraints.append(BoundedConstraint(constraint, 0.0, math.inf))
 
-    def program(self, sense: Sense, best: tuple[int, ...] = ()) -> Nlp:
+    def program(self, sense: Sense, best: tuple[int, ...] = (), weights: tuple[int, ...] = ()) -> Nlp:
         """Return the program that optimises the level.
 
         Args:
             sense: sense of the level.
             best: indices in ``p`` of each task's own optimum.
+            weights: indices in ``p`` of the tasks' weights.
 
         Raises:
             CaseError: a limb has zero length at every point of the box.
@@ -207,4 +252,4 @@ class _EpigraphBuilder:
             tuple(item.constraint for item in self._constraints),
             best,
         )
-        return assemble(self._layout, self.level, sense, self._constraints, epigraph)
+        return assemble(self._layout, self.level, sense, self._constraints, epigraph, weights)

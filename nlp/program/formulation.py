@@ -19,11 +19,12 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
+from ..case.limits.form import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from .assembly import assemble
-from .epigraph import formulate_worst_pose, total_over_poses
-from .layout import lay_out
+from .epigraph import formulate_worst_pose, weighted_total
+from .layout import Layout, lay_out
 from .nlp import Nlp
 from .places import Scalar
 from .program import Program
@@ -43,7 +44,7 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     sense = case.tasks[task].sense
     if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
         return formulate_worst_pose(layout, sense)
-    return assemble(layout, total_over_poses([robot.F[0] for robot in layout.robots], case.over_poses), sense)
+    return assemble(layout, _weighted_call(layout, [SX(1)]), sense)
 
 
 def formulate_each(case: Case) -> list[Nlp]:
@@ -78,15 +79,21 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
         CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
     """
     layout = lay_out(case, case.tasks)
-    F = total_over_poses([robot.F for robot in layout.robots], case.over_poses)
     senses = {task.sense for task in case.tasks}
     sense = senses.pop() if len(senses) == 1 else Sense.MAX
     signs = [1.0 if task.sense is sense else -1.0 for task in case.tasks]
-    symbols = [
-        layout.table.add(f"weight{j}", Dimension.NUMBER, sign * weight).symbols
+    added = [
+        layout.table.add(f"weight{j}", Dimension.NUMBER, sign * weight)
         for j, (sign, weight) in enumerate(zip(signs, weights, strict=True))
     ]
-    return assemble(layout, sum((symbol * F[j] for j, symbol in enumerate(symbols)), SX(0)), sense)
+    call = _weighted_call(layout, [each.symbols for each in added])
+    return assemble(layout, call, sense, weights=tuple(each.places[0].index for each in added))
+
+
+def _weighted_call(layout: Layout, weights: Sequence[SX]) -> Call:
+    """Return the weighted sum of the tasks' objectives, (1, 1) each weight, over all poses."""
+    form = Form(weighted_total, (len(weights), layout.case.over_poses is OverPoses.MEAN))
+    return Call(form, ca.vertcat(*weights, *[robot.F for robot in layout.robots]))
 
 
 def proximity_program(program: Program) -> Program:
@@ -95,6 +102,7 @@ def proximity_program(program: Program) -> Program:
     t, scale, cost = SX.sym("target", n), SX.sym("scale", n), SX.sym("cost")
     return replace(
         program,
+        objective_call=None,
         objective=program.objective + cost * ca.sumsqr((program.x - t) / scale),
         p=ca.vertcat(program.p, t, scale, cost),
         arguments=(*program.arguments, *(Scalar(f"near{i}", Dimension.NUMBER) for i in range(2 * n + 1))),

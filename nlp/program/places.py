@@ -95,6 +95,7 @@ class Places:
         twists: indices in ``p`` of the six numbers of each task's twist.
         directions: indices in ``x`` of the three components of each unit vector with three free components.
         epigraph: places of the epigraph of a worst case; None where the objective consists of F itself.
+        weights: indices in ``p`` of the tasks' weights; empty for one task.
     """
 
     numbers: tuple[Place, ...]
@@ -103,6 +104,7 @@ class Places:
     twists: tuple[range, ...]
     directions: tuple[tuple[int, int, int], ...] = ()
     epigraph: Epigraph | None = None
+    weights: tuple[int, ...] = ()
 
 
 class PlacedSymbols(NamedTuple):

@@ -17,6 +17,7 @@ from casadi import SX
 from ...models import FloatArray, Model, RobotInstance
 from ...models.whole import Whole
 from ..case.limits.constraint import Constraint
+from ..case.limits.form import Call
 from .kernel import Kernel, single_output
 from .places import Places, Scalar
 
@@ -90,6 +91,7 @@ class Program(Whole):
         robots: the robot's expressions at each pose.
         model: the robot itself.
         places: places of the case's numbers, rotations, unknowns, twists, directions and epigraph.
+        objective_call: the call whose value the objective is, where it combines F of several poses.
     """
 
     variables: tuple[Scalar, ...]
@@ -101,6 +103,7 @@ class Program(Whole):
     robots: tuple[RobotInstance, ...]
     model: Model
     places: Places
+    objective_call: Call | None = None
 
     def __repr__(self) -> str:
         counts = (

@@ -113,11 +113,12 @@ def formulate_relaxation(nlp: Nlp) -> Nlp:
     unchanged = [k for k, constraint in enumerate(program.constraints) if not any(constraint.keys)]
     constraints = [program.constraints[k] for k in unchanged]
     lower, upper = [nlp.g_lower[k] for k in unchanged], [nlp.g_upper[k] for k in unchanged]
+    reading = Reading(Dimension.NUMBER)
     for side in sides:
         number = side.number + side.direction * side.unit * t[keys.index(side.key)]
         slack = side.constraint.expression - side.constraint.reading.to_value(number)
         own = (side.key, "") if side.direction < 0 else ("", side.key)
-        constraints.append(replace(side.constraint, expression=slack, reading=Reading(Dimension.NUMBER), keys=own))
+        constraints.append(replace(side.constraint, expression=slack, call=None, reading=reading, keys=own))
         lower.append(0.0 if side.direction < 0 else -np.inf)
         upper.append(np.inf if side.direction < 0 else 0.0)
     relaxation = replace(
@@ -125,6 +126,7 @@ def formulate_relaxation(nlp: Nlp) -> Nlp:
         variables=(*program.variables, *(Scalar(f"relaxation of {key}", Dimension.NUMBER) for key in keys)),
         x=ca.vertcat(program.x, t),
         objective=ca.sum1(t),
+        objective_call=None,
         constraints=tuple(constraints),
     )
     return replace(

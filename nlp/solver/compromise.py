@@ -86,7 +86,7 @@ def combine(
     Returns:
         The solution, with no seconds yet.
     """
-    weights, scaling_notices = _scale_weights(case)
+    weights, scaling_notices = scale_weights(case)
     points, unique, notices = _choose_members(nlps, own, polish)
     notices = [*scaling_notices, *notices]
     combined: ProgramSolution | None = None
@@ -117,22 +117,22 @@ def combine(
     )
 
 
-class _Weights(NamedTuple):
+class Weights(NamedTuple):
     """Scaled weights of the tasks, and notices about the scaling."""
 
     values: list[float]
     notices: list[str]
 
 
-def _scale_weights(case: Case) -> _Weights:
+def scale_weights(case: Case) -> Weights:
     """Return the tasks' weights scaled to sum to the number of tasks, as equation 15 needs them."""
     given = [task.weight for task in case.tasks]
     total, n = sum(given), len(given)
     if abs(total - n) <= 1e-12 * n:
-        return _Weights(given, [])
+        return Weights(given, [])
     scaled = [weight * n / total for weight in given]
     shown = ", ".join(f"{weight:g}" for weight in scaled)
-    return _Weights(
+    return Weights(
         scaled, [f"the weights sum to {total:g} and were scaled to sum to {n}, the number of tasks: {shown}"]
     )
 

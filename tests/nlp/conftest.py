@@ -10,13 +10,15 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from screwsynth.nlp import Case, load_case
+from screwsynth.nlp import Case, Nlp, load_case
 from screwsynth.nlp.cli.main import run as command_line
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
+from screwsynth.nlp.program.sampling import starting_points
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -85,17 +87,16 @@ class Solved:
 class Embedded:
     """The C of a case, compiled and loaded."""
 
-    def __init__(self, case: Case, folder: Path) -> None:
+    def __init__(self, case: Case, folder: Path, level: str = "-O2") -> None:
         files = generate_c(case, "")
         for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
-        sources += [str(folder / name) for name in files if name.endswith("-spectrum.c")]
+        sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
-        flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
+        flags = ["-std=c99", level, "-shared", "-fPIC"]
         subprocess.run([compiler, *flags, *sources, "-lm", "-o", library], check=True)
         self._library = ctypes.CDLL(library)
         self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
@@ -126,8 +127,51 @@ class Embedded:
         (value,) = re.findall(rf"#define {self.prefix.upper()}_{name} (\d+)", self.header)
         return int(value)
 
-    def call(self, function: str, *arrays: np.ndarray) -> int:
-        return int(getattr(self._library, f"{self.prefix}_{function}")(*[_address(each) for each in arrays]))
+    def call(self, function: str, *arguments: np.ndarray | int) -> int:
+        given = [each if isinstance(each, int) else _address(each) for each in arguments]
+        return int(getattr(self._library, f"{self.prefix}_{function}")(*given))
+
+    def compare(self, nlp: Nlp, count: int, close: float = 1e-14) -> None:
+        """Compare every function with the program's own, at random points."""
+        p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n
+        m, limits = len(nlp.program.model.wrenches), len(nlp.program.constraints)
+        tasks, legs, poses = self.macro("TASKS"), self.macro("LEGS"), self.macro("POSES")
+        k, work = np.zeros(self.macro("K") + 1), np.zeros(self.macro("WORK"))
+        F, gradient, hessian = np.zeros(1), np.zeros(n), np.zeros((n, n))
+        J, rates, g, dg = np.zeros((m, 6)), np.zeros((m, tasks)), np.zeros(limits), np.zeros((limits, n))
+        R, axis, angle, each = np.zeros((3, 3)), np.zeros(3), np.zeros(1), np.zeros(tasks)
+        lengths, base, platform, matrix = np.zeros(legs), np.zeros((legs, 3)), np.zeros((legs, 3)), np.zeros((4, 4))
+        assert self.call("prepare", p, k, work) == 0
+        for i, x in enumerate(_random_points(nlp, count)):
+            pose, at = i % poses, ([i % poses] if poses > 1 else [])
+            assert self.call("F", x, k, F, work) == 0
+            alone = F[0]
+            assert self.call("F_gradient", x, k, F, gradient, work) == 0
+            assert F[0] == alone
+            assert self.call("F_hessian", x, k, F, gradient, hessian, work) == 0
+            assert self.call("jacobian", x, k, *at, J, work) == self.call("rates", x, k, *at, rates, work) == 0
+            assert self.call("limits", x, k, g, dg, work) == self.call("rotation", x, k, *at, R, axis, angle, work) == 0
+            assert self.call("geometry", x, k, *at, lengths, base, platform, matrix, work) == 0
+            value, slope, constraint, constraint_slope = kernels.derivatives(x, p)
+            second = kernels.hessian(x, p, 1.0, np.zeros(limits))
+            state, robot = kernels.robot_states[pose](x, p), nlp.program.robots[pose]
+            pairs = [(F, value.ravel()), (gradient, slope.ravel()), (hessian, second), (J, state.jacobian)]
+            pairs += [(rates, state.rates), (g, constraint.ravel()), (dg, constraint_slope), (R, state.rotation)]
+            pairs += [(matrix[:3], np.hstack([state.rotation, state.position])), (matrix[3], np.array([0, 0, 0, 1.0]))]
+            if tasks * poses > 1:
+                assert self.call("F_of_tasks", x, k, *at, each, work) == 0
+                pairs.append((each, state.F.ravel()))
+            if legs and i < 20:
+                ends = [ca.horzcat(*[part for leg in robot.legs for part in (leg.base, leg.base + leg.span)])]
+                ends = ca.Function("ends", [nlp.program.x, nlp.program.p], ends)(x, p).full().T
+                pairs += [(base, ends[::2]), (platform, ends[1::2])]
+                pairs.append((lengths, np.linalg.norm(ends[1::2] - ends[::2], axis=1)))
+            # The same operations: a compiler may still contract or reorder the last digit.
+            for got, wanted in pairs:
+                if got.size:
+                    assert np.max(np.abs(got - wanted)) <= close * max(1.0, float(np.max(np.abs(wanted))))
+            turned = np.eye(3) + np.sin(angle[0]) * _cross(axis) + (1 - np.cos(angle[0])) * _cross(axis) @ _cross(axis)
+            assert np.max(np.abs(turned - R)) <= 1e-13
 
     def solve(self, *, maximise: int | None = None, seeds: int | None = None, **arrays: np.ndarray) -> Solved:
         """Solve the default problem with some of its arrays replaced."""
@@ -161,19 +205,27 @@ class Embedded:
         return Solved(status, result.F, np.array(result.x)[: self.n], **arrays_out, **scalars)
 
 
+def _random_points(nlp: Nlp, count: int) -> list[np.ndarray]:
+    return [np.ascontiguousarray(x) for x in starting_points(nlp, count + 1, 7)[1:]] if nlp.n else [nlp.start]
+
+
+def _cross(u: np.ndarray) -> np.ndarray:
+    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+
+
 def _address(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
 @pytest.fixture(scope="session")
-def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Case], Embedded]:
+def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Embedded]:
     """The C of any case."""
     if not any(shutil.which(name) for name in ("gcc", "clang", "cc")):
         pytest.skip("no C compiler is installed")
-    return lambda case: Embedded(case, tmp_path_factory.mktemp("c"))
+    return lambda case, level="-O2": Embedded(case, tmp_path_factory.mktemp("c"), level)
 
 
 @pytest.fixture(scope="session")
-def embedded(embed: Callable[[Case], Embedded]) -> Callable[[str], Embedded]:
+def embedded(embed: Callable[..., Embedded]) -> Callable[[str], Embedded]:
     """The C of a shipped case, made once."""
     return cache(lambda name: embed(load_case(name)))

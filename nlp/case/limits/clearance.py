@@ -20,6 +20,7 @@ from casadi import SX
 
 from ....models import Dimension
 from .constraint import BoundedConstraint, Reading, between
+from .form import Call, Form
 from .interval import LowerLimit
 from .limit import PosedRobot
 from .segments import squared_distance
@@ -37,15 +38,25 @@ class LegClearance(LowerLimit):
         """Return a smooth function of the distance of each pair of legs, with the distance itself."""
         far = 4 * self.min**2
         for one, other in itertools.combinations(pose.robot.legs, 2):
-            squared = squared_distance(one.base, one.span, other.base, other.span)
+            ends = ca.vertcat(one.base, one.span, other.base, other.span)
             yield between(
                 f"leg_clearance limbs {one.name} and {other.name}{pose.where}",
-                _near(squared, far),
+                Call(Form(_near_of_legs, (far,)), ends),
                 _reading(far),
                 "leg_clearance",
                 lower=self.min,
-                exact=ca.sqrt(squared),
+                exact=ca.sqrt(_squared_of_legs(ends)),
             )
+
+
+def _squared_of_legs(ends: SX) -> SX:
+    """Return the squared distance (1, 1) of two legs from the base and the span of each, (12, 1)."""
+    return squared_distance(ends[:3], ends[3:6], ends[6:9], ends[9:])
+
+
+def _near_of_legs(ends: SX, far: float) -> SX:
+    """Return :func:`_near` of the distance of two legs from the base and the span of each, (12, 1)."""
+    return _near(_squared_of_legs(ends), far)
 
 
 def _near(squared: SX, far: float) -> SX:

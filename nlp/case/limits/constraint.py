@@ -11,6 +11,7 @@ from typing import TypeAlias, TypeVar
 from casadi import SX
 
 from ....models import Dimension, FloatArray
+from .form import Call
 
 _T = TypeVar("_T")
 
@@ -105,6 +106,7 @@ class Constraint:
         exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
         measure: the measured number itself, where the expression only estimates it.
         spectral: the matrix that the expression is made from, where it estimates eigenvalues.
+        call: the call whose value the expression is, where it repeats for several legs, joints, tasks or poses.
     """
 
     name: str
@@ -115,6 +117,7 @@ class Constraint:
     exact: SX | None = None
     measure: JacobianMeasure | None = None
     spectral: Spectral | None = None
+    call: Call | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,7 @@ class BoundedConstraint:
 
 def bounded(
     name: str,
-    expression: SX,
+    expression: SX | Call,
     reading: Reading,
     keys: tuple[str, str],
     *,
@@ -142,7 +145,7 @@ def bounded(
 
     Args:
         name: in the words of a case.
-        expression: (1, 1); it grows with the measured number.
+        expression: (1, 1), or the call whose value it is; it grows with the measured number.
         reading: how its bounds read.
         keys: dotted keys below ``limits`` of the lower and of the upper number; empty where there is none.
         lower: the lower number, radians for an angle; None where there is none.
@@ -151,8 +154,9 @@ def bounded(
         measure: the measured number itself, where the expression only estimates it.
         spectral: the matrix that the expression is made from, where it estimates eigenvalues.
     """
+    value, call = (expression.value, expression) if isinstance(expression, Call) else (expression, None)
     return BoundedConstraint(
-        Constraint(name, expression, reading, keys, exact=exact, measure=measure, spectral=spectral),
+        Constraint(name, value, reading, keys, exact=exact, measure=measure, spectral=spectral, call=call),
         -math.inf if lower is None else float(reading.to_value(SX(lower))),
         math.inf if upper is None else float(reading.to_value(SX(upper))),
     )
@@ -160,7 +164,7 @@ def bounded(
 
 def between(
     name: str,
-    expression: SX,
+    expression: SX | Call,
     reading: Reading,
     key: str,
     *,

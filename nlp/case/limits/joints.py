@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
@@ -31,10 +31,13 @@ from ...units import Units
 from ..table import Table, Vector
 from ..toml import TomlValue
 from .constraint import BoundedConstraint, Reading, between
+from .form import Call, Form
 from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
+#: A direction (3, 1) in another frame, with the platform's rotation (3, 3).
+Turn: TypeAlias = Callable[[SX, SX], SX]
 
 
 def _angle(value: float) -> float:
@@ -49,6 +52,26 @@ def _slope(value: float) -> float:
 
 def _minus_cosine(angle: SX) -> SX:
     return -ca.cos(angle)
+
+
+def _minus_cosine_of_leg(axis_and_span: SX) -> SX:
+    """Return minus the cosine, (1, 1), of the angle between a unit axis and a leg's span, (6, 1) together."""
+    axis, span = axis_and_span[:3], axis_and_span[3:]
+    return -(ca.dot(axis, span) / ca.norm_2(span))
+
+
+def _minus_cosine_from_home(inputs: SX, to_world: Turn, from_home: Turn) -> SX:
+    """Return minus the cosine, (1, 1), of the angle between a leg and its joint's axis, which is the leg's at home.
+
+    Args:
+        inputs: rotation column after column and position at home, platform joint, base joint, rotation, span, (30, 1).
+        to_world: of a direction of the joint's plate.
+        from_home: its inverse.
+    """
+    R, p, platform, base = ca.reshape(inputs[:9], 3, 3), inputs[9:12], inputs[12:15], inputs[15:18]
+    span = p + R @ platform - base
+    axis = to_world(from_home(span / ca.norm_2(span), R), ca.reshape(inputs[18:27], 3, 3))
+    return _minus_cosine_of_leg(ca.vertcat(axis, inputs[27:]))
 
 
 #: ``-cos(angle)`` read as the angle.
@@ -207,20 +230,29 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         """Return the cosine of each joint's angle."""
         robot = pose.robot
         for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
-            cosine = ca.dot(self._to_world(axis, robot.rotation), leg.span) / ca.norm_2(leg.span)
-            yield between(f"{self.key} limb {leg.name}{pose.where}", -cosine, _ANGLE, self.key, upper=self.max)
+            if isinstance(self.about, MountingPose):
+                R, p = self._home_pose(self.about)
+                form = Form(_minus_cosine_from_home, (self._to_world, self._from_home))
+                cosine = Call(form, ca.veccat(R, p, leg.platform, leg.base, robot.rotation, leg.span))
+            else:
+                cosine = Call(Form(_minus_cosine_of_leg), ca.vertcat(self._to_world(axis, robot.rotation), leg.span))
+            yield between(f"{self.key} limb {leg.name}{pose.where}", cosine, _ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
         """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""
         if self.about is None:
             return [SX([0, 0, 1])] * len(robot.legs)
         if isinstance(self.about, MountingPose):
-            (axis,) = unit_axes((self.about.axis,), 1)
-            R = matrix_from_axis_angle(SX(axis.tolist()), SX(self.about.angle))
-            p = SX(list(self.about.position))
+            R, p = self._home_pose(self.about)
             spans = [p + R @ leg.platform - leg.base for leg in robot.legs]
             return [self._from_home(span / ca.norm_2(span), R) for span in spans]
         return [SX(axis.tolist()) for axis in unit_axes(self.about, len(robot.legs))]
+
+    @staticmethod
+    def _home_pose(home: MountingPose) -> tuple[SX, SX]:
+        """Return the rotation (3, 3) and the position (3, 1) of a mounting pose."""
+        (axis,) = unit_axes((home.axis,), 1)
+        return matrix_from_axis_angle(SX(axis.tolist()), SX(home.angle)), SX(list(home.position))
 
     @staticmethod
     @abc.abstractmethod

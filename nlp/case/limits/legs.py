@@ -21,6 +21,7 @@ from ....models import Model
 from ...errors import CaseError
 from ..table import Table
 from .constraint import LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
+from .form import Call, Form
 from .interval import IntervalLimit
 from .limit import Design, Limit, LimitedCase, PosedRobot, Written
 from .pairs import PairFamily
@@ -46,7 +47,8 @@ class LegLength(IntervalLimit):
             yield from QuantityLimit(self.key, min=self.min, max=self.max).at_pose(pose)
         for leg in pose.robot.legs:
             name = f"leg_length limb {leg.name}{pose.where}"
-            yield between(name, ca.sumsqr(leg.span), SQUARED_LENGTH, "leg_length", lower=self.min, upper=self.max)
+            squared = Call(Form(ca.sumsqr), leg.span)
+            yield between(name, squared, SQUARED_LENGTH, "leg_length", lower=self.min, upper=self.max)
 
 
 class ActuatorTable(Table):
@@ -56,6 +58,16 @@ class ActuatorTable(Table):
     dead_length: FiniteFloat | None = Field(
         default=None, description="what the leg has beside its stroke: shortest >= dead_length + stroke"
     )
+
+
+def _stroke(spans: SX) -> SX:
+    """Return the longer length less the shorter, (1, 1), from a leg's shorter and longer span, (6, 1) together."""
+    return ca.norm_2(spans[3:]) - ca.norm_2(spans[:3])
+
+
+def _dead_length(spans: SX) -> SX:
+    """Return the shorter length less the stroke, (1, 1), from a leg's shorter and longer span, (6, 1) together."""
+    return 2 * ca.norm_2(spans[:3]) - ca.norm_2(spans[3:])
 
 
 @dataclass(frozen=True)
@@ -105,19 +117,20 @@ class Actuator(Limit[ActuatorTable]):
         if len(design.robots) == 1:
             return
         for i, leg in enumerate(design.robots[0].legs):
-            lengths = ca.vertcat(*[ca.norm_2(robot.legs[i].span) for robot in design.robots])
-            yield PairFamily(lengths, partial(self._pair, leg.name, lengths), self._slack)
+            spans = ca.horzcat(*[robot.legs[i].span for robot in design.robots])
+            lengths = ca.vertcat(*[ca.norm_2(spans[:, k]) for k in range(len(design.robots))])
+            yield PairFamily(lengths, partial(self._pair, leg.name, spans), self._slack)
 
-    def _pair(self, leg: str, lengths: SX, a: int, b: int) -> tuple[BoundedConstraint, ...]:
-        """Return the constraints on a leg, with its lengths (N, 1), that is shorter at pose ``a`` than at ``b``."""
+    def _pair(self, leg: str, spans: SX, a: int, b: int) -> tuple[BoundedConstraint, ...]:
+        """Return the constraints on a leg, with its spans (3, N), that is shorter at pose ``a`` than at ``b``."""
         where, limits = f" limb {leg} poses {a + 1} and {b + 1}", []
-        shorter, longer = lengths[a], lengths[b]
+        both = ca.vertcat(spans[:, a], spans[:, b])
         if self.stroke_max is not None:
             key = "actuator.stroke_max"
-            limits.append(bounded(f"{key}{where}", longer - shorter, LENGTH, ("", key), upper=self.stroke_max))
+            limits.append(bounded(f"{key}{where}", Call(Form(_stroke), both), LENGTH, ("", key), upper=self.stroke_max))
         if self.dead_length is not None:
-            key = "actuator.dead_length"
-            limits.append(bounded(f"{key}{where}", 2 * shorter - longer, LENGTH, (key, ""), lower=self.dead_length))
+            key, dead = "actuator.dead_length", Call(Form(_dead_length), both)
+            limits.append(bounded(f"{key}{where}", dead, LENGTH, (key, ""), lower=self.dead_length))
         return tuple(limits)
 
     def _slack(self, shorter: float, longer: float) -> float:

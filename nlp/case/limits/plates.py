@@ -19,8 +19,14 @@ from ....models import Dimension
 from ...errors import CaseError
 from ..table import Table
 from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, between, bounded
+from .form import Call, Form
 from .interval import IntervalLimit, LowerLimit
 from .limit import Design, Limit, LimitedCase, Plate, Written
+
+
+def _squared_distance(points: SX) -> SX:
+    """Return the squared distance (1, 1) of two points, (6, 1) together."""
+    return ca.sumsqr(points[:3] - points[3:])
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,7 @@ class JointSpacing(LowerLimit):
         """Return the squared distance of each pair of joints."""
         for one, other in itertools.combinations(plate.joints, 2):
             name = f"joint_spacing {plate.name} joints {one.name} and {other.name}"
-            apart = ca.sumsqr(one.centre - other.centre)
+            apart = Call(Form(_squared_distance), ca.vertcat(one.centre, other.centre))
             yield between(name, apart, SQUARED_LENGTH, "joint_spacing", lower=self.min)
 
 
@@ -80,7 +86,7 @@ class Footprint(Limit[FootprintTable]):
         if largest is None:
             return
         for joint in plate.joints:
-            radius, keys = ca.sumsqr(joint.centre[:2]), ("", f"footprint.{plate.name}")
+            radius, keys = Call(Form(ca.sumsqr), joint.centre[:2]), ("", f"footprint.{plate.name}")
             yield bounded(f"footprint {plate.name} joint {joint.name}", radius, SQUARED_LENGTH, keys, upper=largest)
 
 

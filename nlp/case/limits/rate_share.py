@@ -6,16 +6,25 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
+import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
 from ..table import Table
 from .constraint import NUMBER, BoundedConstraint, between
+from .form import Call, Form
 from .interval import AtMost
 from .limit import Limit, LimitedCase, PosedRobot, Written
 
 #: Keeps a limb's share of F defined where F is 0, in parts of F's size without cancellation.
 _SHARELESS = 1e-14
+
+
+def _share(numbers: SX) -> SX:
+    """Return a limb's share of F, (1, 1), from F, F without cancellation and the limb's rates, (2 + rates, 1)."""
+    rates = numbers[2:]
+    squares = sum((rates[i] ** 2 for i in range(rates.numel())), SX(0))
+    return squares / (numbers[0] + _SHARELESS * numbers[1])
 
 
 @dataclass(frozen=True)
@@ -47,8 +56,7 @@ class RateShare(Limit[AtMost]):
         robot = pose.robot
         for j, task in enumerate(pose.tasks):
             whose = f" task {task}" if len(pose.tasks) > 1 else ""
-            whole = robot.F[j] + _SHARELESS * robot.magnitude[j]
             for limb in pose.model.limbs:
                 own = [robot.rates[i, j] for i, row in enumerate(pose.model.wrenches) if row.limb == limb]
-                part = sum((rate**2 for rate in own), SX(0)) / whole
+                part = Call(Form(_share), ca.vertcat(robot.F[j], robot.magnitude[j], *own))
                 yield between(f"rate_share limb {limb}{whose}{pose.where}", part, NUMBER, "rate_share", upper=self.max)

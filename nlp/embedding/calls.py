@@ -1,0 +1,243 @@
+"""A program as calls of few functions: those that repeat for legs, pairs of legs, joints, tasks and poses.
+
+A call of a limit or of the objective is a *final* call. It may take values of *inner* calls: spans of legs, rates of
+rows, their sums, and with several poses the other numbers of the robot at each pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
+
+import casadi as ca
+from casadi import SX
+
+from ...models import Model, RobotInstance, Substitution, WrenchKind, homogenised, instantiate
+from ...models.instance import LegInstance, magnitude, objective, rates
+from ...models.wrench import Wrench, force_along
+from ..case.limits.form import Call, Form
+from ..program.program import Program
+
+#: Depth to which expressions of joint centres at two poses are compared.
+_DEPTH = 1000
+#: Operations of the second derivatives of all calls of one form up to which they stay single operations in C. A loop
+#: saves little then, and single operations are faster.
+_FEW = 2000
+
+
+#: A row of J from its inputs, as :func:`_inputs_of_row` returns them.
+RowBuild: TypeAlias = Callable[[SX], Wrench]
+
+
+class InnerCall(NamedTuple):
+    """A call, and its value (r, 1) as the program's own expressions."""
+
+    call: Call
+    values: SX
+
+
+class FinalCall(NamedTuple):
+    """A call, and the index of the constraint that is its value; the number of constraints for the objective."""
+
+    call: Call
+    place: int
+
+
+@dataclass(frozen=True, eq=False)
+class Calls:
+    """The calls of a program.
+
+    Attributes:
+        inner: calls whose values other calls take.
+        final: calls whose values are constraints, or the objective.
+        matrices: J with moments about the platform's origin, (6 m, 1) row after row, at each pose; empty where there is
+            no limit on singular values.
+    """
+
+    inner: tuple[InnerCall, ...]
+    final: tuple[FinalCall, ...]
+    matrices: tuple[SX, ...]
+
+
+@dataclass(frozen=True)
+class RobotValues:
+    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form."""
+
+    model: Model
+
+    def __call__(self, inputs: SX) -> SX:
+        """Return :func:`robot_values` of a robot from its inputs (k, 1)."""
+        return robot_values(self.robot(inputs))
+
+    def robot(self, inputs: SX) -> RobotInstance:
+        """Return the robot from its inputs (k, 1)."""
+        at, parts = 0, []
+        for each in Substitution.identity(self.model).all:
+            parts.append(ca.reshape(inputs[at : at + each.numel()], each.shape))
+            at += each.numel()
+        twists = [inputs[j : j + 6] for j in range(at + 1, inputs.numel(), 6)]
+        return instantiate(self.model, Substitution(*parts), inputs[at], twists)
+
+
+def robot_values(robot: RobotInstance) -> SX:
+    """Return F, rates, F without cancellation, closure, quantities and J row after row, below each other (r, 1).
+
+    The moments of J are about the platform's origin.
+    """
+    numbers = [robot.F, robot.rates, robot.magnitude, robot.closure, *robot.quantities, _central_rows(robot)]
+    return ca.veccat(*numbers)
+
+
+def span_of_leg(inputs: SX) -> SX:
+    """Return ``p + R a - b``, (3, 1), from p, R column after column, a and b, (18, 1) together."""
+    return inputs[:3] + ca.reshape(inputs[3:12], 3, 3) @ inputs[12:15] - inputs[15:]
+
+
+def find_calls(program: Program) -> Calls:
+    """Return the calls of a program.
+
+    At a single pose limits of few operations are no calls, and the objective is one only where limits take F.
+    """
+    several = len(program.robots) > 1
+    is_spectral = any(each.spectral is not None for each in program.constraints)
+    matrices = tuple(_central_rows(robot) for robot in program.robots) if is_spectral else ()
+    inner = _inner_calls(program, matrices)
+    values = {each.element_hash() for item in inner for each in ca.vertsplit(item.values) if not each.is_constant()}
+    final = []
+    for place, constraint in enumerate(program.constraints):
+        if several and constraint.spectral is None and constraint.expression.element_hash() in values:
+            final.append(FinalCall(Call(Form(_same), constraint.expression), place))
+        elif constraint.call is not None:
+            final.append(FinalCall(constraint.call, place))
+    taken = values if several else set()
+    chosen = [each for members in by_form(final) if _is_worthwhile(program, members, taken) for each in members]
+    of_F = {each.element_hash() for robot in program.robots for each in ca.vertsplit(robot.F)}
+    takes_F = several or any(each.element_hash() in of_F for item in chosen for each in ca.vertsplit(item.call.inputs))
+    if program.objective_call is not None and takes_F:
+        chosen.append(FinalCall(program.objective_call, len(program.constraints)))
+    return Calls(inner, tuple(chosen), matrices)
+
+
+def _same(inputs: SX) -> SX:
+    return inputs
+
+
+def _central_rows(robot: RobotInstance) -> SX:
+    """Return J (6 m, 1), row after row, with moments about the platform's origin."""
+    return ca.vec(ca.horzcat(*homogenised(robot.jacobian, robot.position, 1.0)).T)
+
+
+def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, ...]:
+    """Return the calls that give spans of legs, rates, F, and with several poses the robot's other numbers.
+
+    Of two calls with the same value the first one is used.
+    """
+    calls: list[InnerCall] = []
+    first = program.robots[0].legs
+    for k, robot in enumerate(program.robots):
+        legs = [_with_first_joints(leg, own) for leg, own in zip(robot.legs, first, strict=True)]
+        for leg in legs:
+            inputs = ca.veccat(robot.position, robot.rotation, leg.platform, leg.base)
+            calls.append(InnerCall(Call(Form(span_of_leg), inputs), leg.span))
+        rows = [_inputs_of_row(row, legs) for row in robot.rows]
+        if len(program.robots) == 1 or all(row.form == _FORCE_OF_LEG for row in rows):
+            calls += _calls_of_rows(robot, rows)
+        if len(program.robots) > 1:
+            values = robot_values(robot)
+            if matrices:
+                values[values.numel() - matrices[k].numel() :] = matrices[k]
+            calls.append(InnerCall(Call(Form(RobotValues(program.model)), robot.inputs), values))
+    return tuple(calls)
+
+
+def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
+    """Return a leg with the expressions of its joint centres at the first pose: no pose changes the centres."""
+    same = all(
+        ca.is_equal(here, there, _DEPTH) for here, there in ((leg.base, first.base), (leg.platform, first.platform))
+    )
+    return replace(leg, base=first.base, platform=first.platform) if same else leg
+
+
+class _RowInputs(NamedTuple):
+    """A row: the form of its rates, and the inputs that determine the row."""
+
+    form: Form
+    inputs: SX
+
+
+def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> _RowInputs:
+    """Return the inputs of a row: base and span of a leg that it acts along, else force, moment and square."""
+    for leg in legs:
+        along = force_along(leg.name, leg.base, leg.span)
+        if row.kind is WrenchKind.FORCE and row.limb == leg.name:
+            pairs = ((row.force, along.force), (row.moment, along.moment), (row.square, along.square))
+            if all(ca.is_equal(one, other, _DEPTH) for one, other in pairs):
+                return _RowInputs(_FORCE_OF_LEG, ca.vertcat(leg.base, leg.span))
+    form = _FORCE if row.kind is WrenchKind.FORCE else _COUPLE
+    return _RowInputs(form, ca.vertcat(row.force, row.moment, row.square))
+
+
+def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[InnerCall]:
+    """Return the calls that give each row's rates, and those that give F and F without cancellation from them."""
+    tasks = robot.F.numel()
+    at = robot.inputs.numel() - 6 * tasks
+    length, calls = robot.inputs[at - 1], []
+    for j in range(tasks):
+        twist, terms, sizes = (
+            robot.inputs[at + 6 * j : at + 6 * j + 6],
+            SX.sym("term", len(rows)),
+            SX.sym("size", len(rows)),
+        )
+        for i, row in enumerate(rows):
+            inputs = ca.vertcat(length, twist, row.inputs)
+            calls.append(InnerCall(Call(row.form, inputs), ca.vertcat(robot.rates[i, j], terms[i])))
+            form = Form(_size_of_row, row.form.numbers)
+            calls.append(InnerCall(Call(form, ca.vertcat(length, twist, robot.position, row.inputs)), sizes[i]))
+        calls.append(InnerCall(Call(Form(ca.sum1), terms), robot.F[j]))
+        calls.append(InnerCall(Call(Form(ca.sum1), sizes), robot.magnitude[j]))
+    return calls
+
+
+def _force_of_leg(inputs: SX) -> Wrench:
+    return force_along("", inputs[:3], inputs[3:])
+
+
+def _force(inputs: SX) -> Wrench:
+    return Wrench("", WrenchKind.FORCE, inputs[:3], inputs[3:6], inputs[6])
+
+
+def _couple(inputs: SX) -> Wrench:
+    return Wrench("", WrenchKind.COUPLE, inputs[:3], inputs[3:6], inputs[6])
+
+
+def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
+    """Return a row's rate and its part of F, (2, 1), from characteristic length, twist and the row's inputs."""
+    length, twist, rows = inputs[0], inputs[1:7], [row(inputs[7:])]
+    return ca.vertcat(rates(rows, twist, length), objective(rows, twist, length))
+
+
+def _size_of_row(inputs: SX, row: RowBuild) -> SX:
+    """Return a row's part of F without cancellation, (1, 1), from length, twist, position and the row's inputs."""
+    return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
+
+
+_FORCE_OF_LEG, _FORCE, _COUPLE = (Form(_rate_of_row, (row,)) for row in (_force_of_leg, _force, _couple))
+
+
+def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[int]) -> bool:
+    """Return whether calls take values of inner calls, or are many operations."""
+    if any(each.element_hash() in values for item in members for each in ca.vertsplit(item.call.inputs)):
+        return True
+    multipliers = SX.sym("multipliers", len(members))
+    total = ca.dot(multipliers, ca.vertcat(*[item.call.value for item in members]))
+    hessian = ca.Function("hessian", [program.x, program.p, multipliers], [ca.hessian(total, program.x)[0]])
+    return len(members) > 1 and int(hessian.n_instructions()) > _FEW
+
+
+def by_form(final: Iterable[FinalCall]) -> list[list[FinalCall]]:
+    """Return calls of one form and one number of inputs together, in the order of the first of them."""
+    found: dict[tuple[Form, int], list[FinalCall]] = {}
+    for item in final:
+        found.setdefault((item.call.form, item.call.inputs.numel()), []).append(item)
+    return list(found.values())

@@ -1,0 +1,133 @@
+"""The program of a case that C is generated for: of its task, or of several tasks by the case's method."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import frozen_vector
+from ..case.case import Case
+from ..case.pose import OverPoses
+from ..case.task import Method, Sense
+from ..errors import CaseError
+from ..program.formulation import formulate, formulate_weighted
+from ..program.nlp import Nlp
+from ..program.pairs import with_all_pairs
+from ..solver.compromise import scale_weights
+from ..solver.multistart import solve_program
+from ..solver.solve import solve
+from ..solver.status import Status
+
+#: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
+_MOST_PAIRS = 1000
+#: Digits of numbers that come from a solve: few enough to be the same on every machine.
+_DIGITS = 9
+
+
+class Subject(NamedTuple):
+    """A program, and its optimal value; None where the search ended at no optimum."""
+
+    nlp: Nlp
+    optimum: float | None
+
+
+def find_subject(case: Case) -> Subject:
+    """Return the program of a case that C is generated for.
+
+    For a worst case each task is solved first by itself: the worst one is relative to their own optima.
+
+    Raises:
+        CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
+        InputError: its functions have no finite value at any point that is tried.
+    """
+    if len(case.tasks) > 1 and case.method is Method.AVERAGE:
+        fault = "optimises nothing, so C is not generated for it: must be 'weighted-sum' or 'worst-case'"
+        raise CaseError("combine.method", fault, case.method.value, case.source)
+    _check_pairs(formulate(case))
+    if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
+        several = len(case.tasks) > 1
+        nlp = formulate_weighted(case, scale_weights(case).values) if several else formulate(case)
+        own = solve_program(nlp, case.search)
+        return Subject(with_all_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
+    combination = solve(case).combination
+    combined = None if combination is None else combination.combined
+    if combined is None:
+        fault = "has a task without an optimum of its own, so there is nothing to combine"
+        raise CaseError("combine.method", fault, case.method.value, case.source)
+    return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
+
+
+def magnitude_of(nlp: Nlp) -> SX:
+    """Return the size of a program's objective without cancellation, (1, 1), never below its size.
+
+    With several poses it is estimated from the first one.
+    """
+    case, places = nlp.case, nlp.program.places
+    size = nlp.program.robot.magnitude
+    if places.weights:
+        weights = ca.fabs(nlp.program.p[list(places.weights)])
+        if places.epigraph is None:
+            size = ca.dot(weights, size)
+        else:
+            size = size / weights if {task.sense for task in case.tasks} == {Sense.MAX} else size * weights
+    if case.over_poses is OverPoses.SUM and case.pose_count > 1:
+        size = size * case.pose_count
+    return ca.mmax(size)
+
+
+def _check_pairs(nlp: Nlp) -> None:
+    """Refuse a program with too many pairs of poses.
+
+    Raises:
+        CaseError: there are too many.
+    """
+    counts = [family.values.numel() for family in nlp.families]
+    pairs = sum(
+        count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, nlp.families, strict=True)
+    )
+    if pairs > _MOST_PAIRS:
+        fault = f"gives {pairs} constraints on pairs of poses, and C is generated for at most {_MOST_PAIRS}"
+        raise CaseError("pose", fault, nlp.case.pose_count, nlp.case.source)
+
+
+def _rounded(nlp: Nlp) -> Nlp:
+    """Return a program with fewer digits of the numbers that come from a solve."""
+    epigraph = nlp.program.places.epigraph
+    if epigraph is None:
+        return nlp
+    arguments, lower, upper, start = (np.array(each) for each in (nlp.arguments, nlp.lower, nlp.upper, nlp.start))
+    for index in (epigraph.ceiling, *epigraph.best):
+        arguments[index] = _shortened(arguments[index])
+    for values in (lower, upper, start):
+        values[epigraph.level] = _shortened(values[epigraph.level])
+    return replace(
+        nlp,
+        arguments=frozen_vector(arguments),
+        lower=frozen_vector(lower),
+        upper=frozen_vector(upper),
+        start=frozen_vector(start),
+    )
+
+
+def _shortened(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def objective_words(nlp: Nlp) -> str:
+    """Return the objective of a program in words."""
+    case, poses = nlp.case, nlp.case.pose_count
+    over = f" over {poses} poses" if poses > 1 else ""
+    if nlp.program.places.weights:
+        if case.method is Method.WEIGHTED_SUM:
+            total = "mean" if poses > 1 and case.over_poses is OverPoses.MEAN else "sum"
+            return f"the weighted sum of F of {len(case.tasks)} tasks" + (f", each the {total}{over}" if over else "")
+        return f"the level of the worst of {len(case.tasks)} tasks, which is the last variable" + over
+    if not over:
+        return "F of the task"
+    if case.over_poses is OverPoses.WORST:
+        return f"the level of the worst F{over}, which is the last variable"
+    return f"the {case.over_poses.value} of F{over}"

@@ -1,0 +1,189 @@
+"""C for several tasks and several poses: what it combines is what Python combines, and what it cannot is refused."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.nlp import Case, Nlp, case_from_tables, load_case, solve
+from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp.embedding.subject import find_subject
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.program.sampling import starting_points
+
+Embedded = Any
+Run = Callable[..., tuple[int, str, str]]
+
+ROBOT = """
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+[robot.parameters]
+x1 = { min = 20, max = 32 }
+x2 = { min = 8, max = 15 }
+x3 = { min = 1, max = 20 }
+x4 = 10
+"""
+#: A free rotation, a held one, and none.
+POSES = """
+[[pose]]
+position = [{ min = -6, max = 6 }, 1, 22]
+rotation = { angle = { min = -15, max = 15 } }
+[[pose]]
+position = [3, { min = -4, max = 4 }, 24]
+rotation = { axis = [1, 2, 0], angle = { min = -10, max = 12 } }
+[[pose]]
+position = [0, 0, 20]
+"""
+TASKS = """
+[[task]]
+name = "turn"
+sense = "max"
+axis = [1, 2, 6]
+point = [3, 1, 12]
+pitch = 0.1
+weight = 0.5
+[[task]]
+name = "push"
+sense = "min"
+axis = [0, 1, 1]
+point = [0, 1, 2]
+pitch = 2.0
+weight = 1.5
+"""
+MANY = """
+[limits]
+leg_length = { min = 5, max = 60 }
+base_joint_angle = 80
+platform_joint_angle = { max = 80, about = "home" }
+home = { position = [0, 0, 22], axis = [0, 0, 1], angle = 5 }
+joint_spacing = { min = 0.5 }
+leg_clearance = { min = 4 }
+rate_share = { max = 0.9 }
+actuator = { stroke_max = 30, dead_length = 1 }
+custom = ["x1 - 1.2*x2 >= 0"]
+"""
+SPECTRA = """
+[limits]
+condition_number = { max = 50, length = 10 }
+smallest_singular_value = { min = 0.01, length = 7 }
+"""
+UPU = """
+[robot]
+model = "three-upu"
+axes = "free"
+[robot.parameters]
+base_radius = { min = 40, max = 60 }
+platform_radius = 25
+u1_1 = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = -1, max = 1 }]
+u2_1 = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = -1, max = 1 }]
+u1_2 = [0, 1, 0]
+u2_2 = [1, 0, 0.3]
+u1_3 = [0, 1, 0.4]
+u2_3 = [1, 0, 0]
+[[pose]]
+position = [0, 0, 50]
+[[pose]]
+position = [5, { min = 0, max = 10 }, 55]
+[limits]
+rate_share = { max = 0.99 }
+"""
+
+
+def table(*texts: str) -> Case:
+    return case_from_tables(tomllib.loads("".join(texts) + "[solve]\nstarts = 1\n"), name="c", source="c.toml")
+
+
+def combine(method: str, over: str) -> str:
+    return f'[combine]\nmethod = "{method}"\nover_poses = "{over}"\n'
+
+
+ONE = TASKS[: TASKS.index("[[task]]", 10)]
+CASES = {
+    "worst of two senses over a mean, all limits": (ROBOT, POSES, TASKS, combine("worst-case", "mean"), MANY),
+    "weighted sum over a sum, singular values": (ROBOT, POSES, TASKS, combine("weighted-sum", "sum"), SPECTRA),
+    "worst pose": (ROBOT, POSES, ONE, '[combine]\nover_poses = "worst"\n'),
+    "couples": (UPU, TASKS, combine("weighted-sum", "mean")),
+}
+
+
+def curvatures(c: Embedded, nlp: Nlp, close: float) -> None:
+    """Compare the Hessian of the Lagrangian with multipliers for every constraint."""
+    n, generator = nlp.n, np.random.default_rng(2)
+    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+    assert c.call("prepare", np.ascontiguousarray(nlp.arguments), k, work) == 0
+    for point in starting_points(nlp, 21, 3)[1:]:
+        multipliers, weight = generator.normal(size=len(nlp.program.constraints)), np.array([0.7])
+        x, H = np.ascontiguousarray(point), np.zeros((n, n))
+        wanted = nlp.program.kernels.hessian(x, nlp.arguments, 0.7, multipliers)
+        given = np.array([each.ctypes.data for each in (x, k, weight, multipliers)], dtype=np.uintp)
+        made = np.array([H.ctypes.data], dtype=np.uintp)
+        assert c.call("SQP_curvature", given, made, work) == 0
+        assert np.max(np.abs(H - wanted)) <= close * np.max(np.abs(wanted))
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if "sum over" in name else name for name in CASES]
+)
+def test_the_c_has_the_programs_values_and_its_optimum(name: str, embed: Callable[..., Embedded]) -> None:
+    case = table(*CASES[name])
+    subject, c = find_subject(case), embed(case, "-O0")
+    close = 1e-10 if "singular" in name else 1e-13
+    c.compare(subject.nlp, 50, close)
+    curvatures(c, subject.nlp, max(close, 1e-12))
+    if subject.optimum is not None:
+        solved = c.solve()
+        assert solved.status == 0
+        better = 1 if subject.nlp.sign < 0 else -1
+        assert better * (solved.F - subject.optimum) >= -1e-6 * max(1.0, abs(subject.optimum))
+
+
+def test_weights_senses_and_twists_change_at_run_time(embedded: Callable[[str], Embedded]) -> None:
+    c, case = embedded("peg-in-hole"), load_case("peg-in-hole")
+    places = find_subject(case).nlp.program.places
+    turned = replace(case.tasks[0], sense=case.tasks[1].sense, twist=case.tasks[1].twist, weight=0.3)
+    other = replace(case, tasks=(turned, replace(case.tasks[1], sense=case.tasks[0].sense, weight=1.7)))
+    wanted = find_subject(other)
+    solved = c.solve(p=wanted.nlp.arguments, maximise=int(wanted.nlp.sign < 0))
+    assert places.weights == wanted.nlp.program.places.weights
+    assert solved.status == 0
+    assert wanted.optimum is not None
+    assert abs(solved.F - wanted.optimum) <= 1e-6 * max(1.0, abs(wanted.optimum))
+
+
+@pytest.mark.parametrize("name", ["camera-mount", "haptic-device", "flight-simulator", "peg-in-hole"])
+def test_shipped_combinations_are_solved_as_python_solves_them(name: str, embedded: Callable[[str], Embedded]) -> None:
+    c, wanted = embedded(name), solve(load_case(name))
+    own = wanted.combination.combined if wanted.combination is not None else wanted.outcomes[0].own
+    assert own is not None
+    solved = c.solve()
+    assert solved.status == 0
+    assert abs(solved.F - own.F) <= 1e-6 * max(1.0, abs(own.F))
+
+
+@pytest.mark.parametrize(
+    ("texts", "sentence"),
+    [
+        ((ROBOT, "[pose]\nposition = [0, 0, 20]\n", TASKS, '[combine]\nmethod = "average"\n'), "combine.method"),
+        (
+            (ROBOT, *(f"[[pose]]\nposition = [{k}, 0, 22]\n" for k in range(20)), ONE, MANY),
+            "4560 constraints on pairs of poses",
+        ),
+    ],
+)
+def test_what_is_not_generated_is_refused_by_name(
+    texts: tuple[str, ...], sentence: str, tmp_path: Path, cli: Run
+) -> None:
+    with pytest.raises(CaseError, match=sentence):
+        generate_c(table(*texts))
+    (tmp_path / "case.toml").write_text("".join(texts), encoding="utf-8")
+    code, out, err = cli("codegen", str(tmp_path / "case.toml"), "--out", str(tmp_path / "made"))
+    assert (code, out) == (2, "")
+    assert sentence in err
+    assert not (tmp_path / "made").exists()
