@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -29,7 +30,10 @@ from ..program.program import Program
 from ..program.sampling import starting_points
 from ..solver.multistart import solve_program
 from ..solver.status import Status
+from .apitexts import index_macros, version_texts
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .manifest import MANIFEST, manifest_text
+from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -41,9 +45,17 @@ _PARTS = {
     "-sqp.h": "sqp.h",
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
+    "-limits.c": "limits.c",
+    "-batch.c": "batch.c",
+    ".hpp": "api.hpp",
 }
 #: Ending of the file that a case with limits on singular values needs in addition.
 _SPECTRUM = "-spectrum.c"
+#: Files of every folder whose names do not begin with the prefix.
+_OTHERS = (
+    *("selftest.c", "bench.c", "example.c", "example.cpp", "realtime.c", "sfunction.c"),
+    *("Makefile", "CMakeLists.txt", "README.md"),
+)
 #: Number of starting points in the solver's table.
 _SEEDS = 16
 #: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
@@ -77,13 +89,19 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         raise CaseError("pose", "gives several poses; C is generated for one", case.pose_count, case.source)
     nlp = formulate(case)
     staged = stage_functions(nlp.program, f"{identifier(case.name)}_CASADI")
+    limits = run_time_limits(nlp, f"{identifier(case.name)}_CASADI")
     names = _substitutions(nlp, staged)
+    names |= limit_texts(limits, names["id"], replace(case.units, angle="rad").label)
     parts = _PARTS | ({_SPECTRUM: "spectrum.c"} if int(names["nspectra"]) else {})
+    sources = [f"{names['id']}{ending}" for ending in (*parts, "-casadi.c") if ending.endswith(".c")]
+    names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
     files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
-    for name in ("selftest.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
+    for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
-    casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
-    return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
+    functions = staged.all if limits.function is None else (*staged.all, limits.function)
+    casadi = _casadi_files(functions, f"{names['id']}_CASADI")
+    files |= {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
+    return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
@@ -142,7 +160,8 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
         "id": prefix,
         "ID": prefix.upper(),
         "title": comment_text(case.title or case.name),
-        "version": __version__,
+        **version_texts(__version__),
+        "indices": index_macros(program, prefix),
         "casadi": ca.CasadiMeta.version(),
         "length": comment_text(case.units.length),
         "n": str(n),
@@ -185,8 +204,6 @@ def _spectrum_texts(program: Program, prefix: str) -> dict[str, str]:
         "spectrum_lengths": ", ".join(repr(float(spectral.length)) for _, spectral in found),
         "spectrum_places": ", ".join(str(k) for k, _ in found),
         "spectrum_kinds": ", ".join(str(spectral.end.value) for _, spectral in found),
-        "spectrum_object": f" {prefix}-spectrum.o" if found else "",
-        "spectrum_source": f" {prefix}{_SPECTRUM}" if found else "",
         "spectrum_row": row if found else "",
         # Eigenvalues by another order of operations, and by inverses, lose two digits more.
         "limits_close": "1e-10" if found else "1e-12",

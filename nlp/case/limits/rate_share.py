@@ -10,12 +10,14 @@ from casadi import SX
 
 from ....models import Dimension
 from ..table import Table
-from .constraint import NUMBER, BoundedConstraint, between
+from .constraint import BoundedConstraint, Reading, between
 from .interval import AtMost
 from .limit import Limit, LimitedCase, PosedRobot, Written
 
 #: Keeps a limb's share of F defined where F is 0, in parts of F's size without cancellation.
 _SHARELESS = 1e-14
+#: A part of a whole read as it is.
+_PART = Reading(Dimension.NUMBER, above=0.0, most=1.0)
 
 
 @dataclass(frozen=True)
@@ -51,4 +53,4 @@ class RateShare(Limit[AtMost]):
             for limb in pose.model.limbs:
                 own = [robot.rates[i, j] for i, row in enumerate(pose.model.wrenches) if row.limb == limb]
                 part = sum((rate**2 for rate in own), SX(0)) / whole
-                yield between(f"rate_share limb {limb}{whose}{pose.where}", part, NUMBER, "rate_share", upper=self.max)
+                yield between(f"rate_share limb {limb}{whose}{pose.where}", part, _PART, "rate_share", upper=self.max)
