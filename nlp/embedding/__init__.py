@@ -1,4 +1,6 @@
 """C for embedding: the objective of a case and a whole solver, from the templates in ``c``.
 
-The modules import each other in this order: ``ctext`` and ``stages`` stand alone, ``codegen`` uses both.
+The modules import each other in this order: ``ctext`` and ``stages`` stand alone; ``apitexts`` and ``runtimelimits``
+use ``ctext``, ``manifest`` uses ``runtimelimits``, and ``codegen`` uses all of them. ``folder`` reads the file that
+``manifest`` writes, and ``library`` loads the folder.
 """

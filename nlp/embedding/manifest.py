@@ -22,9 +22,7 @@ FORMAT = 1
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 
 
-def manifest_text(
-    nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, str], files: Mapping[str, str]
-) -> str:
+def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, str], files: Mapping[str, str]) -> str:
     """Return the manifest's text.
 
     Args:
@@ -68,9 +66,7 @@ def manifest_text(
         ],
         "constraints": [
             {"name": each.name, "lower": _finite(lower), "upper": _finite(upper)}
-            for each, lower, upper in zip(
-                program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True
-            )
+            for each, lower, upper in zip(program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
         ],
         "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.wrenches],
         "tasks": [{"name": task.name, "twist": np.asarray(task.twist).tolist()} for task in case.tasks],

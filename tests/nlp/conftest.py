@@ -61,8 +61,7 @@ class Embedded:
             (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
-        sources += [str(folder / name) for name in files if name.endswith("-spectrum.c")]
+        sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
         flags = ["-std=c99", "-O2", "-shared", "-fPIC"]

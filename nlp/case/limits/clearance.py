@@ -24,7 +24,6 @@ from .interval import LowerLimit
 from .limit import PosedRobot
 from .segments import squared_distance
 
-
 #: Largest distance that a constraint can be for, in parts of the distance D beyond which it is 1: closer to D its slope
 #: falls below an eighth of the slope at the limit that it was made for.
 _MOST = 0.9

@@ -117,7 +117,9 @@ class Actuator(Limit[ActuatorTable]):
             limits.append(bounded(f"{key}{where}", longer - shorter, POSITIVE_LENGTH, ("", key), upper=self.stroke_max))
         if self.dead_length is not None:
             key = "actuator.dead_length"
-            limits.append(bounded(f"{key}{where}", 2 * shorter - longer, POSITIVE_LENGTH, (key, ""), lower=self.dead_length))
+            limits.append(
+                bounded(f"{key}{where}", 2 * shorter - longer, POSITIVE_LENGTH, (key, ""), lower=self.dead_length)
+            )
         return tuple(limits)
 
     def _slack(self, shorter: float, longer: float) -> float:
