@@ -1,4 +1,4 @@
-"""Generated C in Python: the numbers and the verdicts of the C, many problems in one call, and refusals in a sentence."""
+"""Generated C in Python: the numbers and the verdicts of the C, many problems in one call, refusals in a sentence."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ class Bounds:
         value = ctypes.c_double(-1)
         return self.call("get_limit", ctypes.c_int(limit), ctypes.byref(value)), value.value
 
-    def solve(self) -> Any:
+    def solve(self) -> Embedded:
         names = ("lower", "upper", "g_lower", "g_upper")
         return self.c.solve(**{name: self.part(1 + k) for k, name in enumerate(names)})
 
