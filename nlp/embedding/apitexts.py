@@ -31,4 +31,6 @@ def version_texts(version: str) -> dict[str, str]:
         version: of the package, such as ``1.2.3``; a part that is missing is 0.
     """
     parts = [*(match.group() for match in re.finditer(r"\d+", version)), "0", "0", "0"]
-    return {"version": version} | dict(zip(("version_major", "version_minor", "version_patch"), parts, strict=False))
+    named = dict(zip(("version_major", "version_minor", "version_patch"), parts, strict=False))
+    number = (int(parts[0]) * 1000 + int(parts[1])) * 1000 + int(parts[2])
+    return {"version": version, "version_number": str(number)} | named

@@ -13,7 +13,15 @@ from .manifest import FORMAT, MANIFEST
 
 
 class CompiledNumber(NamedTuple):
-    """A number of x or p: name, unit (``rad`` for angles), bounds in x, and the case's value in p or start in x."""
+    """A free variable of x or a fixed number of p.
+
+    Attributes:
+        name: for people.
+        unit: ``rad`` for angles, empty for a plain number.
+        lower: its bound as a variable; -inf for a fixed number.
+        upper: likewise.
+        default: the case's value of a fixed number; for a variable, where the case's first search starts.
+    """
 
     name: str
     unit: str
@@ -23,11 +31,11 @@ class CompiledNumber(NamedTuple):
 
 
 class CompiledLimit(NamedTuple):
-    """A limit that can be set: its key, unit (``rad`` for angles), the case's number, and what is allowed.
+    """A limit that can be set at run time.
 
     Attributes:
         key: dotted key, such as ``leg_length.max``.
-        unit: of its number.
+        unit: of its number: ``rad`` for angles, empty for a plain number.
         default: the case's number.
         above: the number must be larger than this.
         most: the number may be at most this.

@@ -48,15 +48,20 @@ def test_the_cpp_header_and_its_example_compile_and_run(compiler: str, folder: P
     if shutil.which(compiler) is None:
         pytest.skip(f"{compiler} is not installed")
     (folder / "example-cpp").unlink(missing_ok=True)
-    run("make", f"CXX={compiler}", f"CXXFLAGS={STRICT_CPP} -Wno-unused-variable", "example-cpp", where=folder)
+    run("make", f"CXX={compiler}", f"CXXFLAGS={STRICT_CPP}", "example-cpp", where=folder)
     printed = run("./example-cpp", where=folder)
     assert "the case: F = 407.2107, status 0" in printed
     assert re.search(r"a vertical axis: F = [\d.]+, status 0", printed)
     assert "angle.max: 0.523599 rad" in printed
     (folder / "throws.cpp").write_text(THROWS, encoding="utf-8")
-    run(compiler, *STRICT_CPP.split(), "-Wno-unused-variable", "throws.cpp", "-L.",
+    run(compiler, *STRICT_CPP.split(), "throws.cpp", "-L.",
         f"-l{identifier('paper-4.1-helical')}", "-lm", "-o", "throws", where=folder)  # fmt: skip
     run("./throws", where=folder)
+    # Another version's folder in the same program.
+    other = [compiler, "-fsyntax-only", "-DSCREWSYNTH_VERSION=1", "example.cpp"]
+    done = subprocess.run(other, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "are of different versions of screwsynth" in done.stderr
 
 
 THROWS = """#include <cmath>
@@ -98,12 +103,14 @@ def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) ->
     check = """
         {
             static double before[SCREWSYNTH_PAPER_4_1_HELICAL_N];
+            static int has_before = 0;
             int j;
-            for (j = 0; j < SCREWSYNTH_PAPER_4_1_HELICAL_N && cycle > 0; ++j)
+            for (j = 0; j < SCREWSYNTH_PAPER_4_1_HELICAL_N && has_before; ++j)
                 if (fabs(x[j] - before[j]) > 1.000001 * STEP * (screwsynth_paper_4_1_helical_variable_upper[j] -
                                                          screwsynth_paper_4_1_helical_variable_lower[j]))
                     return 2;
             memcpy(before, x, sizeof before);
+            has_before = 1;
         }"""
     (folder / "realtime.c").write_text(source.replace(hook, check), encoding="utf-8")
     run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT}", "realtime", where=folder)

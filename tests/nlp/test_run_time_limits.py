@@ -283,6 +283,9 @@ def test_macros_for_indices_limits_and_versions() -> None:
     major, minor, patch = (re.findall(rf"_VERSION_{part} (\d+)", header)[0] for part in ("MAJOR", "MINOR", "PATCH"))
     assert __version__.startswith(f"{major}.{minor}.{patch}")
     assert f'#define SCREWSYNTH_LIMITED_VERSION "{__version__}"' in header
+    # Folders of different versions cannot share a program: their types may differ.
+    number = (int(major) * 1000 + int(minor)) * 1000 + int(patch)
+    assert f"#define SCREWSYNTH_VERSION {number}\n#elif SCREWSYNTH_VERSION != {number}\n#error" in header
     for name in ("ITERATIONS", "FEASIBLE", "STATIONARY"):
         assert f"#ifndef SCREWSYNTH_LIMITED_{name}\n#define SCREWSYNTH_LIMITED_{name} " in header
     assert c_names(["a b", "a-b", "größe", "", "*"]) == ["a_b", "a_b_1", "gr_e", "unnamed", "unnamed_4"]
