@@ -38,6 +38,11 @@ from .certificate.branchandbound import certify_program as certify_program
 from .certificate.certificate import Certificate as Certificate
 from .certificate.certificate import CertificateStatus as CertificateStatus
 from .embedding.codegen import generate_c as generate_c
+from .embedding.folder import CompiledLimit as CompiledLimit
+from .embedding.folder import CompiledNumber as CompiledNumber
+from .embedding.library import CompiledCase as CompiledCase
+from .embedding.library import CompiledSolutions as CompiledSolutions
+from .embedding.library import load_compiled as load_compiled
 from .errors import CaseError as CaseError
 from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError

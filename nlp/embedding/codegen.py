@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -26,10 +27,13 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
+from .apitexts import index_macros, version_texts
 from .casaditext import without_queries
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
+from .manifest import MANIFEST, manifest_text
+from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words
 
@@ -42,7 +46,15 @@ _PARTS = {
     "-sqp.h": "sqp.h",
     "-sqp.c": "sqp.c",
     "-qp.c": "qp.c",
+    "-limits.c": "limits.c",
+    "-batch.c": "batch.c",
+    ".hpp": "api.hpp",
 }
+#: Files of every folder whose names do not begin with the prefix.
+_OTHERS = (
+    *("selftest.c", "stack.c", "bench.c", "example.c", "example.cpp", "realtime.c", "sfunction.c"),
+    *("Makefile", "CMakeLists.txt", "README.md"),
+)
 #: Number of starting points in the solver's table.
 _SEEDS = 16
 #: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
@@ -73,18 +85,25 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         InputError: the case's functions have no finite value at any point that is tried.
     """
     subject = find_subject(case)
-    staged = stage_functions(subject.nlp.program, magnitude_of(subject.nlp), f"{identifier(case.name)}_CASADI")
+    nlp, prefix = subject.nlp, identifier(case.name)
+    staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI")
+    limits = run_time_limits(nlp, f"{prefix}_CASADI")
     names = _substitutions(subject, staged)
+    names |= limit_texts(limits, prefix, replace(case.units, angle="rad").label)
     parts = dict(_PARTS)
     if staged.loops:
         parts["-loops.c"] = "loops.c"
     if staged.loops.spectra:
         parts["-spectrum.c"] = "spectrum.c"
-    files = {f"{names['id']}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
-    for name in ("selftest.c", "stack.c", "bench.c", "example.c", "Makefile", "CMakeLists.txt", "README.md"):
+    sources = [f"{prefix}{ending}" for ending in (*parts, "-casadi.c") if ending.endswith(".c")]
+    names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
+    files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
+    for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
-    casadi = _casadi_files(staged.all, f"{names['id']}_CASADI")
-    return files | {f"{names['id']}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
+    functions = staged.all if limits.function is None else (*staged.all, limits.function)
+    casadi = _casadi_files(functions, f"{prefix}_CASADI")
+    files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
+    return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
@@ -146,7 +165,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "id": prefix,
         "ID": prefix.upper(),
         "title": comment_text(case.title or case.name),
-        "version": __version__,
+        **version_texts(__version__),
+        "indices": index_macros(program, prefix),
         "casadi": ca.CasadiMeta.version(),
         "length": comment_text(case.units.length),
         "n": str(n),

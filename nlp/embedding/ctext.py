@@ -19,6 +19,22 @@ def identifier(name: str) -> str:
     return f"screwsynth_{plain or 'case'}"
 
 
+def c_name(name: str) -> str:
+    """Return the end of a C name for any name of a number: letters, digits and underscores as they are."""
+    return re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_") or "unnamed"
+
+
+def c_names(names: Iterable[str]) -> list[str]:
+    """Return the ends of C names for names of numbers; equal ones get their index at the end."""
+    found: list[str] = []
+    for index, name in enumerate(names):
+        plain = c_name(name)
+        while plain in found:
+            plain = f"{plain}_{index}"
+        found.append(plain)
+    return found
+
+
 def string_table(name: str, size: str, values: Iterable[str]) -> str:
     """Return a constant table of strings; it ends with a null, so that it is never empty."""
     quoted = ", ".join([*(_string_literal(text) for text in values), "0"])

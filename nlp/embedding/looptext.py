@@ -32,8 +32,6 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         "nspectra": str(len(loops.spectra)),
         "spectrum_lengths": ", ".join(repr(float(each.spectral.length)) for each in loops.spectra),
         "spectrum_kinds": ", ".join(str(each.spectral.end.value) for each in loops.spectra),
-        "loop_objects": "".join(f" {prefix}-{part}.o" for part in parts),
-        "loop_sources": "".join(f" {prefix}-{part}.c" for part in parts),
         "loop_rows": "".join(f"| `{prefix}-{part}.c` | {explained[part]} |\n" for part in parts),
         "nentries": str(loops.entries.numel()),
         "nslots": str(loops.slot_count),

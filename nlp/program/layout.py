@@ -61,7 +61,7 @@ ROTATION_ANGLE = Reading(Dimension.ANGLE, from_value=_angle_from, slope=_angle_s
 #: The constraint ``|u|^2 = 1`` read as the length itself.
 _LENGTH_OF_DIRECTION = replace(squared(Dimension.NUMBER), to_value=Reading(Dimension.NUMBER).to_value)
 #: Largest size, as a variable, of a component of a free unit vector, or of a rotation's ``q`` in radii of its ball.
-_WIDENING = 1.25
+WIDENING = 1.25
 #: Largest residual of an equation among fixed numbers that counts as none: files give them with a dozen digits.
 _ROUNDING = 1e-9
 
@@ -212,8 +212,8 @@ def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
     for value, typical in zip(values, parameter.typical, strict=True):
         if isinstance(value, Free):
             start = min(max(typical, value.lower), value.upper) if without_start else value.start
-            lower = -_WIDENING if value.lower == -1.0 else value.lower
-            upper = _WIDENING if value.upper == 1.0 else value.upper
+            lower = -WIDENING if value.lower == -1.0 else value.lower
+            upper = WIDENING if value.upper == 1.0 else value.upper
             widened.append(Free(lower, upper, start))
         else:
             widened.append(value)
@@ -272,7 +272,7 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
     # The ball implies |q_x| <= radius and so on: a bound that touches the ball would share its multiplier where the
     # ball is active.
-    bound = min(_WIDENING * radius, 1.0)
+    bound = min(WIDENING * radius, 1.0)
     along_z = Free(-bound, bound, math.sin(start / 2))
     vector = table.add_vector(f"{prefix}q", Dimension.NUMBER, (Free(-bound, bound), Free(-bound, bound), along_z))
     ball = Constraint(f"{prefix}angle", ca.sumsqr(vector.symbols), ROTATION_ANGLE)

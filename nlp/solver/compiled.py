@@ -7,6 +7,7 @@ or ``~/.cache``).
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import InputError
@@ -14,8 +15,11 @@ from ..errors import InputError
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 
 
-def shared_library(source: str) -> Path:
-    """Compile a C text into a shared library, or return the cached one.
+def shared_library(files: Mapping[str, str]) -> Path:
+    """Compile C texts into a shared library, or return the cached one.
+
+    Args:
+        files: texts by file name; those whose names end in ``.c`` are compiled, the others are there to be included.
 
     Raises:
         InputError: there is no C compiler, or it fails.
@@ -25,15 +29,19 @@ def shared_library(source: str) -> Path:
 
     compiler = _compiler()
     version = _run([compiler, "--version"])
-    key = hashlib.sha256("\0".join([source, compiler, version, *_FLAGS]).encode()).hexdigest()
+    key = hashlib.sha256(
+        "\0".join([*(part for item in sorted(files.items()) for part in item), compiler, version, *_FLAGS]).encode()
+    ).hexdigest()
     folder = _folder()
     library = folder / f"{key[:32]}.so"
     if library.exists():
         return library
     with tempfile.TemporaryDirectory(dir=folder) as temporary:
-        text, compiled = Path(temporary) / "source.c", Path(temporary) / "compiled.so"
-        text.write_text(source, encoding="utf-8")
-        _run([compiler, *_FLAGS, str(text), "-lm", "-o", str(compiled)])
+        compiled = Path(temporary) / "compiled.so"
+        for name, text in files.items():
+            (Path(temporary) / name).write_text(text, encoding="utf-8")
+        sources = [str(Path(temporary) / name) for name in sorted(files) if name.endswith(".c")]
+        _run([compiler, *_FLAGS, *sources, "-lm", "-o", str(compiled)])
         # A rename leaves a whole library or none, also when two processes compile it at the same time.
         compiled.replace(library)
     return library

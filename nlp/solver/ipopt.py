@@ -93,7 +93,7 @@ def _compiled_problem(problem: dict[str, SX]) -> str:
     generator = ca.CodeGenerator("problem.c")
     for function in (solver.oracle(), *(solver.get_function(name) for name in solver.get_function())):
         generator.add(function)
-    return str(shared_library(generator.dump()))
+    return str(shared_library({"source.c": generator.dump()}))
 
 
 def _options(max_iterations: int) -> dict[str, Any]:

@@ -25,6 +25,10 @@ from .interval import LowerLimit
 from .limit import PosedRobot
 from .segments import squared_distance
 
+#: Largest distance that a constraint can be for, in parts of the distance D beyond which it is 1: closer to D its slope
+#: falls below an eighth of the slope at the limit that it was made for.
+_MOST = 0.9
+
 
 @dataclass(frozen=True)
 class LegClearance(LowerLimit):
@@ -86,4 +90,6 @@ def _reading(far: float) -> Reading:
         from_value=partial(_distance, far),
         slope=partial(_slope, far),
         to_value=partial(_bound, far),
+        above=0.0,
+        most=_MOST * math.sqrt(far),
     )

@@ -39,17 +39,21 @@ class Reading:
         from_value: the number for people (radians for angles) from the program's bound.
         slope: derivative of the program's bound with respect to the number for people, at the program's bound.
         to_value: the program's bound from the number for people, as an expression; it never falls where that grows.
+        above: the number for people must be larger than this.
+        most: the number for people may be at most this.
     """
 
     dimension: Dimension
     from_value: Callable[[float], float] = _unchanged
     slope: Callable[[float], float] = _one
     to_value: Callable[[SX], SX] = _unchanged
+    above: float = -math.inf
+    most: float = math.inf
 
 
 def squared(dimension: Dimension) -> Reading:
-    """Return the reading of a square as the number itself."""
-    return Reading(dimension, from_value=_root, slope=_slope_of_square, to_value=_square)
+    """Return the reading of a square as the number itself, which is positive."""
+    return Reading(dimension, from_value=_root, slope=_slope_of_square, to_value=_square, above=0.0)
 
 
 def _root(value: float) -> float:
@@ -65,6 +69,7 @@ def _square(number: SX) -> SX:
 
 
 LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)
+POSITIVE_LENGTH = Reading(Dimension.LENGTH, above=0.0)
 SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NUMBER)
 
 

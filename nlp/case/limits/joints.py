@@ -75,7 +75,7 @@ def _minus_cosine_from_home(inputs: SX, to_world: Turn, from_home: Turn) -> SX:
 
 
 #: ``-cos(angle)`` read as the angle.
-_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine)
+_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine, above=0.0, most=math.pi)
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:

@@ -20,7 +20,7 @@ from pydantic import Field, FiniteFloat
 from ....models import Model
 from ...errors import CaseError
 from ..table import Table
-from .constraint import LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
+from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
 from .form import Call, Form
 from .interval import IntervalLimit
 from .limit import Design, Limit, LimitedCase, PosedRobot, Written
@@ -110,7 +110,7 @@ class Actuator(Limit[ActuatorTable]):
             key = "actuator.dead_length"
             for leg in design.robots[0].legs:
                 length = ca.norm_2(leg.span)
-                yield bounded(f"{key} limb {leg.name}", length, LENGTH, (key, ""), lower=self.dead_length)
+                yield bounded(f"{key} limb {leg.name}", length, POSITIVE_LENGTH, (key, ""), lower=self.dead_length)
 
     def on_pairs(self, design: Design) -> Iterator[PairFamily]:
         """Return the stroke and the dead length of each leg, for all pairs of poses."""
@@ -127,10 +127,11 @@ class Actuator(Limit[ActuatorTable]):
         both = ca.vertcat(spans[:, a], spans[:, b])
         if self.stroke_max is not None:
             key = "actuator.stroke_max"
-            limits.append(bounded(f"{key}{where}", Call(Form(_stroke), both), LENGTH, ("", key), upper=self.stroke_max))
+            stroke = Call(Form(_stroke), both)
+            limits.append(bounded(f"{key}{where}", stroke, POSITIVE_LENGTH, ("", key), upper=self.stroke_max))
         if self.dead_length is not None:
             key, dead = "actuator.dead_length", Call(Form(_dead_length), both)
-            limits.append(bounded(f"{key}{where}", dead, LENGTH, (key, ""), lower=self.dead_length))
+            limits.append(bounded(f"{key}{where}", dead, POSITIVE_LENGTH, (key, ""), lower=self.dead_length))
         return tuple(limits)
 
     def _slack(self, shorter: float, longer: float) -> float:

@@ -11,13 +11,15 @@ from casadi import SX
 
 from ....models import Dimension
 from ..table import Table
-from .constraint import NUMBER, BoundedConstraint, between
+from .constraint import BoundedConstraint, Reading, between
 from .form import Call, Form
 from .interval import AtMost
 from .limit import Limit, LimitedCase, PosedRobot, Written
 
 #: Keeps a limb's share of F defined where F is 0, in parts of F's size without cancellation.
 _SHARELESS = 1e-14
+#: A part of a whole read as it is.
+_PART = Reading(Dimension.NUMBER, above=0.0, most=1.0)
 
 
 def _share(numbers: SX) -> SX:
@@ -59,4 +61,4 @@ class RateShare(Limit[AtMost]):
             for limb in pose.model.limbs:
                 own = [robot.rates[i, j] for i, row in enumerate(pose.model.wrenches) if row.limb == limb]
                 part = Call(Form(_share), ca.vertcat(robot.F[j], robot.magnitude[j], *own))
-                yield between(f"rate_share limb {limb}{whose}{pose.where}", part, NUMBER, "rate_share", upper=self.max)
+                yield between(f"rate_share limb {limb}{whose}{pose.where}", part, _PART, "rate_share", upper=self.max)

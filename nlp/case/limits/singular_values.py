@@ -41,7 +41,9 @@ def _condition_bound(number: SX) -> SX:
 
 
 #: ``-1 / c^2`` read as the condition number c.
-_CONDITION = Reading(Dimension.NUMBER, from_value=_condition_from, slope=_condition_slope, to_value=_condition_bound)
+_CONDITION = Reading(
+    Dimension.NUMBER, from_value=_condition_from, slope=_condition_slope, to_value=_condition_bound, above=1.0
+)
 
 
 class SmallestTable(Table):

@@ -1,0 +1,334 @@
+"""A folder of C as a Python object: compiled once, and called for many problems at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+from ..case.task import Sense
+from ..errors import InputError, listing, nearest
+from ..solver.compiled import shared_library
+from .folder import CompiledLimit, CompiledNumber, Manifest, read_manifest
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Largest number of problems in one call of the C: Ctrl-C works between calls, and threads share work evenly.
+_CHUNK = 32
+
+
+class CompiledSolutions(NamedTuple):
+    """Answers of the solver in C to n problems, one row for each.
+
+    Attributes:
+        F: (n,) objective.
+        x: (n, variables) free variables, radians for angles.
+        status: (n,) codes; ``CompiledCase.statuses`` has their names. 0 is an optimum.
+        R: (n, 3, 3) rotation of the platform.
+        axis: (n, 3) unit axis of the rotation.
+        angle: (n,) its angle in ``[0, pi]``.
+        violation: (n,) largest violation of a constraint.
+        residual: (n,) KKT residual.
+        runs: (n,) number of searches.
+        converged: (n,) number of searches that ended at an optimum.
+        iterations: (n,) number of iterations of all searches.
+    """
+
+    F: FloatArray
+    x: FloatArray
+    status: NDArray[np.intc]
+    R: FloatArray
+    axis: FloatArray
+    angle: FloatArray
+    violation: FloatArray
+    residual: FloatArray
+    runs: NDArray[np.intc]
+    converged: NDArray[np.intc]
+    iterations: NDArray[np.intc]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """(n,) whether an optimum was found."""
+        return np.equal(self.status, 0)
+
+
+class CompiledCase:
+    """A case's solver in C, loaded from the folder that ``screwsynth codegen`` wrote.
+
+    :func:`load_compiled` makes it. Its methods may be called from several threads.
+    """
+
+    def __init__(self, manifest: Manifest, library: ctypes.CDLL) -> None:
+        self._manifest, self._library = manifest, library
+        counts = (ctypes.c_int * 6)()
+        self._function("sizes")(counts)
+        *shape, self._work, self._iwork = list(counts)
+        lengths = (manifest.variables, manifest.parameters, manifest.constraints, manifest.limits)
+        if shape != [len(each) for each in lengths]:
+            raise InputError(f"{manifest.name}: the manifest and the C of the folder are not of one case")
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.variables)} variables, {len(self.parameters)} fixed numbers, {len(self.limits)} limits"
+        return f"<CompiledCase {self.name!r}: {counts}>"
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self._manifest.name
+
+    @property
+    def variables(self) -> tuple[CompiledNumber, ...]:
+        """The free variables, in the order of ``x``."""
+        return self._manifest.variables
+
+    @property
+    def parameters(self) -> tuple[CompiledNumber, ...]:
+        """The fixed numbers, in the order of ``p``."""
+        return self._manifest.parameters
+
+    @property
+    def limits(self) -> tuple[CompiledLimit, ...]:
+        """The limits that can be set."""
+        return self._manifest.limits
+
+    @property
+    def statuses(self) -> tuple[str, ...]:
+        """Names of the statuses by code, such as ``OK`` for 0."""
+        return self._manifest.statuses
+
+    def solve(
+        self,
+        x0: ArrayLike | None = None,
+        p: ArrayLike | None = None,
+        *,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Mapping[str, ArrayLike] | None = None,
+        sense: Sense | str | None = None,
+        seeds: int | None = None,
+        threads: int | None = None,
+    ) -> CompiledSolutions:
+        """Return the answers to n problems; n is the number of rows of the arrays that have rows.
+
+        Args:
+            x0: (variables,) or (n, variables) where the first search of each problem starts; None for none.
+            p: (parameters,) or (n, parameters) fixed numbers; the case's own where None.
+            lower: (variables,) or (n, variables) bounds; the case's own where None. Equal ones fix a variable.
+            upper: likewise.
+            limits: numbers or (n,) numbers by key of ``limits``, lengths in the case's unit and angles in radians.
+            sense: ``"max"`` or ``"min"``; the case's own where None.
+            seeds: number of further searches from the table of starting points; all of them where None.
+            threads: number of threads; that of the processors where None.
+
+        Raises:
+            InputError: an array has another shape or a number that is not finite, a limit is unknown or not allowed, or
+                there is nowhere to start. Whatever else a problem has against it is its status.
+        """
+        manifest = self._manifest
+        n, k = len(self.variables), len(self.parameters)
+        arrays = {"x0": _rows("x0", x0, n), "p": _rows("p", p, k)}
+        arrays |= {"lower": _rows("lower", lower, n), "upper": _rows("upper", upper, n)}
+        arrays["limits"] = self._limit_rows(limits or {})
+        counts = {name: len(each) for name, each in arrays.items() if each is not None and each.ndim == 2}
+        if len(set(counts.values())) > 1:
+            said = ", ".join(f"{name} has {count}" for name, count in counts.items())
+            raise InputError(f"arrays must have one number of rows, and {said}")
+        count = next(iter(counts.values()), 1)
+        if sense not in ("max", "min", *Sense, None):
+            raise InputError(f"sense = {sense!r}: must be 'max' or 'min'")
+        if seeds is not None and not _is_between(seeds, 0, manifest.seeds):
+            raise InputError(f"seeds = {seeds!r}: must be a whole number from 0 to {manifest.seeds}")
+        if seeds == 0 and x0 is None:
+            raise InputError("seeds = 0 without x0: a search needs a point to start from")
+        if threads is not None and not _is_between(threads, 1, None):
+            raise InputError(f"threads = {threads!r}: must be a whole number of at least 1")
+        batch, answers = self._batch(count, arrays)
+        batch.maximise = -1 if sense is None else int(Sense(sense) is Sense.MAX)
+        batch.seeds = -1 if seeds is None else seeds
+        self._run(batch, count, threads or os.cpu_count() or 1)
+        return answers
+
+    def _batch(self, count: int, arrays: Mapping[str, FloatArray | None]) -> tuple[_Batch, CompiledSolutions]:
+        """Return problems as the C reads them, and the arrays that it writes."""
+        batch = _Batch()
+        for name, given in arrays.items():
+            if given is not None:
+                setattr(batch, name, _Rows(given.ctypes.data, given.shape[-1], int(given.ndim == 1)))
+        answers = CompiledSolutions(
+            F=np.zeros(count),
+            x=np.zeros((count, len(self.variables))),
+            status=np.zeros(count, dtype=np.intc),
+            R=np.zeros((count, 3, 3)),
+            axis=np.zeros((count, 3)),
+            angle=np.zeros(count),
+            violation=np.zeros(count),
+            residual=np.zeros(count),
+            runs=np.zeros(count, dtype=np.intc),
+            converged=np.zeros(count, dtype=np.intc),
+            iterations=np.zeros(count, dtype=np.intc),
+        )
+        for name, values in answers._asdict().items():
+            setattr(batch, name, values.ctypes.data)
+        # The C reads and writes memory of these arrays: they must live as long as the batch.
+        batch.kept = (*arrays.values(), answers)
+        return batch, answers
+
+    def _run(self, batch: _Batch, count: int, threads: int) -> None:
+        """Solve the problems in chunks. ctypes releases the interpreter's lock during a call."""
+        solve_each = self._function("solve_each")
+        share = max(1, min(_CHUNK, -(-count // threads)))
+        waiting = queue.SimpleQueue[int]()
+        for first in range(0, count, share):
+            waiting.put(first)
+        is_stopped = threading.Event()
+
+        def work() -> None:
+            reals, integers = np.empty(self._work), np.empty(self._iwork, dtype=np.intc)
+            with contextlib.suppress(queue.Empty):
+                while not is_stopped.is_set():
+                    first = waiting.get_nowait()
+                    last = min(first + share, count)
+                    solve_each(ctypes.byref(batch), first, last, _address(reals), _address(integers))
+
+        workers = min(threads, -(-count // share)) if count else 0
+        if workers <= 1:
+            work()
+            return
+        with ThreadPoolExecutor(workers) as pool:
+            try:
+                for each in [pool.submit(work) for _ in range(workers)]:
+                    each.result()
+            finally:
+                # After Ctrl-C no thread begins another chunk.
+                is_stopped.set()
+
+    def _limit_rows(self, given: Mapping[str, ArrayLike]) -> FloatArray | None:
+        """Return the numbers of all limits, (limits,) or (n, limits); None where none is given.
+
+        Raises:
+            InputError: a limit is unknown or not allowed.
+        """
+        if not given:
+            return None
+        columns: dict[str, FloatArray] = {each.key: np.array(each.default) for each in self.limits}
+        for key, values in given.items():
+            if key not in columns:
+                raise InputError(f"limits: no limit {key!r} can be set; {nearest(str(key), columns)}")
+            columns[key] = _numbers(f"limits[{key!r}]", values)
+            if columns[key].ndim > 1:
+                raise InputError(f"limits[{key!r}]: must be a number or one for each problem, got {columns[key].shape}")
+        for limit in self.limits:
+            column = columns[limit.key]
+            wrong = column[~((limit.above < column) & (column <= limit.most))]
+            if wrong.size:
+                allowed = [f"above {limit.above:.10g}"] if limit.above > -np.inf else []
+                allowed += [f"at most {limit.most:.10g}"] if limit.most < np.inf else []
+                unit = f" {limit.unit}" if limit.unit else ""
+                raise InputError(f"limits[{limit.key!r}] = {wrong.flat[0]:.10g}{unit}: must be {' and '.join(allowed)}")
+        for key, column in columns.items():
+            upper = columns.get(f"{key.removesuffix('.min')}.max") if key.endswith(".min") else None
+            if upper is not None and column.ndim == upper.ndim == 0 and column > upper:
+                raise InputError(f"limits[{key!r}] = {column:.10g}: must be at most the other side, {upper:.10g}")
+        lengths = {key: len(column) for key, column in columns.items() if column.ndim}
+        if len(set(lengths.values())) > 1:
+            said = listing(f"{key} {length}" for key, length in lengths.items())
+            raise InputError(f"limits: arrays must have one length, got {said}")
+        return np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns.values()), axis=-1))
+
+    def _function(self, name: str) -> Callable[..., Any]:
+        """Return a function of the library."""
+        function: Callable[..., Any] = getattr(self._library, f"{self._manifest.prefix}_{name}")
+        return function
+
+
+def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
+    """Return the solver of a folder of C, compiled when it is loaded first.
+
+    The shared library is cached under the user's cache folder, by a hash of the C. It takes a C compiler: ``cc``,
+    ``gcc`` or ``clang``, or the one that the environment variable ``CC`` names.
+
+    Args:
+        folder: the folder that ``screwsynth codegen`` wrote, or :func:`~screwsynth.nlp.generate_c`'s files.
+
+    Raises:
+        InputError: the folder is none of generated C or of another version, or there is no working C compiler.
+    """
+    manifest = read_manifest(Path(folder))
+    path = shared_library(manifest.files)
+    try:
+        return CompiledCase(manifest, ctypes.CDLL(str(path)))
+    except (OSError, AttributeError) as error:
+        raise InputError(f"{folder}: the compiled library cannot be loaded: {error}") from None
+
+
+class _Rows(ctypes.Structure):
+    """Rows of numbers, as the C has them."""
+
+    _fields_: ClassVar = [("values", ctypes.c_void_p), ("length", ctypes.c_int), ("is_shared", ctypes.c_int)]
+
+
+class _Batch(ctypes.Structure):
+    """Problems and answers, as the C has them."""
+
+    _fields_: ClassVar = [
+        *((name, _Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),
+        *((name, ctypes.c_int) for name in ("maximise", "seeds")),
+        *((name, ctypes.c_void_p) for name in ("status", "runs", "converged", "iterations")),
+        *((name, ctypes.c_void_p) for name in ("F", "x", "R", "axis", "angle", "violation", "residual")),
+    ]
+    maximise: int
+    seeds: int
+    kept: tuple[Any, ...]
+
+
+def _rows(name: str, given: ArrayLike | None, length: int) -> FloatArray | None:
+    """Return an array (length,) or (n, length) of finite numbers.
+
+    Raises:
+        InputError: the shape is another one, or a number is not finite.
+    """
+    if given is None:
+        return None
+    array = _numbers(name, given)
+    if array.ndim not in (1, 2) or array.shape[-1] != length:
+        raise InputError(f"{name}: must have the shape ({length},) or (n, {length}), got {array.shape}")
+    return array
+
+
+def _numbers(name: str, given: ArrayLike) -> FloatArray:
+    """Return an array of finite numbers, contiguous.
+
+    Raises:
+        InputError: something in it is no number, or not finite.
+    """
+    try:
+        array = np.array(given, dtype=np.float64, order="C")
+    except (ValueError, TypeError):
+        raise InputError(f"{name}: must be an array of numbers") from None
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = ", ".join(str(index) for index in wrong[0])
+        where = f"{name}[{place}]" if place else name
+        raise InputError(f"{where} = {array[tuple(wrong[0])]}: must be finite")
+    return array
+
+
+def _is_between(value: object, least: int, most: int | None) -> bool:
+    """Return whether a value is a whole number within bounds."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        return False
+    return bool(least <= value and (most is None or value <= most))
+
+
+def _address(array: NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

@@ -1,0 +1,250 @@
+"""Limits of a case that C sets at run time, in their own units.
+
+A limit is one or more bounds of constraints, each by a reading, such as the cosine of an angle or the square of a
+length. One generated function converts all limits to the bounds. The tables of this module say which constraint each
+bound belongs to.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension
+from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.pose import MAX_FREE_ROTATION
+from ..program.layout import WIDENING
+from ..program.nlp import Nlp
+from ..program.places import FreeRotation
+from .ctext import c_names, comment_text, integer_table, number_table, string_table
+
+#: Depth to which two expressions of one limit are compared: above that of every reading.
+_DEPTH = 30
+#: Size of a number that stands for none in tables of C.
+_NONE = 1e300
+
+
+@dataclass(frozen=True)
+class RunTimeLimit:
+    """A limit of a case as C sets it.
+
+    Attributes:
+        key: dotted key below ``limits``; for the angle of a rotation with a free axis, the constraint's name with
+            ``.min`` or ``.max``.
+        name: end of its name in C.
+        dimension: of its number.
+        default: the case's number, radians for an angle.
+        above: the number must be larger than this.
+        most: the number may be at most this.
+    """
+
+    key: str
+    name: str
+    dimension: Dimension
+    default: float
+    above: float
+    most: float
+
+
+class Side(NamedTuple):
+    """A side of a constraint: indices of the constraint and of the converted number, and whether it is the upper."""
+
+    constraint: int
+    is_upper: bool
+    converted: int
+
+
+class Widening(NamedTuple):
+    """Bounds of a variable that follow from the squared radius of a rotation's ball: indices of both."""
+
+    variable: int
+    converted: int
+
+
+@dataclass(frozen=True, eq=False)
+class RunTimeLimits:
+    """The limits that C sets, and their conversion to bounds.
+
+    Attributes:
+        limits: the limits, in the order of the constraints.
+        function: the limits' numbers (k, 1) to the converted numbers (m, 1); None where there is no limit.
+        sides: sides of constraints that the converted numbers are bounds of.
+        widenings: variables whose bounds follow from converted numbers.
+        owners: index of the limit that each converted number follows from.
+    """
+
+    limits: tuple[RunTimeLimit, ...]
+    function: ca.Function | None
+    sides: tuple[Side, ...]
+    widenings: tuple[Widening, ...]
+    owners: tuple[int, ...] = ()
+
+    @property
+    def converted(self) -> int:
+        """Number of converted numbers."""
+        return 0 if self.function is None else int(self.function.numel_out(0))
+
+    @property
+    def work(self) -> int:
+        """Size of the function's workspace in doubles."""
+        return 0 if self.function is None else int(self.function.sz_w())
+
+
+def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
+    """Return the limits of a program that depend on its variables.
+
+    A limit that is also a constraint on fixed numbers alone cannot be set beyond what these numbers measure: the C does
+    not have that constraint.
+
+    Args:
+        nlp: the program.
+        prefix: beginning of the function's name.
+    """
+    balls = {id(each.ball): each for each in nlp.program.places.rotations if isinstance(each, FreeRotation)}
+    symbols: dict[str, SX] = {}
+    limits: dict[str, RunTimeLimit] = {}
+    places: dict[str, list[int]] = {}
+    outputs: list[SX] = []
+    owners: list[int] = []
+    sides: list[Side] = []
+    widenings: list[Widening] = []
+    for index, constraint in enumerate(nlp.program.constraints):
+        ball = balls.get(id(constraint))
+        reading = constraint.reading if ball is None else _ROTATION
+        for key, is_upper in zip(_keys(nlp, index, ball), (False, True), strict=True):
+            if not key:
+                continue
+            bound = float((nlp.g_upper if is_upper else nlp.g_lower)[index])
+            value = float(constraint.reading.from_value(bound))
+            if key not in limits:
+                symbols[key], places[key] = SX.sym(key), []
+                limits[key] = _limit(key, reading, value, _measured(nlp, key))
+            expression = reading.to_value(symbols[key])
+            same = [k for k in places[key] if ca.is_equal(outputs[k], expression, _DEPTH)]
+            if not same:
+                places[key].append(len(outputs))
+                outputs.append(expression)
+                owners.append(list(limits).index(key))
+            converted = same[0] if same else places[key][-1]
+            sides.append(Side(index, is_upper, converted))
+            if ball is not None and is_upper:
+                widenings += [Widening(variable, converted) for variable in ball.q]
+    if not limits:
+        return RunTimeLimits((), None, (), ())
+    values = ca.vertcat(*symbols.values())
+    function = ca.Function(f"{prefix}_bounds", [values], [ca.densify(ca.vertcat(*outputs))])
+    names = c_names(key.upper() for key in limits)
+    named = tuple(replace(each, name=name) for each, name in zip(limits.values(), names, strict=True))
+    return RunTimeLimits(named, function, tuple(sides), tuple(widenings), tuple(owners))
+
+
+def _squared_sine(angle: SX) -> SX:
+    """Return ``sin^2(angle / 2)``, the squared length of a rotation's ``q``."""
+    return ca.sin(0.5 * angle) ** 2
+
+
+#: The angle of a rotation about a free axis, as it is set.
+_ROTATION = Reading(Dimension.ANGLE, to_value=_squared_sine, above=0.0, most=MAX_FREE_ROTATION)
+
+
+def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
+    """Return the keys of a constraint's lower and upper number; empty where there is none."""
+    constraint: Constraint = nlp.program.constraints[index]
+    if ball is None:
+        return constraint.keys
+    return f"{constraint.name}.min" if math.isfinite(nlp.g_lower[index]) else "", f"{constraint.name}.max"
+
+
+class _Range(NamedTuple):
+    """Smallest and largest number that the constraints on fixed numbers allow a limit to have."""
+
+    least: float
+    most: float
+
+
+def _measured(nlp: Nlp, key: str) -> _Range:
+    """Return the range of a limit's number from its constraints that depend on fixed numbers alone."""
+    least, most = -math.inf, math.inf
+    program = nlp.program
+    found = [item for item in nlp.constant_limits if key in item.constraint.keys]
+    for item in found:
+        value = _value(item, program.x, program.p, nlp)
+        if item.constraint.keys[0] == key:
+            most = min(most, value)
+        if item.constraint.keys[1] == key:
+            least = max(least, value)
+    return _Range(least, most)
+
+
+def _value(item: BoundedConstraint, x: SX, p: SX, nlp: Nlp) -> float:
+    """Return the number for people that a constraint on fixed numbers measures."""
+    function = ca.Function("constant", [x, p], [ca.densify(item.constraint.expression)])
+    return float(item.constraint.reading.from_value(float(function(nlp.start, nlp.arguments))))
+
+
+def _limit(key: str, reading: Reading, value: float, measured: _Range) -> RunTimeLimit:
+    """Return a limit with its range, and as yet without a name in C; a measured number is itself allowed."""
+    above = max(reading.above, float(np.nextafter(measured.least, -math.inf)))
+    most = min(reading.most, measured.most)
+    # The case's own number is allowed, also where it differs from a measured one by rounding.
+    above = above if value > above else float(np.nextafter(value, -math.inf))
+    return RunTimeLimit(key, "", reading.dimension, value, above, max(most, value))
+
+
+def limit_texts(found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str]) -> dict[str, str]:
+    """Return the texts for the placeholders about limits.
+
+    Args:
+        found: the limits.
+        prefix: of the case's names in C.
+        unit_of: unit of a dimension, empty for a pure number.
+    """
+    ID, L = prefix.upper(), f"{prefix.upper()}_LIMITS"
+    limits = found.limits
+    members = [
+        f"    {ID}_LIMIT_{each.name} = {k}, /* {_description(each, unit_of(each.dimension))} */"
+        for k, each in enumerate(limits)
+    ]
+    return {
+        "nlimits": str(len(limits)),
+        "limit_members": "".join(f"{member}\n" for member in members),
+        "limit_tables": "\n".join(
+            [
+                string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
+                string_table(f"{prefix}_limit_units", L, [unit_of(each.dimension) for each in limits]),
+                number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
+                number_table(f"{prefix}_limit_above", L, [max(each.above, -_NONE) for each in limits]),
+                number_table(f"{prefix}_limit_most", L, [min(each.most, _NONE) for each in limits]),
+            ]
+        ),
+        "nconverted": str(found.converted),
+        "limit_work": str(found.work),
+        "nsides": str(len(found.sides)),
+        "nwidened": str(len(found.widenings)),
+        "widening": repr(WIDENING),
+        "limit_sides": "\n".join(
+            [
+                integer_table("side_constraints", "SIDES", [each.constraint for each in found.sides]),
+                integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in found.sides]),
+                integer_table("side_converted", "SIDES", [each.converted for each in found.sides]),
+                integer_table("converted_limits", "CONVERTED", found.owners),
+                integer_table("widened", "WIDENED", [each.variable for each in found.widenings]),
+                integer_table("widened_converted", "WIDENED", [each.converted for each in found.widenings]),
+            ]
+        ),
+    }
+
+
+def _description(limit: RunTimeLimit, unit: str) -> str:
+    """Return a limit in words for a comment of C: its key, its unit, its default, and the allowed numbers."""
+    allowed = [f"above {limit.above:.6g}"] if limit.above > -_NONE else []
+    allowed += [f"at most {limit.most:.6g}"] if limit.most < _NONE else []
+    shown = re.sub(r"\s+$", "", f"{limit.default:.6g} {unit}")
+    return comment_text(f"{limit.key}: {shown}{'; ' if allowed else ''}{', '.join(allowed)}")

@@ -1,0 +1,271 @@
+"""The examples beside generated C: C++, a real-time loop, an S-function of Simulink, and two folders in one program."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import generate_c, load_case
+from screwsynth.nlp.embedding.ctext import identifier
+
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O1"
+STRICT_CPP = "-std=c++17 -Wall -Wextra -Wpedantic -Werror -O1"
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
+
+
+def write(name: str, target: Path) -> Path:
+    target.mkdir(parents=True, exist_ok=True)
+    for file, text in generate_c(load_case(name), "").items():
+        (target / file).write_text(text, encoding="utf-8")
+    return target
+
+
+def run(*words: str, where: Path) -> str:
+    done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The C of a case and its library, compiled."""
+    if not COMPILERS:
+        pytest.skip("no C compiler is installed")
+    where = write("paper-4.1-helical", tmp_path_factory.mktemp("helical"))
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT}", "library", where=where)
+    return where
+
+
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_cpp_header_and_its_example_compile_and_run(compiler: str, folder: Path) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    (folder / "example-cpp").unlink(missing_ok=True)
+    run("make", f"CXX={compiler}", f"CXXFLAGS={STRICT_CPP}", "example-cpp", where=folder)
+    printed = run("./example-cpp", where=folder)
+    assert "the case: F = 407.2107, status 0" in printed
+    assert re.search(r"a vertical axis: F = [\d.]+, status 0", printed)
+    assert "angle.max: 0.523599 rad" in printed
+    (folder / "throws.cpp").write_text(THROWS, encoding="utf-8")
+    run(compiler, *STRICT_CPP.split(), "throws.cpp", "-L.",
+        f"-l{identifier('paper-4.1-helical')}", "-lm", "-o", "throws", where=folder)  # fmt: skip
+    run("./throws", where=folder)
+    # Another version's folder in the same program.
+    other = [compiler, "-fsyntax-only", "-DSCREWSYNTH_VERSION=1", "example.cpp"]
+    done = subprocess.run(other, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "are of different versions of screwsynth" in done.stderr
+
+
+THROWS = """#include <cmath>
+#include <stdexcept>
+#include "screwsynth_paper_4_1_helical.hpp"
+namespace robot = screwsynth_paper_4_1_helical;
+template <typename Error, typename Call> bool throws(Call call) {
+    try { call(); } catch (const Error &) { return true; }
+    return false;
+}
+int main() {
+    robot::Solver solver;
+    const auto limit = SCREWSYNTH_PAPER_4_1_HELICAL_LIMIT_ANGLE_MAX;
+    if (!throws<std::out_of_range>([&] { solver.set_limit(limit, std::nan("")); })) return 1;
+    if (!throws<std::out_of_range>([&] { solver.set_bounds(6, 0.0, 1.0); })) return 2;
+    if (!throws<std::out_of_range>([&] { solver.set_bounds(0, 1.0, 0.0); })) return 3;
+    if (!throws<std::invalid_argument>([&] { robot::twist_from_axis({}, {}, 0.0); })) return 4;
+    solver.set_limit(limit, 0.1);
+    if (!(std::fabs(solver.limit(limit) - 0.1) < 1e-15)) return 5;
+    robot::Solver copy = solver; /* has its own memory */
+    solver.set_limit(limit, 0.3);
+    const robot::Result small = copy.solve(), large = solver.solve();
+    if (!small || !large || !(small.angle <= 0.1 + 1e-7) || !(large.angle > 0.29)) return 6;
+    copy.start_at(small.point());
+    copy.set_seeds(0);
+    copy.p()[SCREWSYNTH_PAPER_4_1_HELICAL_p_x1] = std::nan("");
+    return copy.solve().status == SCREWSYNTH_BAD_INPUT ? 0 : 7;
+}
+"""
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform != "linux", reason="clock_nanosleep is Linux's")
+def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) -> None:
+    source = (folder / "realtime.c").read_text(encoding="utf-8")
+    # The same loop, which checks each step.
+    hook = "/* Here x goes to the machine. */"
+    assert source.count(hook) == 1
+    check = """
+        {
+            static double before[SCREWSYNTH_PAPER_4_1_HELICAL_N];
+            static int has_before = 0;
+            int j;
+            for (j = 0; j < SCREWSYNTH_PAPER_4_1_HELICAL_N && has_before; ++j)
+                if (fabs(x[j] - before[j]) > 1.000001 * STEP * (screwsynth_paper_4_1_helical_variable_upper[j] -
+                                                         screwsynth_paper_4_1_helical_variable_lower[j]))
+                    return 2;
+            memcpy(before, x, sizeof before);
+            has_before = 1;
+        }"""
+    (folder / "realtime.c").write_text(source.replace(hook, check), encoding="utf-8")
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT}", "realtime", where=folder)
+    printed = run("./realtime", "200", where=folder)
+    cycles, held = (int(each) for each in re.findall(r"^(\d+) cycles .* us; (\d+) held", printed)[0])
+    assert cycles == 200
+    # On a busy machine cycles are missed; not all are.
+    assert held < cycles
+
+
+@needs_compiler
+def test_the_s_function_compiles_and_solves_in_a_stub_of_simulink(folder: Path) -> None:
+    (folder / "simstruc.h").write_text(SIMSTRUC, encoding="utf-8")
+    (folder / "simulink.c").write_text(SIMULINK, encoding="utf-8")
+    prefix = identifier("paper-4.1-helical")
+    words = ["-DMATLAB_MEX_FILE", "sfunction.c", "-L.", f"-l{prefix}", "-lm", "-o", "sfunction"]
+    run(COMPILERS[0], *STRICT.split(), *words, where=folder)
+    assert (
+        run("./sfunction", where=folder) == "4 ports, 6 1 1 9 wide: status 0, F 407.2107; again 0, 407.2107; none 3\n"
+    )
+
+
+#: As much of simstruc.h as the S-function calls.
+SIMSTRUC = """#include <stdlib.h>
+typedef double real_T;
+typedef int int_T;
+typedef struct { double number; } mxArray;
+typedef struct {
+    int parameters, outputs, widths[8], iwidth, rwidth;
+    real_T twist[6], *out[8], *rwork, time;
+    int_T *iwork;
+    mxArray given[2];
+} SimStruct;
+#define SS_OPTION_EXCEPTION_FREE_CODE 1
+#define mxGetScalar(a) ((a)->number)
+#define ssSetNumSFcnParams(S, n) ((S)->parameters = (n))
+#define ssGetNumSFcnParams(S) ((S)->parameters)
+#define ssGetSFcnParamsCount(S) 2
+#define ssGetSFcnParam(S, i) (&(S)->given[i])
+#define ssSetSFcnParamTunable(S, i, yes) ((void)(S), (void)(i))
+#define ssSetNumContStates(S, n) ((void)(S))
+#define ssSetNumDiscStates(S, n) ((void)(S))
+#define ssSetNumInputPorts(S, n) ((n) == 1)
+#define ssSetInputPortWidth(S, i, n) ((S)->iwidth = (n))
+#define ssSetInputPortRequiredContiguous(S, i, yes) ((void)(S))
+#define ssSetInputPortDirectFeedThrough(S, i, yes) ((void)(S))
+#define ssSetNumOutputPorts(S, n) ((S)->outputs = (n))
+#define ssSetOutputPortWidth(S, i, n) ((S)->widths[i] = (n), (S)->out[i] = calloc((size_t)(n), sizeof(real_T)))
+#define ssSetNumSampleTimes(S, n) ((void)(S))
+#define ssSetNumRWork(S, n) ((S)->rwork = calloc((size_t)(n), sizeof(real_T)))
+#define ssSetNumIWork(S, n) ((S)->iwork = calloc((size_t)(n), sizeof(int_T)))
+#define ssSetOptions(S, o) ((void)(S))
+#define ssSetSampleTime(S, i, t) ((S)->time = (t))
+#define ssSetOffsetTime(S, i, t) ((void)(S))
+#define ssGetRWork(S) ((S)->rwork)
+#define ssGetIWork(S) ((S)->iwork)
+#define ssGetInputPortSignal(S, i) ((const void *)(S)->twist)
+#define ssGetOutputPortRealSignal(S, i) ((S)->out[i])
+"""
+SIMULINK = """#include <math.h>
+#include <stdio.h>
+int main(void) {
+    static SimStruct S;
+    double x;
+    int k;
+    S.given[0].number = 1e-3;
+    S.given[1].number = 16;
+    mdlInitializeSizes(&S);
+    mdlInitializeSampleTimes(&S);
+    mdlStart(&S);
+    for (k = 0; k < 6; ++k)
+        S.twist[k] = screwsynth_paper_4_1_helical_parameter_defaults[SCREWSYNTH_PAPER_4_1_HELICAL_TWIST + k];
+    mdlOutputs(&S, 0);
+    printf("%d ports, %d %d %d %d wide: ", S.outputs, S.widths[0], S.widths[1], S.widths[2], S.widths[3]);
+    printf("status %g, F %.7g; ", *S.out[2], *S.out[1]);
+    mdlOutputs(&S, 0);
+    printf("again %g, %.7g; ", *S.out[2], *S.out[1]);
+    S.twist[0] = NAN;
+    x = S.out[0][2];
+    mdlOutputs(&S, 0);
+    printf("none %g\\n", *S.out[2]);
+    if (S.out[0][2] != x || x < 1.0) return 2; /* x is held */
+    mdlTerminate(&S);
+    return S.iwidth == 6 && S.time == 1e-3 ? 0 : 1;
+}
+"""
+
+PROJECT = """cmake_minimum_required(VERSION 3.13)
+project(both C)
+add_subdirectory(one)
+add_subdirectory(two)
+add_executable(both both.c)
+target_link_libraries(both screwsynth_paper_4_2_rotation::screwsynth_paper_4_2_rotation
+  screwsynth_paper_4_2_translation::screwsynth_paper_4_2_translation)
+"""
+FOUND = """cmake_minimum_required(VERSION 3.13)
+project(found C)
+find_package(screwsynth_paper_4_2_rotation 0.1 REQUIRED)
+find_package(screwsynth_paper_4_2_translation REQUIRED)
+add_executable(both both.c)
+target_link_libraries(both screwsynth_paper_4_2_rotation::screwsynth_paper_4_2_rotation
+  screwsynth_paper_4_2_translation::screwsynth_paper_4_2_translation)
+"""
+BOTH = """#include "screwsynth_paper_4_2_rotation.h"
+#include "screwsynth_paper_4_2_translation.h"
+#include <stdio.h>
+int main(void) {
+    static double work[SCREWSYNTH_PAPER_4_2_ROTATION_SOLVERWORK + SCREWSYNTH_PAPER_4_2_TRANSLATION_SOLVERWORK];
+    static int iwork[SCREWSYNTH_PAPER_4_2_ROTATION_SOLVERIWORK + SCREWSYNTH_PAPER_4_2_TRANSLATION_SOLVERIWORK];
+    screwsynth_paper_4_2_rotation_problem one;
+    screwsynth_paper_4_2_translation_problem two;
+    screwsynth_paper_4_2_rotation_result first;
+    screwsynth_paper_4_2_translation_result second;
+    screwsynth_status a, b;
+    screwsynth_paper_4_2_rotation_defaults(&one);
+    screwsynth_paper_4_2_translation_defaults(&two);
+    a = screwsynth_paper_4_2_rotation_solve(&one, &first, work, iwork);
+    b = screwsynth_paper_4_2_translation_solve(&two, &second, work, iwork);
+    printf("%d %d %d\\n", (int)a, (int)b, first.F != second.F);
+    return a != SCREWSYNTH_OK || b != SCREWSYNTH_OK;
+}
+"""
+
+
+@pytest.fixture
+def cmake() -> Callable[..., str]:
+    found = shutil.which("cmake")
+    if found is None or not COMPILERS:
+        pytest.skip("cmake or a C compiler is not installed")
+    return lambda *words, where: run(found, *words, where=where)
+
+
+@pytest.mark.slow
+def test_two_folders_are_one_project_are_installed_and_found(tmp_path: Path, cmake: Callable[..., str]) -> None:
+    write("paper-4.2-rotation", tmp_path / "one")
+    write("paper-4.2-translation", tmp_path / "two")
+    flags = f"-DCMAKE_C_COMPILER={COMPILERS[0]}"
+    for name, text in (("CMakeLists.txt", PROJECT), ("both.c", BOTH)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    cmake("-S", ".", "-B", "build", flags, f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'installed'}", where=tmp_path)
+    cmake("--build", "build", where=tmp_path)
+    assert run("build/both", where=tmp_path) == "0 0 1\n"
+    # Inside of a project there are no programs.
+    assert not list(tmp_path.glob("build/*/selftest"))
+    cmake("--install", "build", where=tmp_path)
+    user = tmp_path / "user"
+    user.mkdir()
+    for name, text in (("CMakeLists.txt", FOUND), ("both.c", BOTH)):
+        (user / name).write_text(text, encoding="utf-8")
+    cmake("-S", ".", "-B", "build", flags, f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", where=user)
+    cmake("--build", "build", where=user)
+    assert run("build/both", where=user) == "0 0 1\n"
+    # A bare machine gets the library alone.
+    bare = ("-DCMAKE_SYSTEM_NAME=Generic", "-DCMAKE_C_COMPILER_WORKS=1")
+    cmake("-S", "one", "-B", "bare", flags, *bare, where=tmp_path)
+    targets = cmake("--build", "bare", "--target", "help", where=tmp_path)
+    assert "screwsynth_paper_4_2_rotation" in targets
+    assert "selftest" not in targets
