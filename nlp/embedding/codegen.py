@@ -40,6 +40,7 @@ _PARTS = {
     "-solver.c": "solver.c",
     "-sqp.h": "sqp.h",
     "-sqp.c": "sqp.c",
+    "-restore.c": "restore.c",
     "-qp.c": "qp.c",
 }
 #: Ending of the file that a case with limits on singular values needs in addition.
@@ -135,8 +136,8 @@ def _substitutions(nlp: Nlp, staged: StagedFunctions) -> dict[str, str]:
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
     work = max(1, *(function.sz_w() for function in functions))
-    # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
+    # Workspace of sqp.c, and multipliers. A test in solver.c keeps it from compiling with too little.
+    solver_work = work + 5 * n**2 + 18 * n + 13 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,

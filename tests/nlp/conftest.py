@@ -50,6 +50,15 @@ class Solved:
     runs: int
     converged: int
     iterations: int
+    lower_multipliers: np.ndarray
+    upper_multipliers: np.ndarray
+    g_lower_multipliers: np.ndarray
+    g_upper_multipliers: np.ndarray
+
+
+#: Type of the callback that may end a solve.
+Deadline = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+MULTIPLIERS = ("lower_multipliers", "upper_multipliers", "g_lower_multipliers", "g_upper_multipliers")
 
 
 class Embedded:
@@ -61,8 +70,7 @@ class Embedded:
             (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / f"{self.prefix}{end}.c") for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
-        sources += [str(folder / name) for name in files if name.endswith("-spectrum.c")]
+        sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
         library = str(folder / "all.so")
         compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
         flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
@@ -71,10 +79,14 @@ class Embedded:
         self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
         pointer, number, integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
 
+        class Options(ctypes.Structure):
+            _fields_ = (("max_iterations", integer), ("deadline", Deadline), ("user", pointer))
+
         class Problem(ctypes.Structure):
             _fields_ = (
                 *((name, pointer) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper")),
                 *((name, integer) for name in ("maximise", "seeds")),
+                ("options", Options),
             )
 
         class Result(ctypes.Structure):
@@ -85,6 +97,8 @@ class Embedded:
                 ("axis", number * 3),
                 *((name, number) for name in ("angle", "violation", "residual")),
                 *((name, integer) for name in ("runs", "converged", "iterations")),
+                *((name, number * (self.n + 1)) for name in MULTIPLIERS[:2]),
+                *((name, number * (self.c + 1)) for name in MULTIPLIERS[2:]),
             )
 
         self._problem, self._result = Problem, Result
@@ -99,9 +113,19 @@ class Embedded:
     def call(self, function: str, *arrays: np.ndarray) -> int:
         return int(getattr(self._library, f"{self.prefix}_{function}")(*[_address(each) for each in arrays]))
 
-    def solve(self, *, maximise: int | None = None, seeds: int | None = None, **arrays: np.ndarray) -> Solved:
-        """Solve the default problem with some of its arrays replaced."""
+    def solve(
+        self,
+        *,
+        maximise: int | None = None,
+        seeds: int | None = None,
+        max_iterations: int = 0,
+        deadline: Callable[[], bool] | None = None,
+        **arrays: np.ndarray,
+    ) -> Solved:
+        """Solve the default problem with some of its arrays replaced. The result is -7 where the C leaves it as it was."""
         problem, result = self._problem(), self._result()
+        result.F = -7.0
+        result.x[:] = [-7.0] * len(result.x)
         getattr(self._library, f"{self.prefix}_defaults")(ctypes.byref(problem))
         kept = {name: np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()}
         for name, array in kept.items():
@@ -110,6 +134,9 @@ class Embedded:
             problem.maximise = maximise
         if seeds is not None:
             problem.seeds = seeds
+        problem.options.max_iterations = max_iterations
+        callback = Deadline(lambda _: int(deadline())) if deadline else Deadline()
+        problem.options.deadline = callback
         return self._solved(problem, result)
 
     def solve_again(self) -> Solved:
@@ -128,6 +155,7 @@ class Embedded:
         names = ("angle", "violation", "residual", "runs", "converged", "iterations")
         scalars = {name: getattr(result, name) for name in names}
         arrays_out = {name: np.array(getattr(result, name)) for name in ("R", "axis")}
+        arrays_out |= {name: np.array(getattr(result, name))[:-1] for name in MULTIPLIERS}
         return Solved(status, result.F, np.array(result.x)[: self.n], **arrays_out, **scalars)
 
 
