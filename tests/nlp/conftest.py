@@ -122,7 +122,7 @@ class Embedded:
         deadline: Callable[[], bool] | None = None,
         **arrays: np.ndarray,
     ) -> Solved:
-        """Solve the default problem with some of its arrays replaced. The result is -7 where the C leaves it as it was."""
+        """Solve the default problem with some of its arrays replaced. What the C leaves as it was is -7."""
         problem, result = self._problem(), self._result()
         result.F = -7.0
         result.x[:] = [-7.0] * len(result.x)

@@ -1,4 +1,4 @@
-"""The solver in C inside a controller: narrowed bounds, budgets, infeasible problems, multipliers, and refused flags."""
+"""The solver in C inside a controller: narrow bounds, budgets, infeasible problems, multipliers, and refused flags."""
 
 import ctypes
 import math
@@ -81,9 +81,7 @@ def track(c: Embedded, nlp: Nlp, width: float, ticks: int) -> tuple[Counter[int]
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.3", "limited"])
-def test_narrowed_bounds_give_no_false_status(
-    name: str, embedded: EmbeddedCase, limited: tuple[Embedded, Nlp]
-) -> None:
+def test_narrowed_bounds_give_no_false_status(name: str, embedded: EmbeddedCase, limited: tuple[Embedded, Nlp]) -> None:
     c, nlp = limited if name == "limited" else (embedded(name), formulate(load_case(name)))
     way = track(c, nlp, 1.0, 60)[1]
     for width in WIDTHS:
@@ -112,7 +110,7 @@ def test_a_budget_of_iterations_gives_the_best_feasible_point_so_far(limited: tu
         solved = c.solve(x0=feasible, seeds=0, max_iterations=budget)
         assert (solved.status, solved.iterations) == (BUDGET, budget)
         assert solved.violation <= FEASIBLE
-        assert solved.F >= last - 1e-9 * abs(last)
+        assert last - 1e-9 * abs(last) <= solved.F
         last = solved.F
     assert c.solve(x0=feasible, seeds=0, max_iterations=whole.iterations).status == OK
     # Searches that the budget leaves no time for are searches that were asked for.
@@ -138,7 +136,7 @@ def test_a_deadline_ends_the_solve_within_one_evaluation(limited: tuple[Embedded
         assert solved.status == BUDGET
         assert asked == allowed + 1
         assert solved.violation <= FEASIBLE
-        assert solved.F >= last * (1 - 1e-9)
+        assert last * (1 - 1e-9) <= solved.F
         last = solved.F
         if allowed == 0:
             assert np.max(np.abs(solved.x - feasible)) <= 1e-12 * np.max(np.abs(feasible))
