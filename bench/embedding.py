@@ -64,7 +64,7 @@ with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / file).write_text(text)
     (Path(folder) / "driver.c").write_text(DRIVER.replace("ID", prefix).replace("BIG", prefix.upper()))
     (Path(folder) / "handwritten.c").write_text((Path(__file__).parent / "handwritten.c").read_text())
-    parts = [f"{prefix}{end}.c" for end in ("", "-solver", "-sqp", "-qp", "-casadi")]
+    parts = [path.name for path in Path(folder).glob(f"{prefix}*.c")]
     for program in ("driver", "handwritten"):
         flags = ["-O2", "-std=gnu99", f"{program}.c", *parts, "-lm", "-o", program]
         subprocess.run([os.environ.get("CC", "cc"), *flags], cwd=folder, check=True)

@@ -45,6 +45,7 @@ _PARTS = {
     "-solver.c": "solver.c",
     "-sqp.h": "sqp.h",
     "-sqp.c": "sqp.c",
+    "-restore.c": "restore.c",
     "-qp.c": "qp.c",
     "-limits.c": "limits.c",
     "-batch.c": "batch.c",
@@ -158,8 +159,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     rows = len(program.model.wrenches)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
-    # Workspace of sqp.c. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 16 * n + 11 * c + 2 * c * n + 1
+    # Workspace of sqp.c, and multipliers. A test in solver.c keeps it from compiling with too little.
+    solver_work = work + 5 * n**2 + 18 * n + 13 * c + 2 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,

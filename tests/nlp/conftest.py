@@ -82,6 +82,15 @@ class Solved:
     runs: int
     converged: int
     iterations: int
+    lower_multipliers: np.ndarray
+    upper_multipliers: np.ndarray
+    g_lower_multipliers: np.ndarray
+    g_upper_multipliers: np.ndarray
+
+
+#: Type of the callback that may end a solve.
+Deadline = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+MULTIPLIERS = ("lower_multipliers", "upper_multipliers", "g_lower_multipliers", "g_upper_multipliers")
 
 
 class Embedded:
@@ -102,10 +111,14 @@ class Embedded:
         self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
         pointer, number, integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
 
+        class Options(ctypes.Structure):
+            _fields_ = (("max_iterations", integer), ("deadline", Deadline), ("user", pointer))
+
         class Problem(ctypes.Structure):
             _fields_ = (
                 *((name, pointer) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper")),
                 *((name, integer) for name in ("maximise", "seeds")),
+                ("options", Options),
             )
 
         class Result(ctypes.Structure):
@@ -116,6 +129,8 @@ class Embedded:
                 ("axis", number * 3),
                 *((name, number) for name in ("angle", "violation", "residual")),
                 *((name, integer) for name in ("runs", "converged", "iterations")),
+                *((name, number * (self.n + 1)) for name in MULTIPLIERS[:2]),
+                *((name, number * (self.c + 1)) for name in MULTIPLIERS[2:]),
             )
 
         self._problem, self._result = Problem, Result
@@ -173,9 +188,19 @@ class Embedded:
             turned = np.eye(3) + np.sin(angle[0]) * _cross(axis) + (1 - np.cos(angle[0])) * _cross(axis) @ _cross(axis)
             assert np.max(np.abs(turned - R)) <= 1e-13
 
-    def solve(self, *, maximise: int | None = None, seeds: int | None = None, **arrays: np.ndarray) -> Solved:
-        """Solve the default problem with some of its arrays replaced."""
+    def solve(
+        self,
+        *,
+        maximise: int | None = None,
+        seeds: int | None = None,
+        max_iterations: int = 0,
+        deadline: Callable[[], bool] | None = None,
+        **arrays: np.ndarray,
+    ) -> Solved:
+        """Solve the default problem with some of its arrays replaced. What the C leaves as it was is -7."""
         problem, result = self._problem(), self._result()
+        result.F = -7.0
+        result.x[:] = [-7.0] * len(result.x)
         getattr(self._library, f"{self.prefix}_defaults")(ctypes.byref(problem))
         kept = {name: np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()}
         for name, array in kept.items():
@@ -184,6 +209,9 @@ class Embedded:
             problem.maximise = maximise
         if seeds is not None:
             problem.seeds = seeds
+        problem.options.max_iterations = max_iterations
+        callback = Deadline(lambda _: int(deadline())) if deadline else Deadline()
+        problem.options.deadline = callback
         return self._solved(problem, result)
 
     def solve_again(self) -> Solved:
@@ -202,6 +230,7 @@ class Embedded:
         names = ("angle", "violation", "residual", "runs", "converged", "iterations")
         scalars = {name: getattr(result, name) for name in names}
         arrays_out = {name: np.array(getattr(result, name)) for name in ("R", "axis")}
+        arrays_out |= {name: np.array(getattr(result, name))[:-1] for name in MULTIPLIERS}
         return Solved(status, result.F, np.array(result.x)[: self.n], **arrays_out, **scalars)
 
 
