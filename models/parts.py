@@ -148,3 +148,38 @@ class Leg:
     def built(self) -> Leg:
         """The leg between joint centres with their errors."""
         return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """An actuated joint of a limb given joint by joint.
+
+    Attributes:
+        name: unique within the model.
+        limb: name of the limb that it is part of.
+        screw: (6, 1) its current unit screw as a twist, the world's origin as reference.
+        dimension: length for a slide or a parallelogram, angle for a rotation.
+    """
+
+    name: str
+    limb: str
+    screw: SX
+    dimension: Dimension
+
+
+@dataclass(frozen=True, eq=False)
+class JointScrews:
+    """Current screws of a limb's joints, whose ranks tell a limb's singularities.
+
+    Attributes:
+        limb: name of the limb.
+        passive: (6, n) screws of its passive joints as twists, the world's origin as reference.
+        all: (6, k) screws of all its joints.
+        passive_rank, all_rank: their ranks at almost all dimensions and poses.
+    """
+
+    limb: str
+    passive: SX
+    all: SX
+    passive_rank: int
+    all_rank: int

@@ -1,0 +1,92 @@
+"""Rows of the Jacobian as results state them: an orthonormal basis of each member's wrenches, in place of its projector.
+
+Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
+characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
+then forces through the centre, then the others. Behind them are those by which the actuators drive the platform.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import FloatArray
+from .member import Member
+from .wrench import WrenchKind
+
+#: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
+_ZERO = 1e-9
+
+
+class Basis(NamedTuple):
+    """An orthonormal basis (d, size) of a member's wrenches in scaled coordinates, and the kind of each."""
+
+    rows: FloatArray
+    kinds: tuple[WrenchKind, ...]
+
+
+def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int) -> Basis:
+    """Return a basis of a member's wrenches.
+
+    Args:
+        projector: (size, size) or, with columns in other coordinates, (size, k) of the same column space.
+        actuation: (size, a) parts of the actuated joints' screws that the member resists, in scaled coordinates.
+        dimension: of the space.
+    """
+    space = np.linalg.svd(projector)[0][:, :dimension].T
+    driven = _span(actuation.T @ space.T @ space) if actuation.size else np.zeros((0, space.shape[1]))
+    constraints = space - (space @ driven.T) @ driven
+    constraints = np.linalg.svd(constraints)[2][: dimension - len(driven)]
+    couples, rest = _split(constraints, slice(0, 3))
+    forces, others = _split(rest, slice(3, None)) if space.shape[1] > 3 else (rest, rest[:0])
+    if space.shape[1] == 3:
+        couples, forces = constraints[:0], constraints
+    rows = np.vstack([couples, forces, others, driven])
+    return Basis(rows, tuple(_kind(row) for row in rows))
+
+
+def reported_rows(members: Sequence[Member], count: int, jacobian: FloatArray, actuators: Sequence[FloatArray]) -> FloatArray:
+    """Return the matrix (r, m) that turns the rows of a :class:`~.instance.RobotInstance` into those of results.
+
+    Args:
+        members: of the model.
+        count: number of the model's wrenches, whose rows stay as they are.
+        jacobian: (m, 6) rows of the wrenches, then of the members' projectors.
+        actuators: (6, a) for each member: screws of its actuators as twists, the world's origin as reference.
+    """
+    total = count + sum(len(member.kinds) for member in members)
+    matrix = np.zeros((total, len(jacobian)))
+    matrix[:count, :count] = np.eye(count)
+    row, column = count, count
+    for member, screws in zip(members, actuators, strict=True):
+        block = jacobian[column : column + member.size]
+        actuation = block @ np.vstack([screws[3:], screws[:3]])
+        basis = basis_of_member(block, actuation, len(member.kinds)).rows
+        matrix[row : row + len(basis), column : column + member.size] = basis
+        row, column = row + len(basis), column + member.size
+    return matrix
+
+
+def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
+    """Return orthonormal bases of the combinations of rows in which a part of the components is zero, and of the rest."""
+    if not len(rows):
+        return rows, rows
+    left, values, _ = np.linalg.svd(rows[:, part])
+    nonzero = int(np.count_nonzero(values > _ZERO))
+    turned = left.T @ rows
+    return turned[nonzero:], turned[:nonzero]
+
+
+def _span(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the span of rows."""
+    _, values, right = np.linalg.svd(rows)
+    return np.asarray(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+
+
+def _kind(row: FloatArray) -> WrenchKind:
+    """Return the kind of a wrench in scaled coordinates."""
+    if len(row) == 3 or not np.abs(row[3:]).max() > _ZERO:
+        return WrenchKind.FORCE
+    return WrenchKind.WRENCH if np.abs(row[:3]).max() > _ZERO else WrenchKind.COUPLE
