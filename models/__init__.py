@@ -1,6 +1,9 @@
 """Symbolic robots, and the screw algebra in which they are written."""
 
+from typing import TYPE_CHECKING
+
 from .arrays import FloatArray, frozen_array, frozen_vector
+from .basis import reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
 from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
@@ -15,8 +18,20 @@ from .instance import (
     reason_for_zero_row,
 )
 from .legs import LeggedPlatform, legged_platform
+from .member import Member
 from .model import Model, ModelError
-from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
+from .parts import (
+    Actuator,
+    Closure,
+    Dimension,
+    JointScrews,
+    Leg,
+    Parameter,
+    PoseSymbols,
+    Quantity,
+    Unknown,
+    component_names,
+)
 from .rotation import (
     AxisAngle,
     axis_angle_from_matrix,
@@ -38,9 +53,13 @@ from .screws import (
 )
 from .stewart_gough import stewart_gough
 from .three_upu import three_upu
-from .wrench import Wrench, WrenchKind, couple_about, force_along
+from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along
+
+if TYPE_CHECKING:
+    from .joints import RobotError, robot
 
 __all__ = [
+    "Actuator",
     "AmbiguousModelError",
     "AxisAngle",
     "Body",
@@ -50,20 +69,24 @@ __all__ = [
     "Direction",
     "Displacement",
     "FloatArray",
+    "JointScrews",
     "Leg",
     "LegInstance",
     "LeggedPlatform",
     "Link",
     "Mark",
     "MarkKind",
+    "Member",
     "Model",
     "ModelError",
     "Parameter",
     "Point",
     "PoseSymbols",
     "Quantity",
+    "RobotError",
     "RobotFunction",
     "RobotInstance",
+    "RowLabel",
     "Scene",
     "Screw",
     "Substitution",
@@ -93,6 +116,8 @@ __all__ = [
     "objective",
     "reason_for_zero_row",
     "reciprocal_product",
+    "reporting_matrix",
+    "robot",
     "robot_function",
     "screw_displacement",
     "screw_from_axis",
@@ -100,3 +125,12 @@ __all__ = [
     "three_upu",
     "unit_vector",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Return a name of :mod:`.joints`, which most runs do not need and which is imported when it is first used."""
+    if name not in ("RobotError", "robot"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from . import joints  # noqa: PLC0415 - see above
+
+    return getattr(joints, name)

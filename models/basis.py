@@ -7,13 +7,12 @@ then forces through the centre, then the others. Behind them are those by which 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import FloatArray
-from .member import Member
+from .model import Model
 from .wrench import WrenchKind
 
 #: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
@@ -47,23 +46,22 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     return Basis(rows, tuple(_kind(row) for row in rows))
 
 
-def reported_rows(members: Sequence[Member], count: int, jacobian: FloatArray, actuators: Sequence[FloatArray]) -> FloatArray:
+def reporting_matrix(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
     """Return the matrix (r, m) that turns the rows of a :class:`~.instance.RobotInstance` into those of results.
 
     Args:
-        members: of the model.
-        count: number of the model's wrenches, whose rows stay as they are.
-        jacobian: (m, 6) rows of the wrenches, then of the members' projectors.
-        actuators: (6, a) for each member: screws of its actuators as twists, the world's origin as reference.
+        model: the robot.
+        jacobian: (m, 6) rows of its wrenches, which stay as they are, then of its members' projectors.
+        actuators: (6, a) current screws of its actuators.
     """
-    total = count + sum(len(member.kinds) for member in members)
-    matrix = np.zeros((total, len(jacobian)))
+    count = len(model.wrenches)
+    matrix = np.zeros((len(model.rows), len(jacobian)))
     matrix[:count, :count] = np.eye(count)
     row, column = count, count
-    for member, screws in zip(members, actuators, strict=True):
-        block = jacobian[column : column + member.size]
-        actuation = block @ np.vstack([screws[3:], screws[:3]])
-        basis = basis_of_member(block, actuation, len(member.kinds)).rows
+    for member in model.members:
+        own = [k for k, each in enumerate(model.actuators) if each.limb == member.limb]
+        block, screws = jacobian[column : column + member.size], actuators[:, own]
+        basis = basis_of_member(block, block @ np.vstack([screws[3:], screws[:3]]), len(member.kinds)).rows
         matrix[row : row + len(basis), column : column + member.size] = basis
         row, column = row + len(basis), column + member.size
     return matrix

@@ -83,7 +83,7 @@ class Model(Whole, Shown):
         _check_references(self)
 
     def __repr__(self) -> str:
-        options = "".join(f", {key}={value!r}" for key, value in self.options.items())
+        options = "".join(f", {key}={value!r}" for key, value in self.options.items() if not isinstance(value, Mapping))
         counts = f"{len(self.parameters)} parameters, {len(self.limbs)} limbs, {len(self.rows)} rows"
         return f"<Model {self.name!r}{options}: {counts}>"
 

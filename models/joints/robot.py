@@ -62,7 +62,8 @@ def robot(
         "derived": derived,
         "description": description,
     }
-    return _model(read_words(tables))
+    definition = {key: value for key, value in tables.items() if value is not None and value != ""}
+    return _model(read_words(tables), definition)
 
 
 @dataclass(eq=False)
@@ -156,8 +157,8 @@ class _Builder:
         return variable
 
 
-def _model(words: RobotWords) -> Model:
-    """Return the model of a robot from its words."""
+def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
+    """Return the model of a robot from its words, and the tables that state them."""
     at_home = home_robot(words)
     samples = sampled_dimensions(at_home)
     pose = PoseSymbols()
@@ -180,6 +181,7 @@ def _model(words: RobotWords) -> Model:
     return Model(
         name=words.name,
         description=words.description,
+        options={"definition": definition},
         parameters=_parameters(at_home),
         pose=pose,
         home=frame.typical_triple(at_home.home),

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ... import cases
-from ...models import Dimension
+from ...models import Dimension, Model
 from ..errors import CaseError, InputError, nearest
 from ..units import Units
 from .case import Case
@@ -22,7 +22,16 @@ from .orientation import rotation_from_matrix, rotation_from_quaternion, rotatio
 from .overrides import Settings, override_number
 from .pose import Free, OverPoses, Pose, Rotation, Value
 from .robots import build_model
-from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
+from .schema import (
+    Document,
+    ExpectTable,
+    PublishedTable,
+    Range,
+    RobotTable,
+    RotationTable,
+    TaskTable,
+    parse_document,
+)
 from .settings import Expectation, ExpectedValue, Published, Search
 from .task import Method, Sense, Task, unit_twist
 from .tomltext import toml_text
@@ -109,7 +118,7 @@ def read_case(name: str, settings: Settings | None = None) -> CaseFile:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
-    is_whole = not settings and not names_files(tables)
+    is_whole = not settings and not names_files(tables) and not names_robot_file(tables)
     case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
     return CaseFile(case, text if is_whole else toml_text(tables))
 
@@ -138,6 +147,12 @@ def case_text(name: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def names_robot_file(tables: dict[str, Any]) -> bool:
+    """Return whether a document names a robot file."""
+    robot = tables.get("robot")
+    return isinstance(robot, dict) and "file" in robot
+
+
 def case_from_tables(
     tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None, folder: Path | None = None
 ) -> Case:
@@ -157,29 +172,38 @@ def case_from_tables(
     origins = TableOrigins()
     try:
         origins = insert_rows(tables, folder or Path())
+        robot_file = _insert_robot(tables, folder or Path()) if names_robot_file(tables) else None
         written = parse_document(tables)
         if settings:
             for key, value in settings.items():
                 override_number(tables, key, value)
             written = parse_document(tables)
-        return _case_of(written, name, source)
+        return _case_of(written, name, source, robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
 
 
-def _case_of(written: Document, name: str, source: str) -> Case:
+def _insert_robot(tables: dict[str, Any], folder: Path) -> str | None:
+    """Put the robot file that a document names in the place of its name, and return this name."""
+    from .robotfile.reader import insert_robot  # noqa: PLC0415 - few cases have a robot of their own
+
+    return insert_robot(tables, folder)
+
+
+def _case_of(written: Document, name: str, source: str, robot_file: str | None = None) -> Case:
     """Return the case of a document.
 
     Args:
         written: the document.
         name: name of the case in results.
         source: name of the document in messages.
+        robot_file: name of the file from which the robot's definition is; None where the document has it.
 
     Raises:
         CaseError: the document holds a fault.
     """
     units = Units(written.units.length, written.units.angle)
-    model = build_model(written.robot.model, written.robot.options)
+    model = _model_of(written, robot_file)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
@@ -221,6 +245,18 @@ def _case_of(written: Document, name: str, source: str) -> Case:
         published=tuple(_published(row) for row in written.published),
         source=source,
     )
+
+
+def _model_of(written: Document, robot_file: str | None) -> Model:
+    """Return the robot of a document, by its name or by its definition."""
+    robot = written.robot
+    if robot.definition is None:
+        return build_model(robot.model or "", robot.options)
+    from .robotfile.reader import model_of_definition  # noqa: PLC0415 - few cases have a robot of their own
+
+    for key in robot.options:
+        raise CaseError(f"robot.{key}", f"no such key; {nearest(key, RobotTable.model_fields)}")
+    return model_of_definition(robot.definition, robot_file)
 
 
 def _pose_keys(written: Document) -> list[str]:

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 from ...models import Dimension, Model, Parameter
 from ..units import Units
+from .plain import plain_value
 from .settings import Search
+from .toml import toml_text
 
 _UNITS = Units("cm", "deg")
 
@@ -26,7 +28,9 @@ def starter_case(model: Model) -> str:
     """
     z, search = model.home[2], Search()
     reach = _SPREAD * abs(z) or 1.0
-    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items()]
+    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
+    definition = model.options.get("definition")
+    robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -35,7 +39,7 @@ def starter_case(model: Model) -> str:
         f'angle = "{_UNITS.angle}"               # or "rad"',
         "",
         "[robot]",
-        f'model = "{model.name}"',
+        robot,
         *options,
         *(
             ["characteristic_length = 1   # by which unit couples count beside unit forces"]

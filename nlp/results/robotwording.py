@@ -42,7 +42,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
             for item in model.parameters
         ),
     )
-    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.wrenches)]
+    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]

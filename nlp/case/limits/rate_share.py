@@ -49,6 +49,6 @@ class RateShare(Limit[AtMost]):
             whose = f" task {task}" if len(pose.tasks) > 1 else ""
             whole = robot.F[j] + _SHARELESS * robot.magnitude[j]
             for limb in pose.model.limbs:
-                own = [robot.rates[i, j] for i, row in enumerate(pose.model.wrenches) if row.limb == limb]
+                own = [robot.rates[i, j] for i, row in enumerate(pose.model.frame_rows) if row.limb == limb]
                 part = sum((rate**2 for rate in own), SX(0)) / whole
                 yield between(f"rate_share limb {limb}{whose}{pose.where}", part, NUMBER, "rate_share", upper=self.max)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,7 +154,7 @@ def drawing_of_model(model: Model) -> Drawing:
     parameters = np.array([value for item in model.parameters for value in item.typical])
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
     linkage = Linkage(model, parameters)
-    headline = ", ".join(f"{key} = {value}" for key, value in model.options.items())
+    headline = ", ".join(f"{key} = {value}" for key, value in model.options.items() if not isinstance(value, Mapping))
     guess = linkage.posture_at(np.eye(3), np.array(model.home), middles)
     # A motion of zero length closes the loops.
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
@@ -201,7 +201,7 @@ def drawing_of(
         drawing,
         rows=tuple(
             LimbRate(row.limb, row.kind, float(rate), float(share))
-            for row, rate, share in zip(model.wrenches, rates, shares, strict=True)
+            for row, rate, share in zip(model.rows, rates, shares, strict=True)
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name),
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),

@@ -205,7 +205,7 @@ class Panel:
     def _paint_couples(self) -> None:
         """Paint couples as arrows with two heads, at the points that join their limbs to the platform."""
         for row, wrench, values in zip(
-            self.drawing.rows, self.drawing.model.wrenches, self.drawing.posture.jacobian, strict=True
+            self.drawing.rows, self.drawing.model.rows, self.drawing.posture.jacobian, strict=True
         ):
             index = self.drawing.attachment(row.limb)
             if wrench.kind is not WrenchKind.COUPLE or index is None:

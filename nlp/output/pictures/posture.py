@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian
+from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian, reporting_matrix
 from ...program.kernel import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
@@ -58,7 +58,8 @@ class Linkage:
         own = Substitution.identity(model)
         outputs = [
             ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
-            jacobian(model.wrenches, SX(characteristic_length)),
+            jacobian(model.wrenches, SX(characteristic_length), model.members),
+            ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
@@ -76,7 +77,8 @@ class Linkage:
         """
         scene = self.model.scene
         arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
-        columns, rows, *quantities = self._drawing(*arguments)
+        columns, rows, screws, *quantities = self._drawing(*arguments)
+        rows = reporting_matrix(self.model, rows, screws) @ rows
         counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions)]
         points, circles, directions, marks = np.split(columns.T, np.cumsum(counts))
         directions = directions.reshape(-1, 2, 3)
@@ -90,7 +92,7 @@ class Linkage:
             circles=frozen_array(circles.reshape(-1, 3, 3), (len(scene.circles), 3, 3)),
             directions=frozen_array(directions, directions.shape),
             marks=tuple(frozen_array(part, part.shape) for part in np.split(marks, ends)) if scene.marks else (),
-            jacobian=frozen_array(rows, (len(self.model.wrenches), 6)),
+            jacobian=frozen_array(rows, (len(self.model.rows), 6)),
             quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
         )
 

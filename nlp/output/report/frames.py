@@ -278,7 +278,7 @@ def _lengths(drawing: Drawing, posture: Posture) -> list[float]:
     for item, values in zip(drawing.model.quantities, posture.quantities, strict=True):
         if item.name == "leg_length":
             lengths |= dict(zip(item.owners, map(float, values), strict=True))
-    return [lengths.get(row.limb, 0.0) for row in drawing.model.wrenches]
+    return [lengths.get(row.limb, 0.0) for row in drawing.model.rows]
 
 
 def _motion_data(motion: Motion, units: Units) -> MotionData:
