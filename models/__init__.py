@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from .arrays import FloatArray, frozen_array, frozen_vector
-from .basis import reporting_matrix
+from .basis import constraint_rows, rank_of_rows, reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
 from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
@@ -24,6 +24,7 @@ from .parts import (
     Actuator,
     Closure,
     Dimension,
+    GenericRanks,
     JointScrews,
     Leg,
     Parameter,
@@ -69,6 +70,7 @@ __all__ = [
     "Direction",
     "Displacement",
     "FloatArray",
+    "GenericRanks",
     "JointScrews",
     "Leg",
     "LegInstance",
@@ -97,6 +99,7 @@ __all__ = [
     "axis_angle_from_matrix",
     "axis_from_screw",
     "component_names",
+    "constraint_rows",
     "couple_about",
     "displacement",
     "force_along",
@@ -114,6 +117,7 @@ __all__ = [
     "model_names",
     "moved_screw",
     "objective",
+    "rank_of_rows",
     "reason_for_zero_row",
     "reciprocal_product",
     "reporting_matrix",

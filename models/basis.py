@@ -17,6 +17,8 @@ from .wrench import WrenchKind
 
 #: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
 _ZERO = 1e-9
+#: Singular values below this part of the largest are zero: a closed loop is known to the root of rounding at worst.
+_RANK = 1e-7
 
 
 class Basis(NamedTuple):
@@ -65,6 +67,33 @@ def reporting_matrix(model: Model, jacobian: FloatArray, actuators: FloatArray) 
         matrix[row : row + len(basis), column : column + member.size] = basis
         row, column = row + len(basis), column + member.size
     return matrix
+
+
+def constraint_rows(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
+    """Return wrenches (k, 6) of all limbs that do no work in their actuated joints: constraints on a free robot.
+
+    Args:
+        model: the robot.
+        jacobian: (m, 6) rows of a :class:`~.instance.RobotInstance`.
+        actuators: (6, a) current screws of its actuators.
+    """
+    found = [np.zeros((0, 6))]
+    for limb in model.limbs:
+        own = jacobian[[k for k, row in enumerate(model.frame_rows) if row.limb == limb]]
+        screws = actuators[:, [k for k, each in enumerate(model.actuators) if each.limb == limb]]
+        left, values, _ = np.linalg.svd(own @ np.vstack([screws[3:], screws[:3]]))
+        driven = int(np.count_nonzero(values > _ZERO * float(np.abs(own).max(initial=0.0))))
+        found.append(left[:, driven:].T @ own)
+    return np.vstack(found)
+
+
+def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
+    """Return the rank of wrenches (m, 6) with moments about a centre (3,) in parts of a length."""
+    if not len(rows):
+        return 0
+    scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return int(np.count_nonzero(values > _RANK * values[0])) if values[0] > 0 else 0
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:

@@ -183,3 +183,17 @@ class JointScrews:
     all: SX
     passive_rank: int
     all_rank: int
+
+
+@dataclass(frozen=True)
+class GenericRanks:
+    """Ranks of a robot given joint by joint, at almost all dimensions and closed configurations.
+
+    Attributes:
+        jacobian: rank of all rows.
+        constraints: rank of the wrenches that do no work in the actuated joints: the platform has six freedoms less
+            this rank.
+    """
+
+    jacobian: int
+    constraints: int

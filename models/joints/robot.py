@@ -10,10 +10,21 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..basis import basis_of_member
+from ..basis import basis_of_member, constraint_rows, rank_of_rows
+from ..instance import Substitution, jacobian
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
-from ..parts import Actuator, Closure, Dimension, JointScrews, Parameter, PoseSymbols, Quantity, Unknown
+from ..parts import (
+    Actuator,
+    Closure,
+    Dimension,
+    GenericRanks,
+    JointScrews,
+    Parameter,
+    PoseSymbols,
+    Quantity,
+    Unknown,
+)
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
@@ -178,7 +189,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     members = [_with_kinds(member, builder, numbers, loops.points[0]) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [Closure(f"{each.name} in full", each.expression) for each in (*closure, *builder.checks)]
-    return Model(
+    model = Model(
         name=words.name,
         description=words.description,
         options={"definition": definition},
@@ -195,6 +206,27 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
     )
+    return replace(model, generic=_generic_ranks(model, at_home, loops.points))
+
+
+def _generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
+    """Return the largest ranks of a robot's rows and constraints over closed configurations."""
+    own = Substitution.identity(model)
+    size = ca.Function("size", [robot.symbols], [robot.size])
+    length = SX.sym("length")
+    screws = ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators])
+    rows = jacobian(model.wrenches, length, model.members)
+    function = ca.Function("rows", [*own.all, length], [ca.densify(rows), ca.densify(screws)])
+    ranks = []
+    for point in points:
+        reach = float(size(point.dimensions))
+        values = function(point.dimensions, point.unknowns, point.rotation, point.position, reach)
+        J, driven = (each.full() for each in values)
+        if np.isfinite(J).all():
+            constraints = constraint_rows(model, J, driven)
+            ranks.append([rank_of_rows(each, point.position, reach) for each in (J, constraints)])
+    most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
+    return GenericRanks(int(most[0]), int(most[1]))
 
 
 def _with_kinds(member: Member, builder: _Builder, numbers: Sequence[SX], point: ClosedPoint) -> Member:

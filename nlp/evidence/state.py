@@ -28,6 +28,8 @@ ZERO_F = 1e-12
 #: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
 #: the square root of the rounding unit of double precision: a point known to rounding error gives no better accuracy.
 ZERO_SINGULAR_VALUE = 1.5e-8
+#: Largest residual of a loop equation, of order 1, of a closed loop: in another assembly it is of order 0.1.
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +147,17 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             }
         ),
     )
+
+
+def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
+    """Return whether all loop equations of the robot hold at a point (n,), those beyond the program's own included.
+
+    The program has independent equations only, which other ways to assemble the joints fulfil too.
+    """
+    if not nlp.program.model.loops:
+        return True
+    states = (kernel(x, nlp.arguments) for kernel in nlp.program.kernels.robot_states)
+    return all(float(np.abs(each.loops).max(initial=0.0)) <= _CLOSED for each in states)
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
