@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from casadi import SX
+from matplotlib.figure import Figure
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.nlp import (
@@ -25,7 +26,7 @@ from screwsynth.nlp import (
     solve,
 )
 from screwsynth.nlp.case.case import Case
-from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.case.robots import build_model, model_options
 from screwsynth.nlp.output.pictures import fonts
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
@@ -182,7 +183,7 @@ def distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     return float(abs(x * v - y * u) / np.hypot(x, y))
 
 
-def assert_labels_are_clear(robots: list[Drawing]) -> None:
+def assert_labels_are_clear(robots: list[Drawing]) -> Figure:
     """Every limb has one label, on no other limb and within the picture, with a line that ends on its own limb."""
     figure = figure_of(robots)
     figure.canvas.draw()
@@ -195,6 +196,14 @@ def assert_labels_are_clear(robots: list[Drawing]) -> None:
                 limbs.setdefault(gid.removeprefix("limb "), []).append(axes.transData.transform(line.get_xydata()))
         assert set(limbs) == {link.limb for _, _, link in robot.links if link.limb}
         leaders = {str(line.get_gid()): axes.transData.transform(line.get_xydata()) for line in axes.lines}
+        own_lines = [
+            name for name in leaders if name.startswith("leader ") and name not in ("leader edge", "leader dot")
+        ]
+        drawn = [leaders[name] for name in own_lines]
+        # A line that passes the dot of another one might name either place.
+        for k, (dot, _) in enumerate(drawn):
+            near = (*(dot - 3 * per_point), *(dot + 3 * per_point))
+            assert not [j for j, (a, b) in enumerate(drawn) if j != k and crosses_box(a, b, near)]
         for name, own in limbs.items():
             (text,) = [each for each in axes.texts if each.get_text().split("\n")[0] == f"limb {name}"]
             extent = text.get_window_extent()
@@ -215,6 +224,7 @@ def assert_labels_are_clear(robots: list[Drawing]) -> None:
             else:  # the label touches its own limb, or nearly
                 near = tuple(np.array(box) + 6 * per_point * np.array([-1, -1, 1, 1]))
                 assert any(crosses_box(a, b, near) for a, b in own)
+    return figure
 
 
 @pytest.mark.parametrize("name", [name for name in shipped_cases() if name != "paper-4.2"])
@@ -224,7 +234,16 @@ def test_labels_stand_on_no_other_limb(name: str) -> None:
 
 @pytest.mark.parametrize("name", model_names())
 def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
-    assert_labels_are_clear([drawing_of_model(build_model(name))])
+    (option,) = [each for each in model_options(name) if each.choices]
+    robots = [drawing_of_model(build_model(name, {option.name: choice})) for choice in option.choices]
+    figure = assert_labels_are_clear(robots)
+    for axes, robot in zip([axes for axes in figure.axes if axes.texts], robots, strict=True):
+        names = {mark.parameter for mark in robot.model.scene.marks}
+        edges = [axes.transData.transform(np.asarray(patch.get_xy())) for patch in axes.patches if patch.get_gid()]
+        for text in axes.texts:
+            if text.get_text() in names:
+                box = text.get_window_extent().extents
+                assert not [k for loop in edges for k in range(len(loop) - 1) if crosses_box(loop[k], loop[k + 1], box)]
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-max", "hexapod-machining"])

@@ -84,6 +84,7 @@ class Canvas:
         *,
         bold: bool = False,
         limb: str = "",
+        is_led: bool = False,
     ) -> None:
         """Ask for a word beside a point (3,), preferably in a direction (2,) on paper.
 
@@ -95,11 +96,14 @@ class Canvas:
             size: of the letters, points.
             bold: whether they are bold.
             limb: name of the limb that the word belongs to, whose label has a leader line; empty for none.
+            is_led: whether any other word has a leader line.
         """
         length = float(np.linalg.norm(away))
         places = np.atleast_2d(self.view.project(at))
         direction = away / length if length else away
-        self._labels.append(Label(text, places, direction, colour, size, bold, f"label {text}", limb))
+        self._labels.append(
+            Label(text, places, direction, colour, size, bold, f"label {text}", limb, is_led or bool(limb))
+        )
 
     def outwards(self, at: FloatArray) -> FloatArray:
         """Return the direction (2,) on paper from the centre to a point (3,)."""

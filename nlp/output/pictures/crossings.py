@@ -1,4 +1,4 @@
-"""Straight lines in the plane that meet a box or each other."""
+"""Straight lines in the plane that meet a box or each other, and points near them."""
 
 from __future__ import annotations
 
@@ -50,3 +50,11 @@ def segments_cross(segments: FloatArray, line: FloatArray) -> BoolArray:
     one = side(a, b, c) * side(a, b, d)
     other = side(c, d, a) * side(c, d, b)
     return np.asarray((one < 0) & (other < 0))
+
+
+def distances_to_segment(points: FloatArray, line: FloatArray) -> FloatArray:
+    """Return the distance of each point (k, 2) from a straight line between its ends (4,), (k,)."""
+    start, way = line[:2], line[2:] - line[:2]
+    square = float(way @ way)
+    part = np.clip((points - start) @ way / square, 0.0, 1.0) if square else np.zeros(len(points))
+    return np.asarray(np.linalg.norm(points - start - np.outer(part, way), axis=1))

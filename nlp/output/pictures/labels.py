@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 from ....models import FloatArray
-from .crossings import segments_cross, segments_in_box
+from .crossings import distances_to_segment, segments_cross, segments_in_box
 from .fonts import legible
 
 #: Distances, in points, and number of directions of the places that are tried for a word.
@@ -25,13 +25,21 @@ _LED_DISTANCES = (48.0, 64.0, 84.0, 108.0, 136.0, 168.0, 204.0)
 #: Room around a word, in pixels, and half of the width of a limb, in points.
 _ROOM, _HALF_LIMB = 2.0, 4.0
 #: Costs of covering another word, of covering a line that is kept free, and of a point of distance.
-_OVERLAP, _COVERED, _FAR = 50.0, 6.0, 0.12
+_OVERLAP, _COVERED, _FAR = 50.0, 12.0, 0.12
 #: A word on a limb that is not its own is wrong, and a leader line across one misleads.
 _ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 6.0
+#: A leader line that ends where another limb is too, or passes the dot of another one, might mean that one.
+_AMBIGUOUS = 30.0
+#: A leader line that passes a joint, so near in points, seems to name it.
+_PASSES_JOINT, _NEAR_JOINT = 10.0, 6.0
 #: A word beyond the axes is cut off, which is worse than an overlap.
 _OUTSIDE = 600.0
+#: A leader line should run along no other line: cost of each that is beside it, and the parts of its way looked at.
+_LEADER_ALONG, _LEADER_PARTS = 2.0, (0.4, 0.6, 0.8, 1.0)
 #: A leader line is drawn where the word is farther from its place than this, in points.
 _LED = 4.0
+#: So far from its place, in points, every word has a leader line.
+_ASTRAY = 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +54,8 @@ class Label:
         size: of the letters, points.
         bold: whether they are bold.
         name: ``gid`` of the artist.
-        owner: name of the limb that the word belongs to; it then has a leader line.
+        owner: name of the limb that the word belongs to; empty for none.
+        is_led: whether a leader line joins the word to its place however near they are.
     """
 
     text: str
@@ -57,6 +66,7 @@ class Label:
     bold: bool = False
     name: str = ""
     owner: str = ""
+    is_led: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +145,10 @@ def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obs
         place, start = _best_place(label, half, axes.transData.transform(label.at), sheet)
         text.set_position(tuple(back.transform(place)))
         sheet.taken.append((*(place - half), *(place + half)))
-        if label.owner:
-            end = _edge_towards(place, half, start)
-            if np.linalg.norm(end - start) > _LED * sheet.per_point:
-                sheet.leaders.append((*start, *end))
-                line = back.transform(np.array([start, end]))
-                _draw_leader(axes, line, label)
+        end = _edge_towards(place, half, start)
+        if _is_led(label, start, end, sheet):
+            sheet.leaders.append((*start, *end))
+            _draw_leader(axes, back.transform(np.array([start, end])), label)
         texts.append(text)
     return texts
 
@@ -153,9 +161,22 @@ def _draw_leader(axes: Axes, line: FloatArray, label: Label) -> None:
         )
     )
     axes.add_line(
-        Line2D(line[:, 0], line[:, 1], color=label.color, linewidth=0.8, zorder=99, gid=f"leader {label.owner}")
+        Line2D(
+            line[:, 0],
+            line[:, 1],
+            color=label.color,
+            linewidth=0.8,
+            zorder=99,
+            gid=f"leader {label.owner or label.text}",
+        )
     )
     axes.plot([line[0, 0]], [line[0, 1]], marker="o", markersize=2.6, color=label.color, zorder=99, gid="leader dot")
+
+
+def _is_led(label: Label, start: FloatArray, end: FloatArray, sheet: _Sheet) -> bool:
+    """Return whether a word has a leader line from its place (2,) to its edge (2,), in pixels."""
+    least = _LED if label.is_led else _ASTRAY
+    return bool(np.linalg.norm(end - start) > least * sheet.per_point)
 
 
 def _edge_towards(place: FloatArray, half: FloatArray, target: FloatArray) -> FloatArray:
@@ -175,7 +196,7 @@ def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Shee
         sheet: what is already on the paper.
     """
     best, at, least = places[0], places[0], math.inf
-    distances = (*_DISTANCES, *_LED_DISTANCES) if label.owner else _DISTANCES
+    distances = (*_DISTANCES, *_LED_DISTANCES) if label.is_led else _DISTANCES
     for place in places:
         for distance in distances:
             for step in range(_DIRECTIONS):
@@ -186,14 +207,17 @@ def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Shee
                 middle = place + direction * (distance * sheet.per_point + reach)
                 cost = _FAR * distance - 2.0 * float(direction @ label.away)
                 if cost < least:
-                    cost += _cost(label, middle, half, place, sheet)
+                    cost += _cost(label, middle, half, sheet)
+                edge = _edge_towards(middle, half, place)
+                if cost < least and _is_led(label, place, edge, sheet):
+                    cost += _leader_cost(label, place, edge, sheet)
                 if cost < least:
                     best, at, least = middle, place, cost
     return best, at
 
 
-def _cost(label: Label, middle: FloatArray, half: FloatArray, place: FloatArray, sheet: _Sheet) -> float:
-    """Return the cost of what a word at a place covers, arguments as for :func:`_best_place`."""
+def _cost(label: Label, middle: FloatArray, half: FloatArray, sheet: _Sheet) -> float:
+    """Return the cost of what a word covers whose box has this middle (2,), arguments as for :func:`_best_place`."""
     box = (*(middle - half), *(middle + half))
     cost = 0.0
     for other in sheet.taken:
@@ -213,12 +237,34 @@ def _cost(label: Label, middle: FloatArray, half: FloatArray, place: FloatArray,
     cost += _COVERED * int(np.count_nonzero(segments_in_box(sheet.segments[~limbs], box)))
     if sheet.leaders:
         cost += _OVERLAP * int(np.count_nonzero(segments_in_box(np.array(sheet.leaders), box)))
+    return cost
+
+
+def _leader_cost(label: Label, start: FloatArray, end: FloatArray, sheet: _Sheet) -> float:
+    """Return the cost of a leader line from a word's place (2,) to its edge (2,), in pixels."""
+    leader = np.array([*start, *end])
+    limbs = sheet.owners != ""
+    others = sheet.segments[limbs & (sheet.owners != label.owner)]
+    joints = sheet.segments[limbs].reshape(-1, 2)
+    # The line of a joint's own name begins at the joint.
+    joints = joints[np.linalg.norm(joints - start, axis=1) > _NEAR_JOINT * sheet.per_point]
+    cost = _LEADER_CROSSES * int(np.count_nonzero(segments_cross(others, leader)))
+    cost += _PASSES_JOINT * int(np.count_nonzero(distances_to_segment(joints, leader) < _NEAR_JOINT * sheet.per_point))
+    room = 1.5 * _HALF_LIMB * sheet.per_point
+    near = (*(start - room), *(start + room))
     if label.owner:
-        leader = np.array([*place, *_edge_towards(middle, half, place)])
-        others = sheet.segments[limbs & (sheet.owners != label.owner)]
-        cost += _LEADER_CROSSES * int(np.count_nonzero(segments_cross(others, leader)))
-        if sheet.leaders:
-            cost += _OVERLAP * int(np.count_nonzero(segments_cross(np.array(sheet.leaders), leader)))
-        for other in sheet.taken:
-            cost += _OVERLAP * int(np.count_nonzero(segments_in_box(leader[None, :], other)))
+        # Where two limbs cross on paper, a line to one of them might mean the other.
+        cost += _AMBIGUOUS * int(np.count_nonzero(segments_in_box(others, near)))
+    if sheet.leaders:
+        leaders = np.array(sheet.leaders)
+        cost += _OVERLAP * int(np.count_nonzero(segments_cross(leaders, leader)))
+        cost += _AMBIGUOUS * int(np.count_nonzero(segments_in_box(leaders, near)))
+        cost += _AMBIGUOUS * int(np.count_nonzero(distances_to_segment(leaders[:, :2], leader) < room))
+    for part in _LEADER_PARTS:
+        # A leader line that runs along another line cannot be told from it.
+        on_way = start + part * (end - start)
+        beside = (*(on_way - room / 2), *(on_way + room / 2))
+        cost += _LEADER_ALONG * int(np.count_nonzero(segments_in_box(sheet.segments, beside)))
+    for other in sheet.taken:
+        cost += _OVERLAP * int(np.count_nonzero(segments_in_box(leader[None, :], other)))
     return cost

@@ -26,6 +26,8 @@ _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
 #: Places on a limb, in parts of its length, that its label may point to.
 _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
+#: The same for the arrow of a length.
+_ALONG_ARROW = (0.5, 0.35, 0.7)
 #: Radius of an angle's arc, in parts of its first ray.
 _ARC = 0.72
 #: A rate below this part of the largest, and a pitch or velocity below this part of the robot's size, show as 0.
@@ -216,7 +218,7 @@ class Panel:
             self._canvas.arrow(at, end, f"couple {row.limb}", colour, 2.6, 50)
             self._canvas.arrow(at, at + 0.86 * (end - at), f"couple head {row.limb}", colour, 2.6, 50)
             text = f"couple of limb {row.limb}\n{self._rate_text(row.rate)}"
-            self._canvas.label(text, end, self._canvas.outwards(end), bold=True, size=8.5)
+            self._canvas.label(text, end, self._canvas.outwards(end), bold=True, size=8.5, is_led=True)
             if not any(text.startswith("couple") for _, text in self.legend):
                 handle = Line2D([], [], color=MUTED, linewidth=2.6, marker=">")
                 self.legend.append((handle, "couple that a limb applies (two heads)"))
@@ -250,10 +252,13 @@ class Panel:
         for mark, points in zip(self.drawing.model.scene.marks, self.drawing.posture.marks, strict=True):
             name, colour = f"mark {mark.parameter}", RED
             if mark.kind is MarkKind.POINT:
-                self._canvas.label(mark.parameter, points[0], self._canvas.outwards(points[0]), colour, 9.0, bold=True)
+                away = self._canvas.outwards(points[0])
+                self._canvas.label(mark.parameter, points[0], away, colour, 9.0, bold=True, is_led=True)
             elif mark.kind is MarkKind.LENGTH:
                 self._canvas.arrow(points[0], points[1], name, colour, 1.6, 55)
-                self._canvas.label(mark.parameter, points.mean(axis=0), np.array([0.0, 1.0]), colour, 11.0, bold=True)
+                places = points[0] + np.outer(_ALONG_ARROW, points[1] - points[0])
+                away = self._canvas.outwards(places[0])
+                self._canvas.label(mark.parameter, places, away, colour, 11.0, bold=True, is_led=True)
             else:
                 self._paint_angle(name, mark.parameter, points, colour)
 
@@ -268,7 +273,8 @@ class Panel:
         arc = _arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
         self._canvas.line(arc, name, color=colour, linewidth=1.8, zorder=55)
         middle = arc[len(arc) // 2]
-        self._canvas.label(parameter, middle, self._canvas.view.project(middle - vertex), colour, 11.0, bold=True)
+        away = self._canvas.view.project(middle - vertex)
+        self._canvas.label(parameter, middle, away, colour, 11.0, bold=True, is_led=True)
 
     def _colour(self, rate: float) -> tuple[float, float, float, float]:
         red, green, blue, alpha = self._colours(self._scale(rate))
