@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from .arrays import FloatArray, frozen_array, frozen_vector
 from .basis import constraint_rows, rank_of_rows, reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
-from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
+from .drawing import Body, Circle, Direction, JointKind, JointSymbol, Link, LinkKind, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
 from .instance import (
     LegInstance,
@@ -71,11 +71,14 @@ __all__ = [
     "Displacement",
     "FloatArray",
     "GenericRanks",
+    "JointKind",
     "JointScrews",
+    "JointSymbol",
     "Leg",
     "LegInstance",
     "LeggedPlatform",
     "Link",
+    "LinkKind",
     "Mark",
     "MarkKind",
     "Member",

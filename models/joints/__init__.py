@@ -4,7 +4,8 @@ The modules in order, each of which imports only those before it: ``expression``
 numbers), ``motion`` (displacements and screws as symbols), ``words`` (a robot as it is written), ``chain`` (joints and
 limbs with their symbols), ``cut`` (the joint at which a limb's loop is opened), ``opened`` (the opened limb: current
 screws and equations), ``generic`` (ranks at random dimensions), ``resistance`` (rows and members of a limb), ``loops``
-(independent loop equations), ``pictures`` (the drawing), ``robot`` (the model).
+(independent loop equations), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the
+drawing), ``robot`` (the model).
 """
 
 from .expression import ExpressionError

@@ -36,6 +36,7 @@ class Joint:
         point: (3, 1) its centre or a point of its axis, length.
         axes: its axes, each with one variable, the base side first; those of a spherical joint are along x, y and z.
         actuated: whether an actuator drives it.
+        parts: the joints as they are written that this one stands for; empty for a joint as it is written.
     """
 
     place: str
@@ -43,6 +44,7 @@ class Joint:
     point: SX
     axes: tuple[JointAxis, ...]
     actuated: bool
+    parts: tuple[Joint, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,7 @@ def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
         axes = tuple(
             JointAxis(AxisKind.ROTATION, each, point, actuated=False, pitch=SX(0), rod=SX.zeros(3)) for each in basis
         )
-    return Joint(joints[0].place, kind, point, axes, actuated=False)
+    return Joint(joints[0].place, kind, point, axes, actuated=False, parts=tuple(joints))
 
 
 def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:

@@ -32,7 +32,7 @@ from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
 from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
-from .pictures import scene_of
+from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .words import Expression, RobotError, RobotWords, VectorExpression, read_words
 
@@ -92,7 +92,7 @@ class _Builder:
     actuators: list[Actuator] = field(default_factory=list)
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
-    paths: list[tuple[str, OpenedPath]] = field(default_factory=list)
+    paths: list[DrawnPath] = field(default_factory=list)
     structures: dict[tuple[int, int], Ranks] = field(default_factory=dict)
 
     def add_limb(self, limb: Limb) -> None:
@@ -106,7 +106,6 @@ class _Builder:
             path = self._path(limb, index, joints, self._variables(limb, known))
             if path is None:
                 continue
-            self.paths.append((limb.name, path))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
@@ -119,6 +118,11 @@ class _Builder:
             self.actuators.append(Actuator(name, limb.name, path.screws[j][0], dimension))
             way = slide_length(path, self.frame) if j == path.cut.slide else known[id(joint), 0]
             self.positions.append(SX(0) if way is None else way)
+
+    @property
+    def carrying(self) -> set[str]:
+        """Names of the limbs that resist the platform."""
+        return {row.limb for row in self.wrenches} | {member.limb for member in self.members}
 
     def _path(
         self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables
@@ -135,6 +139,9 @@ class _Builder:
             return None
         path = open_path(joints, cut, variables, self.frame)
         rows, member = resistance(limb.name, path, ranks, limb.centre)
+        before = sum(row.limb == limb.name for row in self.wrenches)
+        row = before if len(limb.branches) > 1 and len(rows) == 1 else None
+        self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
         self.wrenches += rows
         self.members += [] if member is None else [member]
         branch = f".{index + 1}" if len(limb.branches) > 1 else ""
@@ -199,7 +206,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=_quantities(builder),
-        scene=scene_of(builder.paths, pose),
+        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),

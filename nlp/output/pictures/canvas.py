@@ -59,10 +59,16 @@ class Canvas:
         """Draw a filled polygon with corners (k, 3); words may cover it."""
         self._axes.add_patch(Polygon(self.view.project(points), **style))
 
-    def marker(self, point: FloatArray, name: str, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
-        """Draw a round marker at a point (3,); words may cover it."""
+    def marker(
+        self,
+        point: FloatArray,
+        name: str,
+        symbol: str = "o",
+        **style: Any,  # noqa: ANN401 - Matplotlib's own words
+    ) -> None:
+        """Draw a marker at a point (3,), round or with one of Matplotlib's symbols; words may cover it."""
         x, y = self.view.project(point)
-        self._axes.plot([x], [y], marker="o", linestyle="none", gid=name, **style)
+        self._axes.plot([x], [y], marker=symbol, linestyle="none", gid=name, **style)
 
     def arrow(self, start: FloatArray, end: FloatArray, name: str, colour: Colour, width: float, zorder: float) -> None:
         """Draw an arrow between two points (3,); towards the eye it is only its head."""

@@ -12,6 +12,7 @@ from ....models import (
     Body,
     FloatArray,
     Link,
+    LinkKind,
     Model,
     WrenchKind,
     axis_from_screw,
@@ -51,12 +52,14 @@ class LimbRate:
         kind: a force, or a couple.
         rate: work rate ``L_i ^ chi``.
         share: part of F, ``rate^2 / F``; nan where F is 0.
+        driving: its work rate in an actuated joint of the limb at unit rate; 0 for a constraint.
     """
 
     limb: str
     kind: WrenchKind
     rate: float
     share: float
+    driving: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +132,20 @@ class Drawing:
         return reciprocal_product(posture.jacobian, self.motion.twist) if self.motion is not None else np.zeros(0)
 
     def limb_rates(self) -> dict[str, float]:
-        """Return the rate that colours each limb: of its force, or of its couple where it applies no force."""
+        """Return the rate that colours each limb.
+
+        It is that of the row that drives the limb's actuator most; without such a row, of its force, or of its couple
+        where it applies no force.
+        """
         rates: dict[str, float] = {}
-        for row in sorted(self.rows, key=lambda row: row.kind is WrenchKind.FORCE):
+        for row in sorted(self.rows, key=lambda row: (row.driving, row.kind is WrenchKind.FORCE)):
             rates[row.limb] = row.rate
         return rates
+
+    def link_rate(self, link: Link) -> float | None:
+        """Return the rate of the row that a link carries alone; None for a link that carries others too."""
+        own = [row.rate for row in self.rows if row.limb == link.limb]
+        return None if link.row is None or link.row >= len(own) else own[link.row]
 
     def attachment(self, limb: str) -> int | None:
         """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
@@ -200,8 +212,8 @@ def drawing_of(
     return replace(
         drawing,
         rows=tuple(
-            LimbRate(row.limb, row.kind, float(rate), float(share))
-            for row, rate, share in zip(model.rows, rates, shares, strict=True)
+            LimbRate(row.limb, row.kind, float(rate), float(share), float(driving))
+            for row, rate, share, driving in zip(model.rows, rates, shares, posture.driving, strict=True)
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name),
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
@@ -279,7 +291,7 @@ def _drawing_without_task(case: Case | None, model: Model, linkage: Linkage, pos
 
 def _loop(links: Sequence[tuple[int, int, Link]], body: Body) -> tuple[int, ...]:
     """Return indices of the points around a body's outline; none where the body's lines are not one closed loop."""
-    following = {start: end for start, end, link in links if link.body is body}
+    following = {start: end for start, end, link in links if link.body is body and link.kind is LinkKind.BAR}
     if len(following) < 3:
         return ()
     first = next(iter(following))

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....models import FloatArray
+from ....models import FloatArray, LinkKind
 from .drawing import Drawing
 
 #: Azimuths that are tried for a view, and its elevation, in degrees.
 _AZIMUTHS = range(-170, 190, 10)
 _ELEVATION = 18.0
+#: A robot lower than this part of its size is seen from this elevation, degrees.
+_FLAT, _ABOVE = 0.1, 60.0
 #: Two lines that cross on paper nearer to an end than this part of their lengths are joined there, and do not cross.
 _JOINED = 0.02
 
@@ -53,19 +55,28 @@ class View:
 
 def clearest_view(drawing: Drawing) -> View:
     """Return the view in which limbs stand farthest apart on paper and the task's axis is least foreshortened."""
-    return max((View(float(azimuth)) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
+    flat = np.ptp(drawing.posture.points, axis=0)[2] < _FLAT * drawing.size
+    elevation = _ABOVE if flat else _ELEVATION
+    return max((View(float(azimuth), elevation) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
 
 
 def _clearness(view: View, drawing: Drawing) -> float:
     """Return a score: least and mean distance on paper between points of limbs, and the visible part of the axis."""
     points = drawing.posture.points
     middles = [
-        view.project(points[start] + part * (points[end] - points[start]))
+        (link.limb, view.project(points[start] + part * (points[end] - points[start])))
         for start, end, link in drawing.links
-        if link.limb is not None
+        if link.limb is not None and link.kind is not LinkKind.RAIL
         for part in (0.35, 0.65)
     ]
-    apart = [float(np.linalg.norm(a - b)) for i, a in enumerate(middles) for b in middles[:i]]
+    has_joints = bool(drawing.model.scene.joints)
+    apart = [
+        float(np.linalg.norm(a - b))
+        for i, (limb, a) in enumerate(middles)
+        for other, b in middles[:i]
+        # Links of one limb, such as the rods of a parallelogram, are near to each other in every view.
+        if limb != other or not has_joints
+    ]
     shown = min(apart, default=0.0) / drawing.size + 0.2 * float(np.mean(apart or [0.0])) / drawing.size
     if drawing.motion is not None:
         seen = np.linalg.norm(view.project(drawing.motion.axis))
