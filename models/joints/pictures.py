@@ -15,7 +15,7 @@ from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene
 from ..parts import PoseSymbols
 from .opened import OpenedPath, PathFrame
 from .outline import outline
-from .placed import PlacedJoint, placed_joints
+from .placed import PlacedJoint, arc_between, placed_joints
 
 #: Half of the length of a rail, in parts of the robot's size: it is no dimension of the robot.
 _RAIL = 0.2
@@ -168,6 +168,11 @@ def _add_joint(
     node = sketch.node(name, joint.place, joint.at_home, body, joint.kind)
     kinds = {joint.kind, None if previous is None else previous.kind}
     is_rod = kinds <= set(_ROD_ENDS) or (previous is not None and previous.kind is JointKind.PRISMATIC and k > 1)
+    bends = arc_between(joints[k - 1], joint, sketch.frame) if k else []
+    for n, (place, at_home) in enumerate(bends):
+        bend = sketch.node(f"{name} bend {n + 1}", place, at_home, Body.LIMB)
+        sketch.link(previous, bend, drawn, LinkKind.BAR, Body.LIMB)
+        previous = bend
     sketch.link(previous, node, drawn, LinkKind.ROD if is_rod else LinkKind.BAR, Body.LIMB)
     sketch.symbol(name, joint, joint.place, body, drawn.limb)
     return node

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from ..drawing import JointKind
@@ -15,6 +16,9 @@ from .opened import OpenedPath, PathFrame
 
 #: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
 _APART = 0.05
+#: Number of bends of an arc, squared sine of the angle between two axes below which they are parallel, and distance
+#: below which they meet, in parts of the distance between their hinges.
+_BENDS, _PARALLEL, _MEET = 8, 1e-6, 1e-9
 #: Kinds of joints that move their point.
 _SLIDING = (JointKind.PRISMATIC, JointKind.HELICAL, JointKind.CYLINDRICAL, JointKind.PARALLELOGRAM)
 
@@ -173,3 +177,40 @@ def _axes_at_rod(
     sign = -1.0 if float(frame.typical_value(across).item()) < 0 else 1.0
     other = x * known + y * rod + sign * ca.sqrt(rest / square) * ca.cross(known, rod)
     return (known, other) if before is not None else (other, known)
+
+
+def arc_between(one: PlacedJoint, other: PlacedJoint, frame: PathFrame) -> list[tuple[SX, SX]]:
+    """Return places between two hinges whose axes meet, on an arc about the point where they do, as spherical links are.
+
+    Each is (3, 1) in world coordinates and (3, 1) at home. There are none where the axes do not meet, or meet at a hinge.
+    """
+    if {one.kind, other.kind} != {JointKind.REVOLUTE} or one.axis_at_home is None or other.axis_at_home is None:
+        return []
+    points = [frame.typical_value(each.at_home).ravel() for each in (one, other)]
+    axes = [frame.typical_value(each).ravel() for each in (one.axis_at_home, other.axis_at_home)]
+    normal = np.cross(*axes)
+    square = float(normal @ normal)
+    if square < _PARALLEL:
+        return []
+    way = points[1] - points[0]
+    reaches = [float(np.cross(way, axis) @ normal) / square for axis in reversed(axes)]
+    size = float(np.linalg.norm(way))
+    centre = points[0] + reaches[0] * axes[0]
+    if min(map(abs, reaches)) <= _MEET * size or abs(float(way @ normal)) > _MEET * size:
+        return []
+    rays = [point - centre for point in points]
+    lengths = [float(np.linalg.norm(ray)) for ray in rays]
+    angle = float(np.arccos(np.clip(rays[0] @ rays[1] / (lengths[0] * lengths[1]), -1.0, 1.0)))
+    if np.sin(angle) < _MEET:
+        return []
+    found = []
+    for part in np.linspace(0.0, 1.0, _BENDS + 2)[1:-1]:
+        radius = (1 - part) * lengths[0] + part * lengths[1]
+        weights = np.sin([(1 - part) * angle, part * angle]) / np.sin(angle) * radius / lengths
+        # The centre moves with the axis of the first hinge, and the rays with their hinges.
+        now = one.place + reaches[0] * one.axes[0]
+        home = one.at_home + reaches[0] * one.axis_at_home
+        place = now + float(weights[0]) * (one.place - now) + float(weights[1]) * (other.place - now)
+        at_home = home + float(weights[0]) * (one.at_home - home) + float(weights[1]) * (other.at_home - home)
+        found.append((place, at_home))
+    return found

@@ -19,6 +19,7 @@ from ...units import rate_unit
 from .canvas import INK, MUTED, RED
 from .drawing import Drawing
 from .fonts import families, legible, needs_other_font
+from .joints import Handles
 from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
@@ -159,7 +160,7 @@ def _add_colour_bar(
 
 
 def _add_legend(
-    figure: Figure, left: float, bottom: float, entries: Sequence[tuple[Artist, str]], columns: int = 1
+    figure: Figure, left: float, bottom: float, entries: Sequence[tuple[Artist | Handles, str]], columns: int = 1
 ) -> None:
     """Write a legend of handles and texts; the place is in parts of the figure."""
     if entries:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 
 from ....models import Body, JointKind
@@ -13,7 +12,7 @@ from .canvas import INK, Canvas
 from .drawing import Drawing
 
 #: Half of the length of an axis' stroke, in parts of the robot's size.
-_STROKE = 0.075
+_STROKE = 0.06
 
 
 class _Look(NamedTuple):
@@ -64,24 +63,26 @@ def paint_joint_symbols(canvas: Canvas, drawing: Drawing) -> None:
             )
 
 
-def symbol_legend(drawing: Drawing) -> list[tuple[Artist, str]]:
-    """Return a handle and a text for each kind of joint of a drawing, and for actuated joints."""
+#: Handles of one entry of a legend, drawn over each other.
+Handles: TypeAlias = tuple[Line2D, ...]
+
+
+def symbol_legend(drawing: Drawing) -> list[tuple[Handles, str]]:
+    """Return handles and a text for each kind of joint of a drawing, and for actuated joints."""
     joints = drawing.model.scene.joints
-    kinds = [kind for kind in JointKind if any(each.kind is kind for each in joints)]
-    found: list[tuple[Artist, str]] = []
-    for kind in kinds:
-        look = _LOOKS[kind]
-        dot = Line2D(
-            [],
-            [],
-            linestyle="none",
-            marker=look.mark,
-            markersize=0.8 * look.size,
-            markerfacecolor="white",
-            markeredgecolor=INK,
-        )
-        found.append((dot, f"{kind.words} ({kind.value})"))
+    found: list[tuple[Handles, str]] = []
+    for kind, look in ((kind, _LOOKS[kind]) for kind in JointKind if any(each.kind is kind for each in joints)):
+        marks = [_mark(look.mark, 0.85 * look.size, "white")]
+        if look.inner:
+            marks.append(_mark(look.inner, 0.85 * look.inner_size, INK))
+        found.append((tuple(marks), f"{kind.words} ({kind.value})"))
     if any(each.is_actuated for each in joints):
-        filled = Line2D([], [], linestyle="none", marker="s", markersize=6, color=INK)
-        found.append((filled, "filled: actuated"))
+        found.append(((_mark("s", 6.0, INK),), "filled: actuated"))
     return found
+
+
+def _mark(symbol: str, size: float, face: str) -> Line2D:
+    """Return a mark of a legend."""
+    return Line2D(
+        [], [], linestyle="none", marker=symbol, markersize=size, markerfacecolor=face, markeredgecolor=INK
+    )

@@ -16,7 +16,7 @@ from ....models import Body, FloatArray, Link, LinkKind, MarkKind, WrenchKind
 from ...units import rate_unit
 from .canvas import FAINT, INK, MUTED, RED, Canvas, Colour
 from .drawing import Drawing, Motion
-from .joints import paint_joint_symbols, symbol_legend
+from .joints import Handles, paint_joint_symbols, symbol_legend
 from .posture import Posture
 from .style import RATE_COLOURS, rate_text
 from .view import View, painting_order
@@ -64,7 +64,7 @@ class Panel:
         sizes = [abs(row.rate) for row in drawing.rows if not math.isnan(row.share)]
         self.largest = max(sizes, default=0.0) or 1.0
         self.legend: list[tuple[Artist, str]] = []
-        self.symbols: list[tuple[Artist, str]] = []
+        self.symbols: list[tuple[Handles, str]] = []
         self._canvas = Canvas(axes, view, np.mean(drawing.posture.points, axis=0))
         self._colours = rate_colour_map()
         self._scale = Normalize(-self.largest, self.largest)
