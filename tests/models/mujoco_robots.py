@@ -4,7 +4,8 @@ Nothing here comes from the package: a robot in numbers (``robot_files``) become
 (``robot_mjcf``), and everything follows from the Jacobian of the engine's constraints.
 
 Twists are ``chi = (omega, v)`` with ``v`` the velocity of the platform's point at the world origin. In *scaled
-coordinates about c*, with a length ``l``, a twist is ``x = (v + omega x c, l omega)`` and a wrench ``y = (f, (m - c x f) / l)``.
+coordinates about c*, with a length ``l``, a twist is ``x = (v + omega x c, l omega)`` and a wrench
+``y = (f, (m - c x f) / l)``.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def column_space(matrix: Array, scale: float) -> Array:
 def left_null_space(matrix: Array) -> Array:
     """Orthonormal basis (n, n - r) of what is orthogonal to every column; columns are scaled to length 1 first."""
     lengths = np.linalg.norm(matrix, axis=0)
-    scaled = matrix[:, lengths > 0] / lengths[lengths > 0]
+    # A joint that does not move the loop leaves rounding errors, which must not be scaled up.
+    moving = lengths > RANK_TOLERANCE * np.max(lengths, initial=0.0)
+    scaled = matrix[:, moving] / lengths[moving]
     U, _, _ = np.linalg.svd(scaled, full_matrices=True)
     return np.asarray(U[:, singular_rank(scaled) :])
 
@@ -89,16 +92,21 @@ class Member:
 class Ranks(NamedTuple):
     """Dimensions and ranks of a robot in one configuration.
 
-    ``rows`` is the sum of ``W``; ``J`` and ``C`` are the ranks of all ``W_k`` and of all ``C_k``; ``freedoms`` are those of
-    the platform with actuators free, ``rotations`` of them change its orientation, ``locked`` remain with actuators locked;
-    ``mobility`` counts every freedom of the mechanism, spinning rods too.
+    Attributes:
+        W: dimension of each member's ``W_k``.
+        C: dimension of each member's ``C_k``.
+        J: rank of all ``W_k`` together.
+        constraints: rank of all ``C_k`` together, those of members that share an actuator taken as one.
+        freedoms: of the platform with actuators free.
+        rotations: number of independent angular velocities among them.
+        locked: freedoms of the platform with actuators locked.
+        mobility: freedoms of the whole mechanism, the spins of rods too.
     """
 
     W: tuple[int, ...]
     C: tuple[int, ...]
-    rows: int
     J: int
-    C_rank: int
+    constraints: int
     freedoms: int
     rotations: int
     locked: int
@@ -166,7 +174,7 @@ class Oracle:
         return np.array(self.data.body("platform").xpos) + self.rotation @ self.robot.home
 
     def drive(self, displacements: Sequence[float]) -> None:
-        """Move the actuators by these displacements from where they are, and close the loops again by Newton's method."""
+        """Move the actuators by these displacements, and close the loops again by Newton's method."""
         free = np.concatenate([self.passive, self.platform_dofs])
         step = np.asarray(displacements, dtype=float) / CONTINUATION_STEPS
         for _ in range(CONTINUATION_STEPS):
@@ -231,10 +239,10 @@ class Oracle:
         return [loop for loop in self.loops if loop.constraint in names]
 
     def wrenches(self, numbers: Index, dofs: Index, c: Array) -> Array:
-        """Wrenches that constraints transmit to the platform without power in these joints: basis (6, d), scaled about c.
+        """Wrenches on the platform without power in these joints: orthonormal basis (6, d), scaled about ``c``.
 
-        Constraint forces ``lambda`` with ``J_dofs' lambda = 0`` act on the platform by ``J_platform' lambda``: these are
-        the wrenches reciprocal to all platform twists that the constraints allow.
+        Constraint forces ``lambda`` with ``J_dofs' lambda = 0`` act on the platform by ``J_platform' lambda``. These
+        are the wrenches reciprocal to all platform twists that the constraints allow.
         """
         rows = np.isin(self.row_constraint, numbers)
         forces = left_null_space(self.J[rows][:, dofs])
@@ -259,15 +267,15 @@ class Oracle:
 
     # -- F and rates
 
-    def F_by_members(self, chi: Array) -> Array:
+    def member_objectives(self, chi: Array) -> Array:
         """``F_k`` of each member in a twist: squared length of the projection on ``W_k``."""
         return np.array([np.sum((m.W.T @ (scaled_twists(m.centre, self.length) @ chi)) ** 2) for m in self.members()])
 
-    def F(self, chi: Array) -> float:
+    def objective(self, chi: Array) -> float:
         """F in a twist, from the members."""
-        return float(np.sum(self.F_by_members(chi)))
+        return float(np.sum(self.member_objectives(chi)))
 
-    def F_by_least_squares(self, chi: Array) -> float:
+    def objective_by_least_squares(self, chi: Array) -> float:
         """F in a twist, from the whole mechanism: least squared mismatch of the loops over all passive rates.
 
         No member, basis or projector is used. Coupled joints keep their coupling. For robots whose members meet the
@@ -315,16 +323,14 @@ class Oracle:
             return singular_rank(np.vstack(back), 1.0)
 
         members = self.members()
-        W = tuple(m.W.shape[1] for m in members)
         twists = self.feasible_twists()
         unlocked = np.concatenate([self.passive, self.platform_dofs])
         locked = null_space(self.J[:, unlocked])[-6:]
         return Ranks(
-            W=W,
+            W=tuple(m.W.shape[1] for m in members),
             C=self.constraint_dimensions(),
-            rows=sum(W),
             J=stacked(members),
-            C_rank=stacked(self.members(locked=False)),
+            constraints=stacked(self.members(locked=False)),
             freedoms=twists.shape[1],
             rotations=singular_rank(twists[:3], 1.0),
             locked=singular_rank(locked, 1.0),

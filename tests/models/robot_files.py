@@ -123,12 +123,12 @@ def rotation(axis: Array, angle: float) -> Array:
     return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K))
 
 
-def value_of(expression: float | str, names: Mapping[str, Value]) -> Any:
+def value_of(expression: float | str, names: Mapping[str, Value]) -> Value:
     """Value of an expression: a number or a vector (3,)."""
     if not isinstance(expression, str):
         return float(expression)
 
-    def of(node: ast.AST) -> Any:
+    def of(node: ast.AST) -> Value:
         match node:
             case ast.Constant(value=int() | float() as number):
                 return float(number)
@@ -145,6 +145,10 @@ def value_of(expression: float | str, names: Mapping[str, Value]) -> Any:
 
     # Python's ^ binds weaker than + and would turn rod^2 - h^2 into another expression.
     return of(ast.parse(expression.replace("^", "**"), mode="eval").body)
+
+
+def number_of(expression: float | str, names: Mapping[str, Value]) -> float:
+    return float(np.asarray(value_of(expression, names)).item())
 
 
 def vector_of(expressions: str | Sequence[float | str], names: Mapping[str, Value]) -> Array:
@@ -177,7 +181,7 @@ def joint_of(table: Table, names: Mapping[str, Value]) -> Joint:
         point=vector_of(table["at"], names),
         axes=tuple(unit(vector_of(axis, names)) for axis in axes),
         actuated=bool(table.get("actuated", False)),
-        pitch=float(value_of(table.get("pitch", 0.0), names)),
+        pitch=number_of(table.get("pitch", 0.0), names),
         to=vector_of(table["to"], names) if "to" in table else None,
     )
 

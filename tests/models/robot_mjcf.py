@@ -1,7 +1,8 @@
 """Robots given joint by joint as MJCF, MuJoCo's text of models, for tests; and the centre of each chain.
 
-At home every body's frame is the world frame, so a body's pose is its displacement. Limbs are trees of hinges, slides and
-balls; the platform is a free body; connects and welds close the loops; coupled joints make screws and parallelograms.
+At home every body's frame is the world frame, so a body's pose is its displacement. Limbs are trees of hinges, slides
+and balls, and the platform is a free body. Connects and welds close the loops. Coupled joints make screws and
+parallelograms.
 """
 
 from __future__ import annotations
