@@ -47,9 +47,9 @@ def line(direction: ArrayLike, point: ArrayLike) -> Array:
     return np.concatenate([direction, np.cross(point, direction)])
 
 
-# Values of an earlier, separate computation, printed with ten and six decimals; l = 0.7. For each robot: dimensions where
-# they are not those of the file, F(CHI), F of the feasible part of CHI, its actuator rates, and F(CHI) with every actuator
-# driven by 0.05. The legs of 6-UPS stand in the order of the file: those on one side of the pairs first.
+# Values of an earlier, separate computation, printed with ten and six decimals; l = 0.7. For each robot: dimensions
+# where they are not those of the file, F(CHI), F of the feasible part of CHI, its actuator rates, and F(CHI) with every
+# actuator driven by 0.05. The legs of 6-UPS stand in the order of the file: those on one side of the pairs first.
 REFERENCE: dict[str, tuple[dict[str, float], float, float, list[float], float]] = {
     "6-ups": (
         {"rb": 1, "rp": 0.6, "base_half": math.degrees(0.35), "platform_half": math.degrees(0.75), "h": 1.2},
@@ -167,7 +167,8 @@ def test_rows_of_the_3_rps_are_the_leg_and_a_force_along_the_hinge() -> None:
 
 @pytest.mark.parametrize("name", ["delta", "delta-parallelogram"])
 def test_motor_angles_of_the_irb_360_are_the_published_ones(name: str) -> None:
-    # R. L. Williams II, "The Delta Parallel Robot". His first motor stands at azimuth -90 degrees: everything is turned.
+    # R. L. Williams II, "The Delta Parallel Robot", prints tenths of a degree; the digits beyond are those of closed
+    # loops. His first motor stands at azimuth -90 degrees, so everything is turned.
     sides = {"rb": 0.567 / math.sqrt(12), "rp": 0.076 / math.sqrt(3), "tilt": 0.0}
     turn = rotation(np.array([0.0, 0, 1]), math.pi / 2)
     for degrees, position in (([-20.547] * 3, [0, 0, -0.9]), ([47.504, -11.569, 21.378], [0.3, 0.5, -1.1])):
