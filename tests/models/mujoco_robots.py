@@ -136,6 +136,9 @@ class Oracle:
         others = np.setdiff1d(np.arange(self.model.nv), self.platform_dofs)
         self.joint_dofs: Index = others
         self.passive: Index = np.setdiff1d(others, self.actuated)
+        # Which constraints belong together follows from the tree of bodies alone, and not from where they are.
+        self.member_constraints = self.components(self.passive)
+        self.limb_constraints = self.components(others)
         self.update()
 
     def update(self) -> None:
@@ -151,6 +154,8 @@ class Oracle:
         mujoco.mj_fwdPosition(self.model, self.data)
         self.J: Array = np.array(self.data.efc_J).reshape(self.data.nefc, self.model.nv)
         self.row_constraint: Index = np.array(self.data.efc_id, dtype=np.intp)
+        self.from_platform: Array = self.platform_jacobian()
+        self.found_members: dict[bool, list[Member]] = {}
 
     def current(self, loop: Loop) -> Array:
         frame = self.data.body(loop.carrier)
@@ -193,8 +198,7 @@ class Oracle:
 
     # -- twists
 
-    @property
-    def from_platform(self) -> Array:
+    def platform_jacobian(self) -> Array:
         """Matrix (6, 6) from the platform's generalised velocities to ``chi``: the engine's body Jacobian."""
         linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         body = self.model.body("platform").id
@@ -252,17 +256,19 @@ class Oracle:
 
     def members(self, *, locked: bool = True) -> list[Member]:
         """Members with actuators locked; with ``locked=False`` limbs, whose ``W`` is then ``C_k``."""
-        dofs = self.passive if locked else self.joint_dofs
-        found = []
-        for numbers in self.components(dofs):
-            c = np.mean([self.current(loop) for loop in self.loops_of(numbers.tolist())], axis=0)
-            found.append(Member(c, self.wrenches(numbers, dofs, c)))
-        return found
+        if locked not in self.found_members:
+            dofs = self.passive if locked else self.joint_dofs
+            found = []
+            for numbers in self.member_constraints if locked else self.limb_constraints:
+                c = np.mean([self.current(loop) for loop in self.loops_of(numbers.tolist())], axis=0)
+                found.append(Member(c, self.wrenches(numbers, dofs, c)))
+            self.found_members[locked] = found
+        return self.found_members[locked]
 
     def constraint_dimensions(self) -> tuple[int, ...]:
         """``dim C_k`` of each member: with its actuators free, but apart from other members that share them."""
         return tuple(
-            self.wrenches(numbers, self.joint_dofs, np.zeros(3)).shape[1] for numbers in self.components(self.passive)
+            self.wrenches(numbers, self.joint_dofs, np.zeros(3)).shape[1] for numbers in self.member_constraints
         )
 
     # -- F and rates
