@@ -27,7 +27,8 @@ Index = NDArray[np.intp]
 #: it, rounding leaves 1e-15.
 RANK_TOLERANCE = 1e-9
 
-#: Loops are closed when no row of the closure is larger; the rounding error of a robot of size 1 is 1e-16 to 1e-15.
+#: Loops are closed when no row of the closure is larger, times the robot's size where that is above 1. Newton's method
+#: ends at 1e-16 to 1e-15 for a robot of size 1, and at 1e-14 for one of size 50 far from the world's origin.
 CLOSURE_TOLERANCE = 2e-14
 
 NEWTON_STEPS = 60
@@ -124,7 +125,7 @@ class Oracle:
     def __init__(self, robot: Robot, length: float) -> None:
         self.robot, self.length = robot, length
         writer = Writer(robot, length)
-        self.loops = writer.loops
+        self.loops, self.tolerance = writer.loops, CLOSURE_TOLERANCE * max(1.0, writer.size)
         self.model = mujoco.MjModel.from_xml_string(writer.mjcf)
         self.data = mujoco.MjData(self.model)
         first = self.model.joint("platform").dofadr[0]
@@ -186,13 +187,13 @@ class Oracle:
             self.data.qpos[self.actuated_q] += step
             self.update()
             for _ in range(NEWTON_STEPS):
-                if self.closure < CLOSURE_TOLERANCE:
+                if self.closure < self.tolerance:
                     break
                 change = np.zeros(self.model.nv)
                 change[free] = -np.linalg.lstsq(self.J[:, free], np.array(self.data.efc_pos), rcond=RANK_TOLERANCE)[0]
                 mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
                 self.update()
-            if self.closure >= CLOSURE_TOLERANCE:
+            if self.closure >= self.tolerance:
                 message = f"{self.robot.name} does not close: its loops are open by {self.closure:.2g}"
                 raise ValueError(message)
 
