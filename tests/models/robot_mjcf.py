@@ -80,7 +80,6 @@ class Loop(NamedTuple):
     constraint: str
     centre: Array
     carrier: str
-    end: str
     weld: bool
 
 
@@ -168,7 +167,7 @@ class Writer:
             self.equalities.append(
                 f'<weld name="{name}" body1="{bodies[-1]}" body2="platform" torquescale="{2 * self.length!r}"/>'
             )
-        self.loops.append(Loop(name, centre.point, after[centre.joint + 1], bodies[-1], not connected))
+        self.loops.append(Loop(name, centre.point, after[centre.joint + 1], not connected))
 
 
 def elementary(joint: Joint) -> list[tuple[str, Array, Array | None]]:
