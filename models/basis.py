@@ -1,4 +1,4 @@
-"""Rows of the Jacobian as results state them: an orthonormal basis of each member's wrenches, in place of its projector.
+"""Rows of the Jacobian as results state them: an orthonormal basis of each member's wrenches, not its projector.
 
 Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
 characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
@@ -97,7 +97,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
-    """Return orthonormal bases of the combinations of rows in which a part of the components is zero, and of the rest."""
+    """Return orthonormal bases of the combinations of rows in which some components are zero, and of the rest."""
     if not len(rows):
         return rows, rows
     left, values, _ = np.linalg.svd(rows[:, part])

@@ -5,8 +5,8 @@ F is written here and nowhere else. For rows ``L_i = (f_i, m_i) / sqrt(square_i)
     F = sum_i (L_i ^ chi)^2,        L_i ^ chi = m_i . omega + f_i . v            (equations 5 and 14)
 
 with moments about the world origin. A row that is a couple is multiplied by the characteristic length, so that its work
-rate has the unit of the others. A :class:`~.member.Member` adds ``|P x(chi)|^2``, the same sum over any orthonormal basis
-of its wrenches; its rows here are all rows of ``P``, which are not independent.
+rate has the unit of the others. A :class:`~.member.Member` adds ``|P x(chi)|^2``, the same sum over any orthonormal
+basis of its wrenches; its rows here are all rows of ``P``, which are not independent.
 """
 
 from __future__ import annotations
@@ -214,7 +214,8 @@ def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX, membe
     at_origin = ca.norm_2(v + ca.cross(omega, position))
     turning = ca.norm_2(omega)
     of_members = (
-        (at_origin + ca.norm_2(member.centre - position) * turning) ** 2 + (0 if member.is_pinned else length * turning) ** 2
+        (at_origin + ca.norm_2(member.centre - position) * turning) ** 2
+        + (0 if member.is_pinned else length * turning) ** 2
         for member in members
     )
     return sum(of_members, SX(0)) + sum(

@@ -1,11 +1,11 @@
 """Members: parts of a limb that resist the platform with a whole space of wrenches, and the projector on that space.
 
 With all actuators locked, a member lets the platform move in the span of the screws of its passive joints, and resists
-every other motion with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre ``c``,
-with a length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``, so that their work rate
-is the plain product ``y . x``. A member resists a twist with ``r = P x``, where ``P`` projects orthogonally on the
-complement of the passive screws: ``|r|^2`` is the sum of the squared work rates of any orthonormal basis of the member's
-wrenches, and no basis is needed.
+every other motion with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre
+``c``, with a length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``, so that their
+work rate is the plain product ``y . x``. A member resists a twist with ``r = P x``, where ``P`` projects orthogonally
+on the complement of the passive screws: ``|r|^2`` is the sum of the squared work rates of any orthonormal basis of the
+member's wrenches, and no basis is needed.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Member:
         screws: (6, n) current screws of its passive joints as twists, the world's origin as reference; those of the
             spherical joint at the centre are left out of a pinned member.
         rank: of the screws, for almost all dimensions and poses. In a pinned member, of their velocities of the centre.
-        kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` of them, or ``3 - rank``
-            of a pinned member.
+        kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` of them, or
+            ``3 - rank`` of a pinned member.
         is_pinned: whether a spherical joint at the centre leaves forces through the centre only.
     """
 
@@ -72,9 +72,10 @@ def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
     """Return the parts (size, k) of vectors (size, k) that are orthogonal to the span of columns (size, n).
 
     Independent columns are made orthogonal one after the other without square roots, and their parts subtracted from
-    the vectors themselves: the difference of two squares would lose a small result. Dependent columns have the projector
-    ``P = N_r / c_r`` of Faddeev and LeVerrier's recursion for ``M = sum a a'``, which chooses no columns: ``N_0 = I``,
-    ``c_k = -tr(M N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for every rank that does not change.
+    the vectors themselves: the difference of two squares would lose a small result. Dependent columns have the
+    projector ``P = N_r / c_r`` of Faddeev and LeVerrier's recursion for ``M = sum a a'``, which chooses no columns:
+    ``N_0 = I``, ``c_k = -tr(M N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for every rank that does not
+    change.
 
     Args:
         columns: (size, n) spanning vectors.

@@ -1,12 +1,13 @@
 """The joint at which a limb's loop is opened, so that few variables of joints become unknowns.
 
 The variables of the joint at the cut, and of the joints of a rod, never become unknowns. A rod is a passive spherical
-joint next to a passive universal or spherical joint, or with one actuated slide between: its length is then given by the
-two points, or is what the actuator drives.
+joint next to a passive universal or spherical joint, or with one actuated slide between: its length is then given by
+the two points, or is driven by the actuator.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -70,7 +71,7 @@ def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
 
 
 def _common_point(robot: HomeRobot, axes: Sequence[JointAxis], samples: FloatArray) -> SX | None:
-    pairs = zip(axes[:-1], axes[1:], strict=True)
+    pairs = itertools.pairwise(axes)
     if any(are_parallel(robot, one.axis, other.axis, samples) for one, other in pairs):
         return None
     return meeting_point(robot, [(axis.point, axis.axis) for axis in axes], samples)

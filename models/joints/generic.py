@@ -127,9 +127,7 @@ def are_parallel(robot: HomeRobot, one: SX, other: SX, samples: FloatArray) -> b
     return all(float(function(sample)) < _INCIDENT for sample in samples)
 
 
-def meeting_point(
-    robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: FloatArray
-) -> SX | None:
+def meeting_point(robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: FloatArray) -> SX | None:
     """Return the point (3, 1) through which lines pass for all dimensions; None where they do not meet in one point.
 
     Args:

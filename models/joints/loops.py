@@ -59,9 +59,7 @@ class PoseOf(NamedTuple):
     position: SX
 
 
-def examine_loops(
-    robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unknowns: SX, samples: FloatArray
-) -> Loops:
+def examine_loops(robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unknowns: SX, samples: FloatArray) -> Loops:
     """Return closed configurations near home, and which of the loop equations are independent there.
 
     Args:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from ..drawing import Body, Link, Point, Scene
@@ -23,7 +24,7 @@ def scene_of(paths: Sequence[tuple[str, OpenedPath]], pose: PoseSymbols) -> Scen
             body = Body.BASE if j == 0 else Body.PLATFORM if j == last else Body.LIMB
             names.append(f"{own}:{j + 1}")
             points.append(Point(names[-1], place, body))
-        links += [Link(one, other, Body.LIMB, limb) for one, other in zip(names[:-1], names[1:], strict=True)]
+        links += [Link(one, other, Body.LIMB, limb) for one, other in itertools.pairwise(names)]
         ends.append((names[0], names[-1]))
     points.append(Point("P", pose.position, Body.PLATFORM))
     for side, body in ((0, Body.BASE), (1, Body.PLATFORM)):

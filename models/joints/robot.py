@@ -120,9 +120,7 @@ class _Builder:
             way = slide_length(path, self.frame) if j == path.cut.slide else known[id(joint), 0]
             self.positions.append(SX(0) if way is None else way)
 
-    def _path(
-        self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables
-    ) -> OpenedPath | None:
+    def _path(self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
         robot = self.robot
         joints = simplified(robot, joints, self.samples)
@@ -138,15 +136,13 @@ class _Builder:
         self.wrenches += rows
         self.members += [] if member is None else [member]
         branch = f".{index + 1}" if len(limb.branches) > 1 else ""
-        self.closure += [
-            Closure(f"loop {limb.name}{branch} ({k + 1})", each) for k, each in enumerate(path.equations)
-        ]
+        self.closure += [Closure(f"loop {limb.name}{branch} ({k + 1})", each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {limb.name}{branch} ({k + 1})", each) for k, each in enumerate(path.checks)]
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
             every = [screw for own in path.screws for screw in own]
             passive = [s for joint, own in zip(joints, path.screws, strict=True) if not joint.actuated for s in own]
-            stacks = (ca.horzcat(SX(6, 0), *part) for part in (passive, every))
-            self.screws.append(JointScrews(limb.name, *stacks, ranks.passive, ranks.all))
+            some, all_of_them = ca.horzcat(SX(6, 0), *passive), ca.horzcat(SX(6, 0), *every)
+            self.screws.append(JointScrews(limb.name, some, all_of_them, ranks.passive, ranks.all))
         return path
 
     def _variables(self, limb: Limb, known: dict[tuple[int, int], SX]) -> Variables:

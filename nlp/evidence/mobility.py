@@ -108,9 +108,10 @@ def _actuator_rates(
         rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
         own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
         driven = J[rows] @ np.vstack([screws[3:, own], screws[:3, own]])
-        values, residual, resisted = np.zeros(len(own)), rates[rows], np.linalg.norm(driven, axis=0)
+        values: FloatArray = np.zeros(len(own))
+        residual, resisted = rates[rows], np.linalg.norm(driven, axis=0)
         if own and float(np.linalg.norm(driven)) > _DEPENDENT * float(np.abs(J[rows]).max()):
-            values = np.linalg.lstsq(driven, rates[rows], rcond=_DEPENDENT)[0]
+            values = np.asarray(np.linalg.lstsq(driven, rates[rows], rcond=_DEPENDENT)[0], dtype=np.float64)
             residual = rates[rows] - driven @ values
         left += float(residual @ residual)
         for k, value, size in zip(own, values, resisted, strict=True):

@@ -76,7 +76,20 @@ class RobotNumbers(NamedTuple):
     @classmethod
     def from_outputs(cls, *outputs: FloatArray) -> RobotNumbers:
         """Return the numbers from the outputs of :meth:`Program.robot_state`."""
-        return cls(*outputs[:10], tuple(outputs[10:]))
+        parameters, rotation, position, jacobian, rates, F, squares, magnitude, loops, actuators = outputs[:10]
+        return cls(
+            parameters,
+            rotation,
+            position,
+            jacobian,
+            rates,
+            F,
+            squares,
+            magnitude,
+            loops,
+            actuators,
+            tuple(outputs[10:]),
+        )
 
 
 @dataclass(frozen=True, eq=False)

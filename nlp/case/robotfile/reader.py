@@ -86,5 +86,3 @@ def model_of_definition(definition: Mapping[str, Any], source: str | None = None
         raise CaseError(f"{prefix}{error.place or 'the robot'}", error.fault, source=source) from None
     except ModelError as error:
         raise CaseError(f"{prefix}the robot", str(error), source=source) from None
-
-

@@ -30,7 +30,9 @@ class DimensionTable(Table):
 class RepeatTable(Table):
     """Copies of a limb by rotation about an axis."""
 
-    count: Annotated[int, Field(ge=1, le=24)] | None = Field(default=None, description="number of copies, evenly spread")
+    count: Annotated[int, Field(ge=1, le=24)] | None = Field(
+        default=None, description="number of copies, evenly spread"
+    )
     angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=24)] | None = Field(
         default=None, description="angle of each copy, degrees"
     )
@@ -74,7 +76,7 @@ class RobotFile(Table):
 
     name: Name = Field(description="its name")
     description: str = Field(default="", description="one sentence")
-    home: VectorExpression = Field(default=[0.0, 0.0, 0.0], description="origin of the platform at home")
+    home: VectorExpression = Field(default="0*x", description="origin of the platform at home")
     dimensions: dict[str, DimensionTable] = Field(default_factory=dict, description="dimensions by name")
     derived: dict[str, Expression] = Field(default_factory=dict, description="further numbers by name")
     limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
