@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -54,6 +55,7 @@ def gallery_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _GALLERY.glob("*.toml")))
 
 
+@cache
 def gallery_robot(name: str) -> Model:
     """Return a shipped robot that is given joint by joint.
 

@@ -24,6 +24,8 @@ from .words import JointWords, LimbWords, RepeatWords, RobotError, RobotWords, V
 #: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
 #: leaves no entries of rounding error in the expressions.
 _EXACT = 1e-15
+#: Letters of an expression that a message shows.
+_LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,4 +237,10 @@ def _evaluated(place: str, written: str | float, names: Mapping[str, SX]) -> SX:
     try:
         return evaluate(written, names)
     except ExpressionError as error:
-        raise RobotError(place, f"is {written!r}, which {error}") from None
+        raise RobotError(place, f"is {_shown(written)}, which {error}") from None
+
+
+def _shown(written: str | float) -> str:
+    """Return an expression for a message, cut to a length that is read."""
+    text = repr(written)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."

@@ -232,7 +232,7 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
     home = here.at(here.home)
     assert pytest.approx(reference.F, abs=1e-10) == home.F
     constraints = constraint_rows(model, home.J, home.actuators)
-    left, values, right = np.linalg.svd(work(constraints))
+    _, values, right = np.linalg.svd(work(constraints))
     rank = int(np.count_nonzero(values > 1e-9))
     assert rank == reference.constraints == rank_of_rows(constraints, np.zeros(3), 1.0)
     feasible = right[rank:].T @ right[rank:] @ CHI
@@ -270,7 +270,7 @@ def test_hexapod_and_three_upu_by_joints_are_those_by_rows() -> None:
     upu_rows = ca.Function("rows", [*theirs.all], [instantiate(tsai, theirs, SX(LENGTH), [SX(CHI)]).jacobian])
     upu = Robot(written(UPU.replace("FIRST", "y")))
     for _ in range(4):
-        pose = np.concatenate([rng.uniform(-0.2, 0.2, 3), [0, 0, 1.2] + rng.uniform(-0.2, 0.2, 3)])
+        pose = np.concatenate([rng.uniform(-0.2, 0.2, 3), np.array([0, 0, 1.2]) + rng.uniform(-0.2, 0.2, 3)])
         R = ca.Function("R", [], [matrix_from_cayley(SX(pose[:3]))])()["o0"].full()
         assert pytest.approx(rows(parameters, [], R, pose[3:]).full(), abs=1e-14) == legs.at(pose).J
         # Its own motion is a translation, where the lower joints stay parallel to the upper ones.
@@ -363,7 +363,8 @@ joints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "0*x
 """
     wrist = RPS.replace(
         '{ type = "S", at = "A" }',
-        '{ type = "R", at = "A", axis = "x" }, { type = "R", at = "A", axis = "y" }, { type = "R", at = "A + z", axis = "z" }',
+        '{ type = "R", at = "A", axis = "x" }, { type = "R", at = "A", axis = "y" },'
+        '{ type = "R", at = "A + z", axis = "z" }',
     )
     cylinder = RPS.replace('{ type = "R", at = "B", axis = "y" },', '{ type = "H", at = "B", axis = "y", pitch = 0 },')
     for text in (wrist, RPS + passive, cylinder):

@@ -35,33 +35,38 @@ def insert_robot(tables: dict[str, Any], folder: Path) -> str | None:
     for other in ("model", "definition"):
         if other in table:
             raise CaseError(f"robot.{other}", "cannot stand beside file: give the robot in one way")
-    definition = read_definition(folder / name)
+    definition = read_definition(name, folder)
     tables["robot"] = {"definition": definition, **{key: value for key, value in table.items() if key != "file"}}
     return name
 
 
-def read_definition(path: Path) -> dict[str, Any]:
+def read_definition(name: str, folder: Path) -> dict[str, Any]:
     """Return the tables of a robot file, with their form checked.
+
+    Args:
+        name: path of the file.
+        folder: folder from which a relative path begins.
 
     Raises:
         CaseError: the file cannot be read, or holds a fault.
     """
+    path = folder / name
     try:
         with path.open("rb") as file:
             content = file.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise CaseError("robot.file", f"cannot be read: {reason}", str(path.name)) from None
+        raise CaseError("robot.file", f"cannot be read: {reason}", name) from None
     if len(content) > _LARGEST_FILE:
-        raise CaseError("robot.file", f"cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB", path.name)
+        raise CaseError("robot.file", f"cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB", name)
     try:
         tables = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
     except (ValueError, RecursionError) as error:
-        raise CaseError("the file", f"is not valid TOML: {error}", source=path.name) from None
+        raise CaseError("the file", f"is not valid TOML: {error}", source=name) from None
     try:
         check_form(tables)
     except CaseError as error:
-        raise error.within(path.name) from None
+        raise error.within(name) from None
     return tables
 
 

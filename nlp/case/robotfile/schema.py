@@ -5,9 +5,10 @@ The classes check keys and types. Everything else is checked where the robot is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, StringConstraints, ValidationError
+from pydantic import Discriminator, Field, FiniteFloat, StringConstraints, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
 from ...errors import CaseError
@@ -15,8 +16,14 @@ from ..faults import case_error
 from ..table import Table, Vector
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
-Expression = FiniteFloat | Name
-VectorExpression = Name | Annotated[list[Expression], Field(min_length=3, max_length=3)]
+Expression = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Name, Tag("<word>")],
+    Discriminator(lambda value: "<word>" if isinstance(value, str) else "<number>"),
+]
+VectorExpression = Annotated[
+    Annotated[Name, Tag("<word>")] | Annotated[list[Expression], Field(min_length=3, max_length=3), Tag("<list>")],
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else "<word>"),
+]
 
 
 class DimensionTable(Table):
@@ -101,12 +108,19 @@ def _error(fault: ErrorDetails) -> CaseError:
     """Return a fault as an error whose key is a place in words, such as ``limb 2, joint 1, axis``."""
     written = case_error(fault)
     location = [*fault["loc"], *([fault["ctx"]["key"]] if "key" in fault.get("ctx", {}) else [])]
+    if fault["type"] == "string_type" and location[-1] == "<word>":
+        return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
+    if fault["type"] == "float_type" and location[-1] == "<number>":
+        return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
+    return CaseError(_place(location), written.fault, written.value)
+
+
+def _place(location: Sequence[int | str]) -> str:
+    """Return a path into the document in words; parts that stand for branches of a union are left out."""
     parts: list[str] = []
     for part in location:
         if isinstance(part, int):
             parts[-1] = f"{parts[-1].removesuffix('s')} {part + 1}"
-        elif part.isidentifier():  # others stand for branches of a union
+        elif not part.startswith("<"):
             parts.append(part)
-    if fault["type"].startswith(("string_", "list_", "float_")) and parts and parts[-1] in ("str", "float"):
-        parts.pop()
-    return CaseError(", ".join(parts) or "the file", written.fault, written.value)
+    return ", ".join(parts) or "the file"
