@@ -72,7 +72,7 @@ def gallery_robot(name: str) -> Model:
     if name not in gallery_names():
         raise UnknownModelError(name)
     tables = tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
-    return replace(robot(**tables), options={})
+    return replace(robot(**(tables | {"name": name})), options={})  # case files name the file, people its robot
 
 
 def robot_function(name: str) -> RobotFunction:

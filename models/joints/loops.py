@@ -15,6 +15,7 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..rotation import matrix_from_cayley
+from ..rows import DEPENDENT, independent_rows
 from .chain import HomeRobot
 from .words import RobotError
 
@@ -23,8 +24,6 @@ _POINTS = 5
 #: Newton steps to a closed configuration, and the residual that ends them: equations are of order 1.
 _STEPS = 40
 _CLOSED = 1e-12
-#: Rows that are left with less than this part of the longest depend on the others: rounding leaves 1e-14.
-_DEPENDENT = 1e-8
 #: Largest random change of the pose's coordinates and of the unknowns, in the robot's size and radians.
 _CHANGES = (0.15, 0.05)
 
@@ -98,7 +97,7 @@ def examine_loops(robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unkno
                 jacobians.append(function(found, sample)[1].full())
     if not points:
         raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")
-    return Loops(tuple(points), _independent_rows(jacobians))
+    return Loops(tuple(points), independent_rows(jacobians))
 
 
 def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
@@ -117,38 +116,5 @@ def _closed(function: ca.Function, z: FloatArray, sample: FloatArray) -> FloatAr
             return None
         if not residual.size or float(np.abs(residual).max()) < _CLOSED:
             return z
-        z = z - np.linalg.lstsq(slopes[:, : len(z)], residual.ravel(), rcond=_DEPENDENT)[0]
+        z = z - np.linalg.lstsq(slopes[:, : len(z)], residual.ravel(), rcond=DEPENDENT)[0]
     return z if float(np.abs(residual).max()) < np.sqrt(_CLOSED) else None
-
-
-def _independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
-    """Return the indices of independent rows.
-
-    Each configuration gives a set, by pivoted orthogonalisation. Of the largest sets it is the one whose smallest
-    singular value over all configurations is largest.
-    """
-    sets = {tuple(sorted(_pivoted(each))) for each in jacobians}
-    most = max(map(len, sets))
-
-    def worst(rows: tuple[int, ...]) -> float:
-        values = [np.linalg.svd(each[list(rows)], compute_uv=False) for each in jacobians]
-        return min((float(each[-1] / each[0]) for each in values if each.size), default=1.0)
-
-    return max(sorted(each for each in sets if len(each) == most), key=worst)
-
-
-def _pivoted(jacobian: FloatArray) -> list[int]:
-    """Return the indices of rows in the order of modified Gram-Schmidt with the longest remaining row first."""
-    left = jacobian.copy()
-    order: list[int] = []
-    longest = 0.0
-    for _ in range(min(left.shape)):
-        lengths = np.linalg.norm(left, axis=1)
-        k = int(np.argmax(lengths))
-        longest = longest or float(lengths[k])
-        if not lengths[k] > _DEPENDENT * longest:
-            break
-        order.append(k)
-        unit = left[k] / lengths[k]
-        left = left - np.outer(left @ unit, unit)
-    return order

@@ -116,7 +116,7 @@ def _actuator_rates(
         left += float(residual @ residual)
         for k, value, size in zip(own, values, resisted, strict=True):
             found[model.actuators[k].name] = float(value) if size > 0 else float("inf")
-    return found, left
+    return {each.name: found.get(each.name, float("inf")) for each in model.actuators}, left
 
 
 def _limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> list[Singularity]:

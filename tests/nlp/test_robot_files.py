@@ -2,7 +2,6 @@
 
 import copy
 import json
-import math
 import pickle
 import tomllib
 from collections.abc import Callable
@@ -250,10 +249,10 @@ def test_a_robot_that_the_program_cannot_treat_is_refused() -> None:
         robot(**floating)
 
 
-def planar(crank: float) -> Case:
-    """Return a planar robot at home, with its distal links through one point for a swing of zero."""
+def planar(bend: float) -> Case:
+    """Return a planar robot at home, its platform's joints on the radii of the base's; without a bend all is radial."""
     model = robot_function("planar-3-rrr")()
-    values = {item.name: item.typical[0] for item in model.parameters} | {"crank": crank, "swing": math.pi}
+    values = {item.name: item.typical[0] for item in model.parameters} | {"turn": 0.0, "bend": bend}
     pose = (Free(-1, 1), Free(-1, 1), 0.0)
     return Case(model, values, pose, [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)])
 
@@ -267,7 +266,7 @@ def test_kinds_of_singularity_are_told_apart() -> None:
         return [each.kind for each in found.singularities]
 
     # All links radial: every limb is stretched.
-    assert kinds(planar(20.0)) == [SingularityKind.SERIAL] * 3
+    assert kinds(planar(0.0)) == [SingularityKind.SERIAL] * 3
     # Park's 3-UPU of Seoul: three constraints of rank one.
     text = tomllib.loads("""
         name = "snu"
