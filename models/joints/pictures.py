@@ -88,9 +88,7 @@ class _Sketch:
     def symbol(self, name: str, joint: PlacedJoint, place: SX, body: Body, limb: str) -> None:
         """Add the symbol of a joint, unless it has been drawn with another path."""
         owner = limb if limb in self.carrying else None
-        self.joints.setdefault(
-            name, JointSymbol(name, joint.kind, place, joint.axes, body, owner, joint.is_actuated)
-        )
+        self.joints.setdefault(name, JointSymbol(name, joint.kind, place, joint.axes, body, owner, joint.is_actuated))
 
     def is_along(self, start: SX, end: SX, axis: SX | None) -> bool:
         """Return whether two places (3, 1) at home are apart from each other along an axis (3, 1) at home."""
@@ -133,7 +131,11 @@ def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> No
     previous: _Node | None = None
     for k, joint in enumerate(joints):
         in_stem = joint.number <= stem
-        name = f"{drawn.limb}:{joint.number}" if in_stem or drawn.count == 1 else f"{drawn.limb}.{drawn.number}:{joint.number}"
+        name = (
+            f"{drawn.limb}:{joint.number}"
+            if in_stem or drawn.count == 1
+            else f"{drawn.limb}.{drawn.number}:{joint.number}"
+        )
         if not in_stem and previous is not None and joints[k - 1].number <= stem:
             previous = _fork(sketch, drawn, own, previous, k)
         previous = _add_joint(sketch, drawn, joints, k, name, previous)
@@ -255,7 +257,10 @@ def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> _Place | 
         end = _Place(after.foot, after.foot_at_home)
         if sketch.is_same(joint.at_home, after.foot_at_home):
             start = _Place(before.place, before.at_home)
-    if not (sketch.is_same(start.at_home, before.at_home) and sketch.is_along(start.at_home, end.at_home, joint.axis_at_home)):
+    if not (
+        sketch.is_same(start.at_home, before.at_home)
+        and sketch.is_along(start.at_home, end.at_home, joint.axis_at_home)
+    ):
         return None
     return _Place((start.place + end.place) / 2, (start.at_home + end.at_home) / 2)
 

@@ -95,9 +95,7 @@ def _hinges(parts: Sequence[Joint], before: Motion, behind: Motion, number: int)
         place, axis = body.point(part.point), part.axes[0].axis
         axes = (body.rotation @ axis,)
         found.append(
-            PlacedJoint(
-                number + k, JointKind.REVOLUTE, place, place, part.point, part.point, axes, axis, part.actuated
-            )
+            PlacedJoint(number + k, JointKind.REVOLUTE, place, place, part.point, part.point, axes, axis, part.actuated)
         )
     return found
 
@@ -137,9 +135,7 @@ def _placed(path: OpenedPath, j: int, frame: PathFrame, number: int) -> PlacedJo
     )
 
 
-def _axes(
-    path: OpenedPath, j: int, before: Motion | None, behind: Motion | None, frame: PathFrame
-) -> tuple[SX, ...]:
+def _axes(path: OpenedPath, j: int, before: Motion | None, behind: Motion | None, frame: PathFrame) -> tuple[SX, ...]:
     """Return the current axes of a joint."""
     joint = path.joints[j]
     if joint.type == "S":
@@ -168,7 +164,11 @@ def _axes_at_rod(
     home, rod = home / ca.norm_2(home), path.rod / ca.norm_2(path.rod)
     known_at_home, other_at_home = (first, second) if before is not None else (second, first)
     known = body.rotation @ known_at_home
-    cos_known, cos_rod, cos_between = ca.dot(other_at_home, known_at_home), ca.dot(other_at_home, home), ca.dot(known, rod)
+    cos_known, cos_rod, cos_between = (
+        ca.dot(other_at_home, known_at_home),
+        ca.dot(other_at_home, home),
+        ca.dot(known, rod),
+    )
     square = 1 - cos_between**2
     x = (cos_known - cos_between * cos_rod) / square
     y = (cos_rod - cos_between * cos_known) / square

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -139,3 +140,12 @@ class Canvas:
         # Limbs stand closest together: their words get the free places first.
         ordered = sorted(self._labels, key=lambda label: not label.owner)
         place_labels(self._axes, renderer, ordered, Obstacles(np.vstack(self._segments), tuple(self._owners)))
+
+
+def arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
+    """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
+    axis, ray = normal / np.linalg.norm(normal), through - centre
+    across = np.cross(axis, ray)
+    turn = 2 * math.pi if last is None else math.atan2(float(last @ across), float(last @ ray))
+    angles = np.linspace(0.0, turn, 97 if last is None else 25)
+    return np.asarray(centre + np.outer(np.cos(angles), ray) + np.outer(np.sin(angles), across))

@@ -131,20 +131,22 @@ class Drawing:
         """Return the work rates (m,) of the task at a posture; empty without a motion."""
         return reciprocal_product(posture.jacobian, self.motion.twist) if self.motion is not None else np.zeros(0)
 
-    def limb_rates(self) -> dict[str, float]:
-        """Return the rate that colours each limb.
+    def limb_rows(self) -> dict[str, int]:
+        """Return the index of the row that colours each limb; empty without a motion.
 
-        It is that of the row that drives the limb's actuator most; without such a row, of its force, or of its couple
-        where it applies no force.
+        It is the row that drives the limb's actuator most; without such a row, that of its force, or of its couple where
+        it applies no force.
         """
-        rates: dict[str, float] = {}
-        for row in sorted(self.rows, key=lambda row: (row.driving, row.kind is WrenchKind.FORCE)):
-            rates[row.limb] = row.rate
-        return rates
+        order = sorted(enumerate(self.rows), key=lambda each: (each[1].driving, each[1].kind is WrenchKind.FORCE))
+        return {row.limb: k for k, row in order}
 
-    def link_rate(self, link: Link) -> float | None:
-        """Return the rate of the row that a link carries alone; None for a link that carries others too."""
-        own = [row.rate for row in self.rows if row.limb == link.limb]
+    def limb_rates(self) -> dict[str, float]:
+        """Return the rate that colours each limb, of the row that :meth:`limb_rows` names."""
+        return {limb: self.rows[k].rate for limb, k in self.limb_rows().items()}
+
+    def link_row(self, link: Link) -> int | None:
+        """Return the index of the row that a link carries alone; None for a link that carries others too."""
+        own = [k for k, row in enumerate(self.rows) if row.limb == link.limb]
         return None if link.row is None or link.row >= len(own) else own[link.row]
 
     def attachment(self, limb: str) -> int | None:

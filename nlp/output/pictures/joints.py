@@ -83,6 +83,4 @@ def symbol_legend(drawing: Drawing) -> list[tuple[Handles, str]]:
 
 def _mark(symbol: str, size: float, face: str) -> Line2D:
     """Return a mark of a legend."""
-    return Line2D(
-        [], [], linestyle="none", marker=symbol, markersize=size, markerfacecolor=face, markeredgecolor=INK
-    )
+    return Line2D([], [], linestyle="none", marker=symbol, markersize=size, markerfacecolor=face, markeredgecolor=INK)

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from ....models import Body, FloatArray, Link, LinkKind, MarkKind, WrenchKind
 from ...units import rate_unit
-from .canvas import FAINT, INK, MUTED, RED, Canvas, Colour
+from .canvas import FAINT, INK, MUTED, RED, Canvas, Colour, arc
 from .drawing import Drawing, Motion
 from .joints import Handles, paint_joint_symbols, symbol_legend
 from .posture import Posture
@@ -128,7 +128,7 @@ class Panel:
         for circle, (centre, through, normal) in zip(self.drawing.model.scene.circles, posture.circles, strict=True):
             if circle.body is body:
                 self._canvas.line(
-                    _arc(centre, through, normal),
+                    arc(centre, through, normal),
                     f"circle {body.value}",
                     color=MUTED,
                     linewidth=0.8,
@@ -152,7 +152,9 @@ class Panel:
             at, wide = 10 + 20 * place / len(lines), _WIDTHS[link.kind]
             # The line of the limb itself is what no other limb's words may cover.
             self._canvas.line(line, f"limb edge {limb}", color=INK, linewidth=wide, zorder=at)
-            self._canvas.line(line, f"limb {limb}", color=colour, linewidth=wide - 1.6, zorder=at + 0.1, limb=limb or "")
+            self._canvas.line(
+                line, f"limb {limb}", color=colour, linewidth=wide - 1.6, zorder=at + 0.1, limb=limb or ""
+            )
             self._canvas.line(
                 line, f"limb light {limb}", color="white", alpha=0.35, linewidth=0.2 * wide, zorder=at + 0.2
             )
@@ -305,7 +307,7 @@ class Panel:
         normal = np.cross(start - vertex, end - vertex)
         if not normal.any():
             return
-        arc = _arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
+        arc = arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
         self._canvas.line(arc, name, color=colour, linewidth=1.8, zorder=55)
         middle = arc[len(arc) // 2]
         away = self._canvas.view.project(middle - vertex)
@@ -323,7 +325,9 @@ class Panel:
         return self._colour(rates[link.limb] if own is None else own)
 
     def _own_rate(self, link: Link) -> float | None:
-        return self.drawing.link_rate(link)
+        """Return the rate of the row that a link carries alone; None for a link that carries others too."""
+        row = self.drawing.link_row(link)
+        return None if row is None else self.drawing.rows[row].rate
 
     def _rates_text(self, rates: Sequence[float]) -> str:
         """Return rates with their unit, those of a limb's rods side by side."""
@@ -339,12 +343,3 @@ class Panel:
         """Return the unit of rates and velocities; an empty one without a task or a case."""
         motion, case = self.drawing.motion, self.drawing.case
         return rate_unit(motion.twist, case.units) if motion is not None and case is not None else ""
-
-
-def _arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
-    """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
-    axis, ray = normal / np.linalg.norm(normal), through - centre
-    across = np.cross(axis, ray)
-    turn = 2 * math.pi if last is None else math.atan2(float(last @ across), float(last @ ray))
-    angles = np.linspace(0.0, turn, 97 if last is None else 25)
-    return np.asarray(centre + np.outer(np.cos(angles), ray) + np.outer(np.sin(angles), across))
