@@ -1,4 +1,4 @@
-"""The drawing of a robot as symbols: points, links, joints, circles, directions and marks, without colours or widths."""
+"""The drawing of a robot as symbols: points, links, joints, circles, directions, marks; without colours or widths."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ class Link:
         body: the body that the link moves with.
         limb: name of the limb that the link is part of, if any.
         kind: bar, rod or rail.
-        row: index, among the rows of the limb, of the one that the link carries alone; None where it carries others too.
+        row: index, among the rows of the limb, of the one that the link carries alone; None for a link that carries
+            others too.
     """
 
     start: str

@@ -31,7 +31,7 @@ class DrawnPath(NamedTuple):
     Attributes:
         limb: name of the limb.
         number: of the path among those of its limb, from 1.
-        count: number of paths of its limb.
+        paths: number of paths of its limb.
         stem: number of joints, as they are written, that all paths of the limb share.
         path: the path.
         row: index of its row among those of the limb, where it has one only and the limb has others.
@@ -39,7 +39,7 @@ class DrawnPath(NamedTuple):
 
     limb: str
     number: int
-    count: int
+    paths: int
     stem: int
     path: OpenedPath
     row: int | None
@@ -127,13 +127,13 @@ def scene_of(
 def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> None:
     """Add a path of a limb, whose paths are ``own``."""
     joints = placed_joints(drawn.path, sketch.frame)
-    stem = drawn.stem if drawn.count > 1 else 0
+    stem = drawn.stem if drawn.paths > 1 else 0
     previous: _Node | None = None
     for k, joint in enumerate(joints):
         in_stem = joint.number <= stem
         name = (
             f"{drawn.limb}:{joint.number}"
-            if in_stem or drawn.count == 1
+            if in_stem or drawn.paths == 1
             else f"{drawn.limb}.{drawn.number}:{joint.number}"
         )
         if not in_stem and previous is not None and joints[k - 1].number <= stem:

@@ -57,8 +57,8 @@ class PlacedJoint:
 def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
     """Return the joints of a path from base to platform.
 
-    Two hinges that were taken together as a universal joint are shown as they are written. Three of them, as a spherical
-    joint, are shown as that joint: the middle axis is on neither side of the cut.
+    Two hinges that were taken together as a universal joint are shown as they are written. Three of them, taken together
+    as a spherical joint, are shown as that joint: the middle axis is on neither side of the cut.
     """
     found: list[PlacedJoint] = []
     number = 1
@@ -180,15 +180,16 @@ def _axes_at_rod(
 
 
 def arc_between(one: PlacedJoint, other: PlacedJoint, frame: PathFrame) -> list[tuple[SX, SX]]:
-    """Return places between two hinges whose axes meet, on an arc about the point where they do, as spherical links are.
+    """Return places between two hinges whose axes meet, on an arc about their common point, as spherical links are.
 
-    Each is (3, 1) in world coordinates and (3, 1) at home. There are none where the axes do not meet, or meet at a hinge.
+    Each is (3, 1) in world coordinates and (3, 1) at home. There are none where the axes do not meet, or meet at one of
+    the hinges.
     """
     if {one.kind, other.kind} != {JointKind.REVOLUTE} or one.axis_at_home is None or other.axis_at_home is None:
         return []
     points = [frame.typical_value(each.at_home).ravel() for each in (one, other)]
     axes = [frame.typical_value(each).ravel() for each in (one.axis_at_home, other.axis_at_home)]
-    normal = np.cross(*axes)
+    normal = np.cross(axes[0], axes[1])
     square = float(normal @ normal)
     if square < _PARALLEL:
         return []

@@ -134,8 +134,8 @@ class Drawing:
     def limb_rows(self) -> dict[str, int]:
         """Return the index of the row that colours each limb; empty without a motion.
 
-        It is the row that drives the limb's actuator most; without such a row, that of its force, or of its couple where
-        it applies no force.
+        It is the row that drives the limb's actuator most; without such a row, that of its force, or of its couple
+        where it applies no force.
         """
         order = sorted(enumerate(self.rows), key=lambda each: (each[1].driving, each[1].kind is WrenchKind.FORCE))
         return {row.limb: k for k, row in order}

@@ -16,7 +16,7 @@ _STROKE = 0.06
 
 
 class _Look(NamedTuple):
-    """Matplotlib's mark of a kind of joint and its size, points; the same of a mark within it; whether axes are shown."""
+    """Matplotlib's mark of a kind of joint with its size in points, a mark within it, and whether axes are shown."""
 
     mark: str
     size: float

@@ -307,9 +307,9 @@ class Panel:
         normal = np.cross(start - vertex, end - vertex)
         if not normal.any():
             return
-        arc = arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
-        self._canvas.line(arc, name, color=colour, linewidth=1.8, zorder=55)
-        middle = arc[len(arc) // 2]
+        curve = arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
+        self._canvas.line(curve, name, color=colour, linewidth=1.8, zorder=55)
+        middle = curve[len(curve) // 2]
         away = self._canvas.view.project(middle - vertex)
         self._canvas.label(parameter, middle, away, colour, 11.0, bold=True, is_led=True)
 
@@ -319,7 +319,7 @@ class Panel:
 
     def _link_colour(self, link: Link, rates: Mapping[str, float]) -> Colour:
         """Return the colour of a link: of its own rate, or else of its limb's."""
-        if link.limb not in rates:
+        if link.limb is None or link.limb not in rates:
             return PLAIN
         own = self._own_rate(link)
         return self._colour(rates[link.limb] if own is None else own)

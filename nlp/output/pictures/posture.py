@@ -31,8 +31,8 @@ class Posture:
         marks: points of each mark, (k, 3) each.
         joints: of each joint, (1 + a, 3) its place and the unit vectors of its axes.
         jacobian: (m, 6) unit wrenches, couple rows scaled by the characteristic length.
-        driving: (m,) work rate of each row in the actuated joints of its limb, each at unit rate; zero for a constraint,
-            and for a robot without actuated joints.
+        driving: (m,) work rate of each row in the actuated joints of its limb, each at unit rate; zero for a
+            constraint, and for a robot without actuated joints.
         quantities: each of the model's quantities, radians for angles.
     """
 

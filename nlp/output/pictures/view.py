@@ -94,7 +94,7 @@ def _clearness_of_joints(view: View, drawing: Drawing) -> float:
     """
     links = [(a, b, link) for a, b, link in drawing.links if link.limb is not None and link.kind is not LinkKind.RAIL]
     points, parts = drawing.posture.points, np.array(_PARTS)[:, None, None]
-    starts, ends = (points[[each[k] for each in links]] for k in range(2))
+    starts, ends = points[[each[0] for each in links]], points[[each[1] for each in links]]
     places = view.project(starts + parts * (ends - starts)).reshape(-1, 2)
     limbs = np.tile([str(link.limb) for *_, link in links], len(_PARTS))
     rods = np.tile([link.kind is LinkKind.ROD for *_, link in links], len(_PARTS))

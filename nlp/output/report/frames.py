@@ -58,8 +58,8 @@ class MotionData(TypedDict):
 class FrameData(TypedDict):
     """The robot at one posture.
 
-    ``t`` is the time along the motion, ``lengths`` has the measure of the limb for each row, ``joints`` has place and axes
-    of each joint, and a rate below ``noise`` is rounding error.
+    ``t`` is the time along the motion, ``lengths`` has the measure of the limb for each row, ``joints`` has place and
+    axes of each joint, and a rate below ``noise`` is rounding error.
     """
 
     t: float

@@ -175,8 +175,8 @@ def _legend(view: ViewData) -> Markup:
         " Green, dashed: motions that nothing resists." if view["free"] else "",
         " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
         " Joints: dark where an actuator drives them." if view["joints"] else "",
-        f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench"
-        f"{', at a joint for its kind' if view['joints'] else ''}.",
+        f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
+        ", at a joint for its kind." if view["joints"] else ".",
     ]
     return join_markup([bar, *words])
 
