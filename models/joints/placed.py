@@ -57,8 +57,8 @@ class PlacedJoint:
 def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
     """Return the joints of a path from base to platform.
 
-    Two hinges that were taken together as a universal joint are shown as they are written. Three of them, taken together
-    as a spherical joint, are shown as that joint: the middle axis is on neither side of the cut.
+    Two hinges that were taken together as a universal joint are shown as they are written. Three of them, taken
+    together as a spherical joint, are shown as that joint: the middle axis is on neither side of the cut.
     """
     found: list[PlacedJoint] = []
     number = 1
