@@ -195,7 +195,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=_quantities(builder),
-        scene=scene_of(builder.paths, pose),
+        scene=scene_of(builder.paths, pose, frame),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
