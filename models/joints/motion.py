@@ -1,7 +1,7 @@
 """Displacements of bodies and screws of joints as symbols.
 
-A displacement takes a point ``x`` to ``R x + t``. A twist has its angular velocity first, then the velocity at the
-world origin. A joint's variable is 0 at home, where the robot is described.
+A twist has its angular velocity first, then the velocity at the world origin. A joint's variable is 0 at home, where the
+robot is described.
 """
 
 from __future__ import annotations
@@ -15,37 +15,37 @@ from casadi import SX
 
 
 class Motion(NamedTuple):
-    """A displacement of a body in the world frame.
+    """A displacement of a body in the world frame: a point ``x`` goes to ``R (x - origin) + image``.
+
+    With the centre of a turn as origin, differences of points appear in which coordinates cancel: expressions of such
+    displacements one after the other are much shorter than with a translation of the world's origin.
 
     Attributes:
         rotation: (3, 3) ``R``.
-        translation: (3, 1) ``t``, length.
+        origin: (3, 1) a point, length.
+        image: (3, 1) where this point goes, length.
     """
 
     rotation: SX
-    translation: SX
+    origin: SX
+    image: SX
 
     @classmethod
     def none(cls) -> Motion:
         """Return the displacement that leaves every point in its place."""
-        return cls(SX.eye(3), SX.zeros(3))
+        return cls(SX.eye(3), SX.zeros(3), SX.zeros(3))
 
     def after(self, first: Motion) -> Motion:
         """Return this displacement after another one, which comes first."""
-        return Motion(self.rotation @ first.rotation, self.rotation @ first.translation + self.translation)
+        return Motion(self.rotation @ first.rotation, first.origin, self.point(first.image))
 
     def inverse(self) -> Motion:
         """Return the displacement back."""
-        return Motion(self.rotation.T, -self.rotation.T @ self.translation)
+        return Motion(self.rotation.T, self.image, self.origin)
 
     def point(self, point: SX) -> SX:
         """Return where a point (3, 1) goes."""
-        return self.rotation @ point + self.translation
-
-    def screw(self, screw: SX) -> SX:
-        """Return a screw (6, 1) that moves with the body."""
-        direction = self.rotation @ screw[:3]
-        return ca.vertcat(direction, self.rotation @ screw[3:] + ca.cross(self.translation, direction))
+        return self.rotation @ (point - self.origin) + self.image
 
 
 class AxisKind(enum.Enum):
@@ -79,11 +79,11 @@ class JointAxis:
     def motion(self, value: SX) -> Motion:
         """Return the displacement at a value of the variable: an angle in radians, or a length."""
         if self.kind is AxisKind.TRANSLATION:
-            return Motion(SX.eye(3), value * self.axis)
+            return Motion(SX.eye(3), self.point, self.point + value * self.axis)
         turn = rotation_about(self.axis, value)
         if self.kind is AxisKind.PARALLELOGRAM:
-            return Motion(SX.eye(3), turn @ self.rod - self.rod)
-        return Motion(turn, self.point - turn @ self.point + self.pitch * value * self.axis)
+            return Motion(SX.eye(3), self.point, self.point + (turn @ self.rod - self.rod))
+        return Motion(turn, self.point, self.point + self.pitch * value * self.axis)
 
     def screw(self, value: SX, at: Motion) -> SX:
         """Return the current unit screw (6, 1).
@@ -99,8 +99,8 @@ class JointAxis:
         if self.kind is AxisKind.PARALLELOGRAM:
             velocity = ca.cross(self.axis, rotation_about(self.axis, value) @ self.rod) / ca.norm_2(self.rod)
             return ca.vertcat(SX.zeros(3), at.rotation @ velocity)
-        home = ca.vertcat(self.axis, ca.cross(self.point, self.axis) + self.pitch * self.axis)
-        return at.screw(home)
+        direction = at.rotation @ self.axis
+        return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
 
 
 def rotation_about(axis: SX, angle: SX) -> SX:

@@ -125,7 +125,8 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
         _join_joint(path, base, platform, frame)
     else:
         turn = base.rotation.T @ platform.rotation
-        apart = base.rotation.T @ (platform.translation - base.translation) / frame.size
+        place = joints[min(cut.first, count - 1)].point
+        apart = base.rotation.T @ (platform.point(place) - base.point(place)) / frame.size
         path.equations += [*ca.vertsplit(ca.inv_skew(turn - turn.T) / 2), *ca.vertsplit(apart)]
         path.checks.append(3 - ca.trace(turn))
     return path

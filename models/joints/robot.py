@@ -176,7 +176,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     at_home = home_robot(words)
     samples = sampled_dimensions(at_home)
     pose = PoseSymbols()
-    platform = Motion(pose.rotation, pose.position - pose.rotation @ at_home.home)
+    platform = Motion(pose.rotation, at_home.home, pose.position)
     frame = PathFrame(at_home.size, platform, at_home.symbols, at_home.typical, samples)
     builder = _Builder(at_home, frame, samples)
     for limb in at_home.limbs:
