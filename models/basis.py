@@ -38,6 +38,11 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     """
     space = np.linalg.svd(projector)[0][:, :dimension].T
     driven = _span(actuation.T @ space.T @ space) if actuation.size else np.zeros((0, space.shape[1]))
+    works = driven @ actuation
+    if works.size:
+        # A wrench of actuation does positive work in the joint that it drives most.
+        most = np.take_along_axis(works, np.argmax(np.abs(works), axis=1)[:, None], axis=1)
+        driven = driven * np.where(most < 0, -1.0, 1.0)
     constraints = space - (space @ driven.T) @ driven
     constraints = np.linalg.svd(constraints)[2][: dimension - len(driven)]
     couples, rest = _split(constraints, slice(0, 3))

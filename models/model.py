@@ -17,7 +17,18 @@ from casadi import SX
 
 from .drawing import Scene
 from .member import Member
-from .parts import Actuator, Closure, GenericRanks, JointScrews, Leg, Parameter, PoseSymbols, Quantity, Unknown
+from .parts import (
+    Actuator,
+    Closure,
+    GenericRanks,
+    JointScrews,
+    Leg,
+    Parameter,
+    PathStructure,
+    PoseSymbols,
+    Quantity,
+    Unknown,
+)
 from .shown import Shown
 from .whole import Whole
 from .wrench import RowLabel, Wrench, WrenchKind
@@ -51,6 +62,7 @@ class Model(Whole, Shown):
         actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
         joint_screws: screws of the joints of its limbs, where they are known.
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
+        structure: the structure of each path of joints; empty for a robot given by its rows.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -76,6 +88,7 @@ class Model(Whole, Shown):
     actuators: tuple[Actuator, ...] = ()
     joint_screws: tuple[JointScrews, ...] = ()
     generic: GenericRanks | None = None
+    structure: tuple[PathStructure, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))

@@ -197,3 +197,30 @@ class GenericRanks:
 
     jacobian: int
     constraints: int
+
+
+@dataclass(frozen=True)
+class PathStructure:
+    """Structure of a path of joints from base to platform, for almost all dimensions and poses.
+
+    Attributes:
+        limb: name of the limb.
+        name: of the path: that of the limb, with the number of the branch where there are several.
+        joints: letters of its joints from base to platform, an actuated one with a star.
+        opened: the place at which its loop is opened, in words.
+        wrenches: dimension of the wrenches with which it resists the platform, actuators locked: of ``W``.
+        constraints: dimension of those that do no work in its actuated joints: of ``C``.
+        unknowns: number of its joint variables that are unknowns and that no path before it has.
+        equations: number of its loop equations.
+        kept: number of those that do not follow from others.
+    """
+
+    limb: str
+    name: str
+    joints: str
+    opened: str
+    wrenches: int
+    constraints: int
+    unknowns: int
+    equations: int
+    kept: int

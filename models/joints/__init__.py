@@ -5,7 +5,7 @@ numbers), ``motion`` (displacements and screws as symbols), ``words`` (a robot a
 limbs with their symbols), ``cut`` (the joint at which a limb's loop is opened), ``opened`` (the opened limb: current
 screws and equations), ``generic`` (ranks at random dimensions), ``resistance`` (rows and members of a limb), ``loops``
 (independent loop equations), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the
-drawing), ``robot`` (the model).
+drawing), ``structure`` (its numbers for people), ``robot`` (the model).
 """
 
 from .expression import ExpressionError

@@ -21,6 +21,7 @@ from ..parts import (
     GenericRanks,
     JointScrews,
     Parameter,
+    PathStructure,
     PoseSymbols,
     Quantity,
     Unknown,
@@ -34,6 +35,7 @@ from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
+from .structure import structure_of, with_kept
 from .words import Expression, RobotError, RobotWords, VectorExpression, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -93,7 +95,8 @@ class _Builder:
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
     paths: list[DrawnPath] = field(default_factory=list)
-    structures: dict[tuple[int, int], Ranks] = field(default_factory=dict)
+    ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
+    structure: list[PathStructure] = field(default_factory=list)
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
@@ -129,12 +132,13 @@ class _Builder:
         robot = self.robot
         joints = simplified(robot, joints, self.samples)
         cut = choose_cut(joints, len(limb.stem) if len(limb.branches) > 1 else 0, with_rods=limb.centre is None)
-        structure = limb.group, index
-        if structure not in self.structures:
-            self.structures[structure] = path_ranks(robot, joints, cut, self.samples)
-        ranks = self.structures[structure]
+        key = limb.group, index
+        if key not in self.ranks:
+            self.ranks[key] = path_ranks(robot, joints, cut, self.samples)
+        ranks = self.ranks[key]
         if ranks.passive == 6 and not any(joint.actuated for joint in joints):
             return None
+        count = len(self.unknowns)
         path = open_path(joints, cut, variables, self.frame)
         rows, member = resistance(limb.name, path, ranks, limb.centre)
         before = sum(row.limb == limb.name for row in self.wrenches)
@@ -142,9 +146,10 @@ class _Builder:
         self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
         self.wrenches += rows
         self.members += [] if member is None else [member]
-        branch = f".{index + 1}" if len(limb.branches) > 1 else ""
-        self.closure += [Closure(f"loop {limb.name}{branch} ({k + 1})", each) for k, each in enumerate(path.equations)]
-        self.checks += [Closure(f"sign {limb.name}{branch} ({k + 1})", each) for k, each in enumerate(path.checks)]
+        name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
+        self.closure += [Closure(f"loop {name} ({k + 1})", each) for k, each in enumerate(path.equations)]
+        self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
+        self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
             every = [screw for own in path.screws for screw in own]
             passive = [s for joint, own in zip(joints, path.screws, strict=True) if not joint.actuated for s in own]
@@ -208,6 +213,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         loops=tuple(everything),
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
+        structure=with_kept(builder.structure, independent),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

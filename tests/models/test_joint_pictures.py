@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mujoco_robots import Oracle
 from numpy.typing import NDArray
-from robot_files import every_joint, robot_of
+from robot_files import every_joint
 from robot_mjcf import elementary
-from test_robot_gallery import GALLERY, configurations, table
+from test_robot_gallery import GALLERY, RANKS, configurations, table
 
 from screwsynth.models import Body, JointKind, LinkKind, Model, robot
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
@@ -20,7 +20,17 @@ Array = NDArray[np.float64]
 
 
 #: Robots with every kind of limb; the others are slow tests.
-QUICK = ("3-rps", "3-upu", "6-rus", "delta", "delta-parallelogram", "exechon", "spherical-3-rrr", "tricept", "tripteron")
+QUICK = (
+    "3-rps",
+    "3-upu",
+    "6-rus",
+    "delta",
+    "delta-parallelogram",
+    "exechon",
+    "spherical-3-rrr",
+    "tricept",
+    "tripteron",
+)
 ROBOTS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in GALLERY]
 
 
@@ -123,7 +133,7 @@ def test_links_keep_their_lengths_while_the_robot_moves(name: str) -> None:
     scene = model_of(name).scene
     slides = {each.name for each in scene.joints if each.kind is JointKind.PRISMATIC}
     names = [point.name for point in scene.points]
-    for start, end, link in shown.links:
+    for start, end, _ in shown.links:
         ends = {names[start], names[end]}
         lengths = [np.linalg.norm(each.points[end] - each.points[start]) for each in (shown.posture, moved)]
         assert lengths[0] > 0
@@ -137,6 +147,20 @@ def test_links_keep_their_lengths_while_the_robot_moves(name: str) -> None:
         assert {body for body, _ in shown.plates} == {Body.BASE, Body.PLATFORM}
     actuated = [each for limb in configurations(name)[0].robot.limbs for each in every_joint(limb) if each.actuated]
     assert sum(each.is_actuated for each in scene.joints) == len(actuated)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_structure_is_that_of_the_engine(name: str) -> None:
+    structure, ranks = model_of(name).structure, RANKS[name]
+    assert tuple(each.wrenches for each in structure) == ranks.W
+    assert tuple(each.constraints for each in structure) == ranks.C
+    generic = model_of(name).generic
+    assert generic is not None
+    assert (generic.jacobian, 6 - generic.constraints) == (ranks.J, ranks.freedoms)
+    assert sum(each.unknowns for each in structure) == len(model_of(name).unknowns)
+    assert sum(each.kept for each in structure) == len(model_of(name).closure)
+    # Every loop equation that is kept determines an unknown or takes a freedom from the platform.
+    assert sum(each.kept for each in structure) == len(model_of(name).unknowns) + 6 - ranks.freedoms
 
 
 def assert_words_are_clear(shown: Drawing) -> None:

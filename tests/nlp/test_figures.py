@@ -236,10 +236,11 @@ def test_labels_stand_on_no_other_limb(name: str) -> None:
     assert_labels_are_clear([drawing(name)])
 
 
-@pytest.mark.parametrize("name", [*DRAWN_BY_HAND, "3-rps", "delta"])
+@pytest.mark.parametrize("name", [*DRAWN_BY_HAND, "3-rps", "delta", "planar-3-rrr"])
 def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
-    (option,) = [each for each in model_options(name) if each.choices]
-    robots = [drawing_of_model(build_model(name, {option.name: choice})) for choice in option.choices]
+    options = [each for each in model_options(name) if each.choices]
+    variants = [{option.name: choice} for option in options for choice in option.choices or ()] or [{}]
+    robots = [drawing_of_model(build_model(name, variant)) for variant in variants]
     figure = assert_labels_are_clear(robots)
     for axes, robot in zip([axes for axes in figure.axes if axes.texts], robots, strict=True):
         names = {mark.parameter for mark in robot.model.scene.marks}

@@ -174,6 +174,9 @@ def _legend(view: ViewData) -> Markup:
         " Dotted grey: the start." if view["reference"] else "",
         " Green, dashed: motions that nothing resists." if view["free"] else "",
         " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
+        " Nothing moves: the loops open along the task's motion."
+        if view["motion"] and len(view["frames"]) == 1
+        else "",
         " Joints: dark where an actuator drives them." if view["joints"] else "",
         f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
         ", at a joint for its kind." if view["joints"] else ".",

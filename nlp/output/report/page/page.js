@@ -132,7 +132,9 @@
     for (const { limb, kind, ends: [a, b] } of view.links) {
       if (limb === null || kind === "rail") continue;
       const way = plus(frame.points[b], frame.points[a], -1), long = norm(way);
-      if (!found.has(limb) || found.get(limb).long < long) found.set(limb, { long, start: frame.points[a], way });
+      // Rods of several limbs come together at the platform: a name is on a bar where there is one.
+      const size = long + (kind === "bar" ? 100 * view.size : 0);
+      if (!found.has(limb) || found.get(limb).size < size) found.set(limb, { size, start: frame.points[a], way });
     }
     // Each at another height, so that names of limbs side by side do not meet.
     return [...found].map(([limb, { start, way }], k) => {
