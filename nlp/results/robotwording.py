@@ -63,11 +63,11 @@ def _structure_words(model: Model) -> Iterator[Line | TextTable]:
     if every == 0:
         yield Line("closed by the pose alone: no unknowns, no equations", label="loops")
         return
-    rows = [
+    loops = [
         (each.name, each.opened, str(each.unknowns), str(each.equations), str(each.equations - each.kept))
         for each in model.structure
     ]
-    yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(rows))
+    yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
     kept = len(model.closure)
     words = f"{unknowns} unknowns, {every} equations"
     words += (
