@@ -1,7 +1,7 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters; the gallery of robots given joint by joint on one sheet, and the solved Delta of robots.md.
+robots with their parameters; the gallery of robots given joint by joint on one sheet, and the Delta of robots.md.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Write the table of the robots that come as robot files into docs/robots.md: run by ``make docs``. A test compares it."""
+"""Write the table of the shipped robot files into docs/robots.md: run by ``make docs``. A test compares them."""
 
 import re
 from collections import Counter
@@ -29,12 +29,12 @@ def limbs_of(model: Model) -> str:
     for each in model.structure:
         paths.setdefault(each.limb, []).append(each.joints.replace("*", "\\*"))
     words = [own[0] if len(own) == 1 else f"({', '.join(own)})" for own in paths.values()]
-    return ", ".join(f"{count} × {joints}" for joints, count in Counter(words).items())
+    return ", ".join(f"{count} x {joints}" for joints, count in Counter(words).items())
 
 
 def counted(values: list[int]) -> str:
-    """Return numbers with equal ones together, such as ``3 × 2``."""
-    return ", ".join(f"{count} × {value}" for value, count in Counter(values).items())
+    """Return numbers with equal ones together, such as ``3 x 2``."""
+    return ", ".join(f"{count} x {value}" for value, count in Counter(values).items())
 
 
 def table() -> str:
