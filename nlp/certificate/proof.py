@@ -131,8 +131,8 @@ def read_proof(text: str, source: str) -> Proof:
         tree = zlib.decompress(base64.b64decode(content["tree"], validate=True))
         digest, bound = content["digest"], None if content["bound"] is None else float(content["bound"])
         proof = Proof(str(content["case"]), str(content["name"]), statement, str(content["graph"]), bound, tree)
-    except (ValueError, KeyError, TypeError, zlib.error) as error:
-        raise ProofError(f"{source}: is no proof: {type(error).__name__}: {error}") from None
+    except (ValueError, KeyError, TypeError, zlib.error):
+        raise ProofError(f"{source}: is no proof as certify --proof writes it") from None
     if digest != hashlib.sha256(tree).hexdigest():
         raise ProofError(f"{source}: is damaged: its digest is not that of its tree")
     return proof

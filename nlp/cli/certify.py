@@ -6,20 +6,33 @@ from typing import Annotated
 
 import typer
 
+from .numbers import Number, WholeNumber
 from .options import CaseName, Jobs, JsonFile, SettingTexts, check_outputs, console, read_settings, write_json
 
 
 def certify(
     case: CaseName,
     settings: SettingTexts = None,
-    gap: Annotated[float, typer.Option(help="Part of the best F that the bound may be off by.")] = 1e-4,
-    time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Stop then, with the bound reached.")] = None,
+    gap: Annotated[
+        float,
+        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of the best F that the bound may be off by."),
+    ] = 1e-4,
+    time: Annotated[
+        float | None,
+        typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop then, with the bound reached."),
+    ] = None,
     above: Annotated[
-        float | None, typer.Option(metavar="F", help="Prove that F is above this value on the whole box.")
+        float | None,
+        typer.Option(parser=Number("--above"), metavar="F", help="Prove that F is above this value on the whole box."),
     ] = None,
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
     starts: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Starting points for the incumbent instead of the case's.")
+        int | None,
+        typer.Option(
+            parser=WholeNumber("--starts", 1, 100_000),
+            metavar="N",
+            help="Starting points for the incumbent instead of the case's.",
+        ),
     ] = None,
     jobs: Jobs = None,
     json_file: JsonFile = None,

@@ -26,9 +26,9 @@ def evaluate(
     csv_file: CsvFile = None,
     table: CsvTable = None,
 ) -> None:
-    """Show F, J, rank and rates at one point; nothing is optimised.
+    """Show F, J, rank and rates at one point.
 
-    What is free stands at its start, or in the middle of its range.
+    Nothing is optimised. What is free stands at its start, or in the middle of its range.
     """
     from ..case.reader import load_case
     from ..evidence import state

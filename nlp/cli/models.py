@@ -19,7 +19,10 @@ def models(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None,
     plot: PlotFile = None,
 ) -> None:
-    """List the robots, or show one with its parameters, options and wrenches."""
+    """List the robots, or show one in full.
+
+    One robot is shown with its parameters, options and wrenches.
+    """
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError

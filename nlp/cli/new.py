@@ -8,7 +8,10 @@ import typer
 
 
 def new(model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot.")]) -> None:
-    """Print a commented case file to begin with: screwsynth new stewart-gough > my-robot.toml."""
+    """Print a commented case file to begin with.
+
+    For example: screwsynth new stewart-gough > my-robot.toml.
+    """
     from ..case.robots import build_model
     from ..case.starter import starter_case
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .numbers import WholeNumber
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
@@ -21,6 +23,9 @@ CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or t
 PlotFile = Annotated[
     str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")
 ]
+CurveFile = Annotated[
+    str | None, typer.Option("--plot", metavar="FILE", help="Draw the curve: a .png, .svg or .pdf file.")
+]
 JsonFile = Annotated[str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.")]
 CsvFile = Annotated[
     str | None, typer.Option("--csv", metavar="FILE", help="Write the tables with all digits; - is stdout.")
@@ -28,9 +33,19 @@ CsvFile = Annotated[
 CsvTable = Annotated[
     str | None, typer.Option("--table", metavar="NAME", help="Write this table only, such as design, limbs or limits.")
 ]
-Starts = Annotated[int | None, typer.Option(min=1, max=100_000, help="Starting points instead of the case's.")]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed instead of the case's.")]
-Jobs = Annotated[int | None, typer.Option(min=1, max=256, help="Threads; the result does not depend on it.")]
+Starts = Annotated[
+    int | None,
+    typer.Option(
+        parser=WholeNumber("--starts", 1, 100_000), metavar="N", help="Starting points instead of the case's."
+    ),
+]
+Seed = Annotated[
+    int | None, typer.Option(parser=WholeNumber("--seed", 0), metavar="N", help="Seed instead of the case's.")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; the result does not depend on it."),
+]
 SettingTexts = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),

@@ -21,7 +21,10 @@ def report(
     seed: Seed = None,
     jobs: Jobs = None,
 ) -> None:
-    """Solve a case and write a page about it: one file that opens without a network."""
+    """Solve a case and write a page about it.
+
+    The page is one file, and opens without a network.
+    """
     from ..case.reader import load_case, read_case
     from ..errors import UncoveredError, one_line
     from ..output.files import write_text

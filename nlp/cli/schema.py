@@ -10,7 +10,10 @@ import typer
 def schema(
     result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
 ) -> None:
-    """Print the JSON Schema of case files, with which editors complete and check."""
+    """Print the JSON Schema of case files.
+
+    Editors complete and check case files with it.
+    """
     import json
 
     if result:

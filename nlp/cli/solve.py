@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .numbers import WholeNumber
 from .options import (
     CaseName,
     CsvFile,
@@ -40,7 +41,12 @@ def solve(
     csv_file: CsvFile = None,
     table: CsvTable = None,
     plot: PlotFile = None,
-    pose: Annotated[int, typer.Option(min=1, help="Pose that --plot draws, where the case has several.")] = 1,
+    pose: Annotated[
+        int,
+        typer.Option(
+            parser=WholeNumber("--pose", 1), metavar="N", help="Pose that --plot draws, where the case has several."
+        ),
+    ] = 1,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
     ] = False,

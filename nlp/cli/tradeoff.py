@@ -9,9 +9,9 @@ import typer
 
 from .options import (
     CaseName,
+    CurveFile,
     Jobs,
     JsonFile,
-    PlotFile,
     Seed,
     SettingTexts,
     Starts,
@@ -43,10 +43,10 @@ def tradeoff(
     jobs: Jobs = None,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the curve as CSV.")] = None,
-    plot: PlotFile = None,
+    plot: CurveFile = None,
     page: Annotated[str | None, typer.Option("--page", metavar="FILE", help="Write the curve as an HTML page.")] = None,
 ) -> None:
-    """Solve again along one limit or number, and show F against it."""
+    """Solve along one limit or number, and show F against it."""
     from ..case.reader import load_case
     from ..errors import InputError
     from ..output.files import write_bytes, write_text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
@@ -18,6 +19,7 @@ from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.pairs import PairFamily
 from ..case.pose import Free
+from ..errors import CaseError
 
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
@@ -61,6 +63,9 @@ def limit_constraints(
         robots: the robot at each pose.
         named: symbols of the case's own numbers by name, radians for angles.
         numbers: the program's numbers.
+
+    Raises:
+        CaseError: a limit that depends on fixed numbers alone has no finite value.
     """
     if not case.limits:
         return LimitConstraints((), ())
@@ -77,6 +82,10 @@ def limit_constraints(
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
         holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
+        if holds and not varies and not math.isfinite(value):
+            # An infinite value is above every bound, and keeps none.
+            key = next(filter(None, item.constraint.keys))
+            raise CaseError(f"limits.{key}", f"has no finite value: {item.constraint.name}", source=case.source)
         (constant if holds and not varies else varying).append(item)
     return LimitConstraints(tuple(varying), tuple(constant), deferred)
 

@@ -44,12 +44,14 @@ class ActiveData(JsonObject):
         name: variable or constraint.
         bound: side of it.
         value: the limit.
+        unit: of the value; left out for a plain number.
         multiplier: improvement of F per unit by which the limit is relaxed.
     """
 
     name: str
     bound: Bound
     value: float
+    unit: Absent[str]
     multiplier: float
 
 

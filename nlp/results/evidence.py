@@ -28,6 +28,7 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
                 name=side.name,
                 bound=side.bound,
                 value=units.shown(side.value, side.dimension),
+                unit=units.label(side.dimension) or None,
                 multiplier=units.per_unit(side.multiplier, side.dimension),
             )
             for side in evidence.active

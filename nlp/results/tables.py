@@ -119,26 +119,25 @@ def margin_table(margins: Sequence[MarginData]) -> TextTable:
     return TextTable(("where", "bound", "value", "limit", "margin", "unit", ""), tuple(rows), "margins")
 
 
-def active_table(result: SolveResult | CombinedData, F: float = 0.0) -> TextTable:
+def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: bool) -> TextTable:
     """Return the bounds and limits that the point lies on or outside of, with their multipliers.
+
+    A point that is no answer has no multipliers: the numbers that the solver left say nothing.
 
     Args:
         result: with evidence.
         F: size of F, of which multipliers have their error.
+        is_answer: whether the point is an answer.
     """
     active = () if result.optimality is None else result.optimality.active
     violated = _violated(result)
-    rows = [
-        (
-            side.name,
-            side.bound,
-            number(side.value),
-            number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4),
-            "violated" if side.name in violated else "active",
-        )
-        for side in active
-    ]
-    return TextTable(("", "side", "value", "multiplier, F per unit", ""), tuple(rows), "active")
+    headers, rows = ("", "side", "value", "unit", "state", "multiplier"), []
+    for side in active:
+        slope = number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4)
+        state = "violated" if side.name in violated else "active"
+        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} F/{side.unit or 'unit'}")
+        rows.append(cells if is_answer else cells[:-1])
+    return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
 
 
 def _violated(result: SolveResult | CombinedData) -> Collection[str]:

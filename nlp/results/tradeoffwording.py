@@ -84,9 +84,15 @@ def tradeoff_words(result: TradeoffResult) -> list[str]:
     ]
 
 
-def objective_label(case: Case) -> str:
-    """Return F with its unit, for an axis."""
-    units = {rate_unit(frozen_array(task.twist, (6,)), case.units) for task in case.tasks}
+def objective_label(case: Case, task: int | None = None) -> str:
+    """Return F with its unit, for an axis.
+
+    Args:
+        case: the case.
+        task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
+    """
+    tasks = case.tasks if task is None else [case.tasks[task]]
+    units = {rate_unit(frozen_array(each.twist, (6,)), case.units) for each in tasks}
     return f"F, ({units.pop()})²" if len(units) == 1 else "F"
 
 

@@ -160,7 +160,7 @@ def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedPr
         ("p_z", "max"),
     ]
     for side in evidence["active"]:
-        assert set(side) == {"name", "bound", "value", "multiplier"}
+        assert set(side) == {"name", "bound", "value", "unit", "multiplier"}
     assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
     starts = result["starts"]
     assert (starts["run"], starts["converged"]) == (4, 4)
@@ -724,6 +724,22 @@ def test_commands_that_do_not_exist_or_lack_something(arguments: tuple[str, ...]
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("solve", "--starts", "0"), "--starts 0: must be a whole number from 1 to 100000"),
+        (("report", "--out", "x.html", "--starts", "1e3"), "--starts 1e3: must be a whole number from 1 to 100000"),
+        (("tradeoff", "--over", "x1=1:2:2", "--jobs", "257"), "--jobs 257: must be a whole number from 1 to 256"),
+        (("solve", "--seed=-1"), "--seed -1: must be a whole number of at least 0"),
+        (("solve", "--pose", "0"), "--pose 0: must be a whole number of at least 1"),
+        (("certify", "--gap", "little"), "--gap little: must be a number"),
+    ],
+)
+def test_numbers_of_options_are_refused_in_one_sentence(arguments: tuple[str, ...], words: str, cli: Run) -> None:
+    command, *others = arguments
+    assert cli(command, "paper-4.3", *others) == (2, "", f"screwsynth: {words}\n")
+
+
 def test_help(cli: Run) -> None:
     for option in ("-h", "--help"):
         code, out, err = cli(option)
@@ -731,6 +747,7 @@ def test_help(cli: Run) -> None:
         for command in ("solve", "evaluate", "models", "schema", "new"):
             assert command in out
             assert cli(command, option)[0] == 0
+        assert "..." not in out.partition("Commands:")[2], "a command's summary is cut off"
 
 
 @pytest.mark.parametrize("arguments", [("solve", "paper-4.3", "--starts", "2", "--json", "-"), ("models",)])

@@ -89,6 +89,7 @@ def test_a_byte_order_mark(tmp_path: Path, cli: Run) -> None:
     [
         ("1/0 >= x1", "divides by zero"),
         ("x1/(2-2) >= 1", "divides by zero"),
+        ("x1/(p_x-p_x) >= 1", "no finite value"),
         ("x1^x1^x1^99999 >= 0", "99999"),
         ("x1^-101 >= 0", "-101"),
         ("1e200*1e200 >= x1", "without a finite value"),

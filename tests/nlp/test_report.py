@@ -205,6 +205,16 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
     assert shown == active
     for name, version in result["versions"].items():
         assert [name, version] in found.tables["versions"]
+    # The lengths beside the view have the digits of the table, and every F on an axis has its unit.
+    at = [header.split(",")[0] for header in found.tables["design-limbs"][0]].index("leg length")
+    assert [row[1] for row in found.tables["rates"][1:]] == [row[at] for row in limbs]
+    labels = {text for text in re.findall(r"<text[^>]*>([^<]*)</text>", found.text) if text.split(",")[0] == "F"}
+    labels |= {plane["label"] for planes in found.data["planes"] for plane in planes}
+    assert labels == {f"F, ({result['units']['length']}/rad)²"}
+    (sides,) = [rows for rows in found.tables.values() if rows[0][-1:] == ["multiplier"]]
+    *_, unit, state, multiplier = sides[1]
+    assert unit
+    assert (state, multiplier.split(" ")[1]) == ("active", f"F/{unit}")
 
 
 def test_rounding_is_no_rate(page: Callable[..., Page]) -> None:
@@ -349,6 +359,9 @@ def test_what_failed_is_no_answer(tmp_path: Path) -> None:
     assert "would be feasible with" in found.words
     assert "largest F =" not in found.words
     assert found.tables["design"][0][1] == "reached"
+    # What a solver leaves as multipliers of a failed search is no cost.
+    assert ["", "side", "value", "unit", "state"] in [rows[0] for rows in found.tables.values()]
+    assert "multiplier" not in found.words
     assert {"class": "answer none", "id": "answer"} in [a for _, a in found.elements]
 
 
@@ -601,12 +614,13 @@ def test_slider_moves_the_platform(opened: Callable[[str], Any], page: Callable[
             np.testing.assert_allclose(drawn[[0, 12]], points[ends], atol=1e-9 * view["size"])
         rows = chrome.execute_script(ROWS)
         assert [row[0] for row in rows] == [row["limb"] for row in view["rows"]]
-        np.testing.assert_allclose([number(row[1]) for row in rows], lengths, rtol=1e-5)
+        # Lengths have the five digits of the table.
+        assert [number(row[1]) for row in rows] == [float(f"{length:.5g}") for length in lengths]
         np.testing.assert_allclose([number(row[2]) for row in rows], rates, rtol=1e-5)
         np.testing.assert_allclose([number(row[3]) for row in rows], 100 * rates**2 / (rates @ rates), atol=0.051)
         for limb, rate, length in zip(limbs, rates, lengths, strict=True):
             found = re.findall(r"length (\S+) .*rate (\S+) ", limb["text"].replace("\N{MINUS SIGN}", "-"))
-            assert [float(each) for each in found[0]] == pytest.approx([length, rate], rel=1e-5)
+            assert [float(each) for each in found[0]] == pytest.approx([float(f"{length:.5g}"), rate], rel=1e-5)
 
 
 FRAME = """
@@ -745,17 +759,22 @@ def test_slider_shows_each_pose(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.browser
-def test_wide_tables_say_that_they_scroll(opened: Callable[[str], Any]) -> None:
-    chrome = opened("hexapod-machining")
+def test_wide_tables_say_that_they_scroll(opened: Callable[[str], Any], tmp_path: Path, cli: Run) -> None:
     hint = (
         "return [...document.querySelectorAll('.scroll')].filter((each) => each.checkVisibility()).map((each) =>"
         " [each.scrollWidth > each.clientWidth + 1, getComputedStyle(each, '::before').content.includes('Scroll')])"
     )
+    curve = tmp_path / "curve.html"
+    over = ("--over", "limits.leg_length.max=60:70:2", "--starts", "1")
+    assert cli("tradeoff", "paper-4.1-helical", *over, "--page", str(curve))[0] == 0
+    chrome = opened("hexapod-machining")
     size = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    rows = until(lambda: (found := chrome.execute_script(hint)) and all(wide == said for wide, said in found) and found)
+    for address in (chrome.current_url, curve.as_uri()):
+        chrome.get(address)
+        rows = until(lambda: (all_ := chrome.execute_script(hint)) and all(a == b for a, b in all_) and all_)
+        assert any(wide for wide, _ in rows)
     chrome.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    assert any(wide for wide, _ in rows)
 
 
 @pytest.mark.browser
@@ -797,7 +816,7 @@ def test_hover_over_a_limb(opened: Callable[[str], Any], page: Callable[..., Pag
     assert float(rate) == pytest.approx(result["rates"][row], rel=1e-5)
     assert float(share) == pytest.approx(100 * result["rates"][row] ** 2 / result["F"], abs=0.051)
     length = result["quantities"]["leg_length"][result["limbs"][row]]
-    assert float(re.findall(r"length (\S+)", text)[0]) == pytest.approx(length, rel=1e-5)
+    assert float(re.findall(r"length (\S+)", text)[0]) == float(f"{length:.5g}")
     wrench = [float(each) for each in re.findall(r"wrench \((.*)\)", text)[0].replace(";", ",").split(",")]
     np.testing.assert_allclose(wrench, result["jacobian"][row], rtol=1e-3, atol=1e-3)
 

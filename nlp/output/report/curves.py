@@ -38,7 +38,10 @@ def tradeoff_rows(result: TradeoffResult) -> Markup:
 
 
 def tradeoff_page(case: Case, result: TradeoffResult) -> str:
-    """Return a whole page about a trade-off, which opens without a network and needs no script."""
+    """Return a whole page about a trade-off, which opens without a network.
+
+    Its script only says which tables scroll: all words, charts and tables stand there without it.
+    """
     title = case.title or case.name
     solved = [point for point in result.points if point.status.is_answer]
     answer = f"{len(solved)} of {len(result.points)} values have an answer"
@@ -59,7 +62,7 @@ def tradeoff_page(case: Case, result: TradeoffResult) -> str:
         "contents": "",
         "body": tag("section", body),
         "style": Markup(_file("style.css")),
-        "script": "",
+        "script": Markup(_file("tables.js")),
         "data": "{}",
         "plotly": "",
     }

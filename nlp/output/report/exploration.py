@@ -12,6 +12,7 @@ from ...results.data import SolveResult
 from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
+from ...results.tradeoffwording import objective_label
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
@@ -34,21 +35,21 @@ def optima(report: Report) -> Markup:
     parts: list[Markup] = []
     result = report.result
     results = [result] if isinstance(result, SolveResult) else result.tasks
-    solutions: list[tuple[str, ProgramSolution, RobotData | None]] = [
-        (part.name, part.solution, own.robot) for part, own in zip(report.parts, results, strict=True)
+    solutions: list[tuple[str, str, ProgramSolution, RobotData | None]] = [
+        (part.name, part.label, part.solution, own.robot) for part, own in zip(report.parts, results, strict=True)
     ]
     if report.combined is not None:
-        solutions.append(("the combined program", report.combined, None))
-    for name, solution, robot in solutions:
+        solutions.append(("the combined program", objective_label(report.case), report.combined, None))
+    for name, label, solution, robot in solutions:
         if not solution.starts:
             continue
         if len(solutions) > 1:
             parts.append(tag("h3", name))
-        parts += _optima_of(solution, robot)
+        parts += _optima_of(solution, robot, label)
     return join_markup(parts)
 
 
-def _optima_of(solution: ProgramSolution, robot: RobotData | None) -> Iterator[Markup]:
+def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {counted(len(solution.starts), 'start')} ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
@@ -65,7 +66,7 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None) -> Iterator[M
             words = f"The optimum that was found: F = {F}."
         yield tag("p", words)
     else:
-        chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=("F", "starts"))
+        chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=(label, "starts"))
         yield tag("figure", chart, tag("figcaption", words))
     left = len(solution.optima) - MOST_OPTIMA
     more = f" ({left} worse {'one is' if left == 1 else 'ones are'} left out)" if left > 0 else ""
@@ -151,7 +152,7 @@ def _slice(part: Part, each: Slice) -> Markup:
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
         [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g}")],
         words=words,
-        labels=(f"{variable.name}, {unit}" if unit else variable.name, "F"),
+        labels=(f"{variable.name}, {unit}" if unit else variable.name, part.label),
         bounds=(values[0], values[-1]),
     )
     return tag("figure", chart, tag("figcaption", words))

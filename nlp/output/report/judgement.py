@@ -26,7 +26,9 @@ def evidence_section(report: Report) -> Markup:
     optimality = result.combined.optimality
     if optimality is not None:
         parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
-        parts.append(_active(result.combined, optimality, result.combined.value or 0.0))
+        parts.append(
+            _active(result.combined, optimality, result.combined.value or 0.0, is_answer=result.status.is_answer)
+        )
     return join_markup(parts)
 
 
@@ -36,18 +38,19 @@ def _evidence_of(result: SolveResult) -> Iterator[Markup]:
     optimality = result.optimality
     if optimality is None:
         return
-    yield _active(result, optimality, 0.0 if result.robot is None else size_of_F(result.robot))
+    size = 0.0 if result.robot is None else size_of_F(result.robot)
+    yield _active(result, optimality, size, is_answer=result.status.is_answer)
     if optimality.reduced_hessian_eigenvalues and result.reached is None:
         values = optimality.reduced_hessian_eigenvalues
         listed = ", ".join(number(value, 1.0, digits=4, part=CURVED) for value in values)
         yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
 
 
-def _active(result: SolveResult | CombinedData, optimality: OptimalityData, size: float) -> Markup:
+def _active(result: SolveResult | CombinedData, optimality: OptimalityData, size: float, *, is_answer: bool) -> Markup:
     if not optimality.active:
         return tag("p", "No bound or limit is active.")
-    table = active_table(result, size)
-    words = {row[-1] for row in table.rows}
+    table = active_table(result, size, is_answer=is_answer)
+    words = {cell for row in table.rows for cell in row}
     caption = " and ".join(word for word in ("violated", "active") if word in words).capitalize()
     return html_table(table, f"{caption} bounds and limits")
 

@@ -19,6 +19,7 @@ from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
 from ...results.rounding import number
 from ...results.tradeoff import TradeoffResult
+from ...results.tradeoffwording import objective_label
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ..pictures.drawing import Drawing, drawing_of
@@ -36,6 +37,7 @@ class Part:
 
     Attributes:
         name: of the task.
+        label: F with its unit, for an axis.
         nlp: its program.
         x: (n,) the point.
         solution: of the task by itself.
@@ -47,6 +49,7 @@ class Part:
     """
 
     name: str
+    label: str
     nlp: Nlp
     x: FloatArray
     solution: ProgramSolution
@@ -94,7 +97,7 @@ class Report:
         return {
             "result": json_data(self.result),
             "views": [view for part in self.parts for view in part.views],
-            "planes": [[_plane(part.nlp, part.x, plane) for plane in part.planes] for part in self.parts],
+            "planes": [[_plane(part, plane) for plane in part.planes] for part in self.parts],
         }
 
 
@@ -137,6 +140,7 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     count = len(slices)
     return Part(
         name=nlp.case.tasks[task].name,
+        label=objective_label(nlp.case, task),
         nlp=nlp,
         x=x,
         solution=own,
@@ -148,8 +152,9 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     )
 
 
-def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
+def _plane(part: Part, plane: Plane) -> dict[str, Any]:
     """Return a map in the case's units, rounded to a picture's precision."""
+    nlp, x = part.nlp, part.x
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 
@@ -159,6 +164,7 @@ def _plane(nlp: Nlp, x: FloatArray, plane: Plane) -> dict[str, Any]:
     return {
         "names": [names[i].name, names[j].name],
         "units": [units.label(names[k].dimension) for k in (i, j)],
+        "label": part.label,
         "first": [shown(i, float(value)) for value in plane.first],
         "second": [shown(j, float(value)) for value in plane.second],
         "F": [[float(f"{value:.5g}") if np.isfinite(value) else None for value in row] for row in plane.F],

@@ -215,7 +215,7 @@ def _rates(view: ViewData) -> Markup:
         bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
         share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
         length = frame["lengths"][k]
-        cells = ["" if length is None else f"{length:.6g}", f"{rate:+.6g}", bar, share]
+        cells = ["" if length is None else f"{length:.5g}", f"{rate:+.6g}", bar, share]
         kinds = ["length number", "rate number", "bars", "share number"]
         body.append(
             tag(

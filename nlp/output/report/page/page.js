@@ -45,7 +45,7 @@
     const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
     const text = [`<b>limb ${plain(limb)}</b>`];
     const length = rows.length ? frame.lengths[rows[0][1]] : null;
-    if (length !== null) text.push(`${view.measure.words} ${shown(length)} ${plain(view.measure.units[rows[0][1]])}`);
+    if (length !== null) text.push(`${view.measure.words} ${shown(length, 5)} ${plain(view.measure.units[rows[0][1]])}`);
     for (const [row, k] of rows) {
       const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
       const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value));
@@ -207,7 +207,7 @@
     byId("F-there").textContent = shown(frame.F, 7);
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
       const rate = frame.rates[k];
-      row.querySelector(".length").textContent = frame.lengths[k] === null ? "" : shown(frame.lengths[k]);
+      row.querySelector(".length").textContent = frame.lengths[k] === null ? "" : shown(frame.lengths[k], 5);
       row.querySelector(".rate").textContent = shown(rate, 6, true);
       row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
       const bar = row.querySelector(".bar");
@@ -278,7 +278,7 @@
     const all = kept.flat().every((value, k) => value === plane.F.flat()[k]);
     window.Plotly.react(byId("map"), [
       ...(all ? [] : [contour(plane.F, { opacity: 0.35, showscale: false })]),
-      contour(kept.flat().some((value) => value !== null) ? kept : plane.F, { colorbar: { title: { text: "F", side: "right" }, thickness: 14 }, visible: true, ...(kept.flat().some((value) => value !== null) ? {} : { opacity: 0.35 }) }),
+      contour(kept.flat().some((value) => value !== null) ? kept : plane.F, { colorbar: { title: { text: plain(plane.label), side: "right" }, thickness: 14 }, visible: true, ...(kept.flat().some((value) => value !== null) ? {} : { opacity: 0.35 }) }),
       { type: "scatter", mode: "markers", x: [plane.at[0]], y: [plane.at[1]], marker: { size: 13, color: "#ff8c1a", line: { color: "#000", width: 2 } }, hovertemplate: "this point<extra></extra>", cliponaxis: false, showlegend: false },
     ], {
       margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: FONT, color: INK, size: 12 },

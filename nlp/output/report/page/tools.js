@@ -2,7 +2,7 @@
 // Where the eye stands so that a box fills its frame: Plotly's camera, whose unit makes the product of the sides 1.
 const fittedCamera = (ranges, eye, frame) => {
   // Half of the angle of Plotly's perspective is an eighth of a half turn; ticks and titles need room, in pixels.
-  const HALF = Math.tan(Math.PI / 8), SIDE = 64, TOP = 36;
+  const HALF = Math.tan(Math.PI / 8), SIDE = 72, TOP = 36;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const unit = (a) => a.map((each) => each / Math.hypot(...a));
@@ -65,8 +65,4 @@ const hasWebGL = () => {
     return false;
   }
 };
-
-// A table that is wider than its place says so.
-const wider = new ResizeObserver((entries) => entries.forEach(({ target }) => target.classList.toggle("wider", target.scrollWidth > target.clientWidth + 1)));
-document.querySelectorAll(".scroll").forEach((each) => wider.observe(each));
 
