@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,8 @@ _APART = 0.05
 #: Number of bends of an arc, squared sine of the angle between two axes below which they are parallel, and distance
 #: below which they meet, in parts of the distance between their hinges.
 _BENDS, _PARALLEL, _MEET = 8, 1e-6, 1e-9
+#: Distances of the first and the last hinge of a spherical limb from its centre, in parts of the robot's size.
+_REACHES = (1.3, 0.7)
 #: Kinds of joints that move their point.
 _SLIDING = (JointKind.PRISMATIC, JointKind.HELICAL, JointKind.CYLINDRICAL, JointKind.PARALLELOGRAM)
 
@@ -69,6 +71,24 @@ def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
         else:
             found.append(_placed(path, j, frame, number))
         number += len(joint.parts) or 1
+    return _spread(found, frame)
+
+
+def _spread(joints: list[PlacedJoint], frame: PathFrame) -> list[PlacedJoint]:
+    """Return the hinges of a spherical limb, all at one point, apart from each other along their axes."""
+    homes = [frame.typical_value(each.at_home).ravel() for each in joints]
+    size = frame.typical_value(frame.size).item()
+    if len(joints) < 2 or any(each.kind is not JointKind.REVOLUTE for each in joints):
+        return joints
+    if max(float(np.abs(home - homes[0]).max()) for home in homes) > _MEET * size:
+        return joints
+    found = []
+    for joint, reach in zip(joints, np.linspace(*_REACHES, len(joints)), strict=True):
+        away, at_home = float(reach) * frame.size * joint.axes[0], joint.at_home
+        if joint.axis_at_home is not None:
+            at_home = at_home + float(reach) * frame.size * joint.axis_at_home
+        place = joint.place + away
+        found.append(replace(joint, foot=place, place=place, foot_at_home=at_home, at_home=at_home))
     return found
 
 

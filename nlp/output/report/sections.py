@@ -186,9 +186,8 @@ def _legend(view: ViewData) -> Markup:
 
 def _measure_header(view: ViewData) -> str:
     """Return the header of the measure of limbs, with its unit where all rows have one."""
-    measure = view["measure"]
-    words = "actuator from home" if view["joints"] else measure["words"]
-    units = {unit for unit in measure["units"] if unit}
+    words = "actuator from home" if view["joints"] else view["measure"]["words"]
+    units = {unit for unit in view["measure"]["units"] if unit}
     return f"{words}, {units.pop()}" if len(units) == 1 else words
 
 
