@@ -262,7 +262,8 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
 
     With such a start, the best optimum found is not the global one, and must not be reported as the answer.
     """
-    feasible = [start for start in starts if start.status is not StartStatus.CONVERGED and start.violation <= FEASIBLE]
+    others = (StartStatus.CONVERGED, StartStatus.OPEN)  # a robot with open loops is no point of the case
+    feasible = [start for start in starts if start.status not in others and start.violation <= FEASIBLE]
     if not (feasible and optima):
         return None
     best = min(feasible, key=lambda start: nlp.sign * start.F)
