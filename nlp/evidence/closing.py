@@ -38,7 +38,7 @@ def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the internal unknowns to which the path from home leads; unchanged where it ends early."""
+    """Return a point (n,) with the unknowns to which the path from home leads; unchanged where it ends early."""
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[Line]:
-    """Yield the rates of the actuators, whether the motion is possible, the freedoms, the singularities, and the assembly."""
+    """Yield the rates of the actuators, whether the motion is possible, the freedoms, singularities and assembly."""
     task = robot.task
     if joints.actuators and task is not None:
         length = rate_unit(task.motion.twist, units)

@@ -19,7 +19,9 @@ def free_pose(name: str, reach: float) -> Case:
     model = robot_function(name)()
     position = [Free(value - reach, value + reach) for value in model.home]
     parameters = {item.name: item.typical[0] for item in model.parameters}
-    return Case(model, parameters, position, [Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))], Rotation(None, Free(-2, 2)))
+    return Case(
+        model, parameters, position, [Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))], Rotation(None, Free(-2, 2))
+    )
 
 
 def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
@@ -108,8 +110,13 @@ def test_every_start_of_six_robots_is_solved(sense: str) -> None:
             for item in case.model.parameters
         }
         task = replace(case.tasks[0], sense=sense)
-        own = solve(
-            replace(case, parameters=parameters, tasks=[task], rotation=Rotation(None, Free(-0.35, 0.35))), starts=24
-        ).outcomes[0].own
+        own = (
+            solve(
+                replace(case, parameters=parameters, tasks=[task], rotation=Rotation(None, Free(-0.35, 0.35))),
+                starts=24,
+            )
+            .outcomes[0]
+            .own
+        )
         assert [start.status.name for start in own.starts] == ["CONVERGED"] * 24, name
         assert loops_are_closed(own.nlp, own.x)
