@@ -2,9 +2,9 @@
 
     python -P bench/joints.py
 
-The pose and two dimensions are free, or three. Instructions are those of CasADi's virtual machine; times are CPU times on
-one thread, those of an evaluation the best of five, because the machine may be shared. A search counts as solved where all its loops are closed, and its
-point fulfils the program's first-order conditions.
+The pose and two dimensions are free, or three. Instructions are those of CasADi's virtual machine; times are CPU times
+on one thread, those of an evaluation the best of five, because the machine may be shared. A search counts as solved
+where all its loops are closed, and its point fulfils the program's first-order conditions.
 """
 
 import time
@@ -81,7 +81,9 @@ def case_of(name: str, sense: str) -> Case:
     position = [Free(value - 0.15 * size, value + 0.15 * size) for value in model.home]
     twist = np.concatenate([TWIST[:3], TWIST[3:] * size])
     task = Task(twist, sense)  # type: ignore[arg-type]
-    return Case(model, parameters, position, [task], Rotation(None, Free(-0.35, 0.35)), characteristic_length=0.7 * size)
+    return Case(
+        model, parameters, position, [task], Rotation(None, Free(-0.35, 0.35)), characteristic_length=0.7 * size
+    )
 
 
 def measure(function: ca.Function, arguments: list[np.ndarray]) -> float:

@@ -81,8 +81,8 @@ def gallery_robot(name: str) -> Model:
 
     if name not in gallery_names():
         raise UnknownModelError(name)
-    tables = _gallery_tables(name) | {"name": name}  # case files name the file, people its robot
-    return replace(robot(**tables), options={})
+    # A case file names the robot by its file, and people by its own name.
+    return replace(robot(**(_gallery_tables(name) | {"name": name})), options={})
 
 
 def robot_function(name: str) -> RobotFunction:

@@ -1,7 +1,7 @@
 """Displacements of bodies and screws of joints as symbols.
 
-A twist has its angular velocity first, then the velocity at the world origin. A joint's variable is 0 at home, where the
-robot is described.
+A twist has its angular velocity first, then the velocity at the world origin. A joint's variable is 0 at home, where
+the robot is described.
 """
 
 from __future__ import annotations

@@ -32,7 +32,9 @@ def starter_case(model: Model) -> str:
         model: the robot.
     """
     z, search = model.home[2], Search()
-    reach = _SPREAD * abs(z) or 1.0
+    lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
+    reach = _SPREAD * (math.hypot(*model.home) or max(lengths, default=0.0)) or 1.0
+    position = ", ".join(_free_number(value, reach) for value in model.home)
     options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
@@ -57,7 +59,7 @@ def starter_case(model: Model) -> str:
         *(_parameter_line(parameter, is_free=index == 0) for index, parameter in enumerate(model.parameters)),
         "",
         "[pose]                        # of the platform in the base's frame, z along the base's normal",
-        f"position = [{_free_number(0, reach)}, {_free_number(0, reach)}, {_free_number(z, reach)}]",
+        f"position = [{position}]",
         "rotation = { angle = { min = -20, max = 20 } }                        # any axis, at most 20 deg",
         *(_ROTATIONS if model.generic is None or model.generic.constraints == 0 else ()),
         "",

@@ -32,7 +32,7 @@ def evaluate(
     """
     from ..case.reader import load_case
     from ..evidence import state
-    from ..evidence.kkt import close_equations
+    from ..evidence.closing import closed_start
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
@@ -41,7 +41,7 @@ def evaluate(
     check_outputs([case], {"--json": json_file, "--csv": csv_file})
     check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
-    x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
+    x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         write_json(json_file, result)

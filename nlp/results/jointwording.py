@@ -1,4 +1,4 @@
-"""Sentences about the joints of a robot given joint by joint: actuator rates, freedoms and singularities."""
+"""Sentences about the joints of a robot given joint by joint: actuator rates, freedoms, singularities, assembly."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[Line]:
-    """Yield the rates of the actuators, whether the motion is possible, the freedoms, and the singularities."""
+    """Yield the rates of the actuators, whether the motion is possible, the freedoms, singularities and assembly."""
     task = robot.task
     if joints.actuators and task is not None:
         length = rate_unit(task.motion.twist, units)
@@ -37,3 +37,5 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
     yield Line(f"{joints.freedoms} with free actuators", label="freedoms")
     for sentence in joints.singularities:
         yield Line(f"singular: {sentence}", tone=Tone.CAUTION)
+    for sentence in joints.assembly:
+        yield Line(f"assembly: {sentence}", tone=Tone.CAUTION)

@@ -170,12 +170,14 @@ class JointsData(JsonObject):
         actuators: with their rates for the task's motion; absent where there are several tasks.
         constrained: part of F that constraints carry, which no actuator can move with; 0 for a motion that is possible.
         singularities: sentences about the singularities found.
+        assembly: sentences about joints that are assembled in another way than at home, or perhaps; empty for home's.
     """
 
     freedoms: int
     actuators: Absent[tuple[ActuatorData, ...]]
     constrained: Absent[float]
     singularities: tuple[str, ...]
+    assembly: tuple[str, ...]
 
 
 class RobotData(JsonObject):

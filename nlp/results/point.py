@@ -15,6 +15,7 @@ import numpy as np
 from ...models import Dimension, FloatArray, Quantity, axis_from_screw
 from .. import __version__
 from ..case.case import Case
+from ..evidence.assembly import assembly_of
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.mobility import mobility_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
@@ -102,6 +103,7 @@ def _joints_data(nlp: Nlp, x: FloatArray, state: RobotState, *, with_task: bool)
     found = mobility_of(nlp, x, state)
     if found is None:
         return None
+    assembly = assembly_of(nlp, x, state)
     actuators = (
         ActuatorData(
             name=each.name,
@@ -117,6 +119,7 @@ def _joints_data(nlp: Nlp, x: FloatArray, state: RobotState, *, with_task: bool)
         singularities=tuple(
             f"{'' if each.limb is None else f'limb {each.limb}: '}{each.kind.value}" for each in found.singularities
         ),
+        assembly=() if assembly is None else assembly.sentences,
     )
 
 

@@ -27,7 +27,9 @@ def program(model: Model, rotation: Rotation) -> Nlp:
     return formulate(Case(model, parameters, position, [Task(TWIST)], rotation, characteristic_length=2.0))
 
 
-def legs(sides: str, dimensions: dict[str, dict[str, object]], points: list[tuple[list[object], list[object]]]) -> Model:
+def legs(
+    sides: str, dimensions: dict[str, dict[str, object]], points: list[tuple[list[object], list[object]]]
+) -> Model:
     """Legs between universal and ball joints at given points of base and platform."""
     return robot(
         sides,
@@ -124,6 +126,6 @@ def test_f_and_its_gradient_are_those_of_the_rows(by_rows: Model, by_joints: Mod
         closed = close_equations(joints, np.concatenate([x, joints.start[rows.n :]]))
         assert closed[: rows.n] == pytest.approx(x, rel=0, abs=0)
         F = rows.evaluate(x).F
-        assert joints.evaluate(closed).F == pytest.approx(F, rel=1e-12)
+        assert pytest.approx(F, rel=1e-12) == joints.evaluate(closed).F
         expected = rows.program.kernels.derivatives(x, rows.arguments).gradient.ravel()
         assert gradient(joints, closed, rows.n) == pytest.approx(expected, rel=0, abs=1e-11 * max(1, *np.abs(expected)))

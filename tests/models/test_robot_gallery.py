@@ -322,7 +322,7 @@ class Library:
 
 
 def limb_forms(oracle: Oracle) -> list[Array]:
-    """Symmetric matrix (6, 6) of each limb's part of F, by twists ``(omega, v)``, from the projectors of its members."""
+    """Symmetric matrix (6, 6) of each limb's part of F, by twists ``(omega, v)``, from its members' projectors."""
     members = iter(oracle.members())
     forms = []
     for limb in oracle.robot.limbs:
@@ -348,7 +348,7 @@ def test_library_equals_mujoco(name: str) -> None:
                 found = library.at(values, pose, twist)
                 # F in parts of its size without cancellation: the feasible part of a twist may move no actuator.
                 size = sum(float(np.abs(twist) @ np.abs(form) @ np.abs(twist)) for form in limb_forms(oracle))
-                assert found.F == pytest.approx(oracle.objective(twist), rel=1e-9, abs=1e-12 * size)
+                assert pytest.approx(oracle.objective(twist), rel=1e-9, abs=1e-12 * size) == found.F
             assert found.closure < 1e-12
             assert found.constrained < 1e-9
             assert not found.singularities
