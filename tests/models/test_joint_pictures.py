@@ -12,9 +12,11 @@ from robot_mjcf import elementary
 from test_robot_gallery import GALLERY, RANKS, configurations, table
 
 from screwsynth.models import Body, JointKind, LinkKind, Model, robot
+from screwsynth.nlp import Case, Task, result_of, solve
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of
 from screwsynth.nlp.output.pictures.posture import Posture
+from screwsynth.nlp.output.report.report import report_of
 
 Array = NDArray[np.float64]
 
@@ -161,6 +163,30 @@ def test_the_structure_is_that_of_the_engine(name: str) -> None:
     assert sum(each.kept for each in structure) == len(model_of(name).closure)
     # Every loop equation that is kept determines an unknown or takes a freedom from the platform.
     assert sum(each.kept for each in structure) == len(model_of(name).unknowns) + 6 - ranks.freedoms
+
+
+def test_the_pages_slider_moves_every_link_and_keeps_its_length() -> None:
+    model = model_of("delta-parallelogram")
+    typical = {item.name: item.typical[0] for item in model.parameters}
+    solution = solve(Case(model, typical, list(model.home), [Task(np.array([0, 0, 0, 0.2, 0, 1.0]))]), starts=1)
+    (view,) = report_of("", solution, result_of(solution)).parts[0].views
+    assert len(view["frames"]) == 41
+    assert [joint["actuated"] for joint in view["joints"]].count(True) == 3
+    places = np.array([frame["points"] for frame in view["frames"]])
+    ends = np.array([link["ends"] for link in view["links"]])
+    lengths = np.linalg.norm(places[:, ends[:, 1]] - places[:, ends[:, 0]], axis=2)
+    assert np.max(np.ptp(lengths, axis=0)) < 1e-9
+    assert set(measured := view["measure"]["units"]) == {"deg"}
+    # Everything but the base moves, and the actuators turn as the joints on the arms say.
+    bodies = np.array([point["body"] for point in view["points"]])
+    moved = np.max(np.linalg.norm(places[-1] - places[0], axis=1)[bodies == "base"])
+    assert moved < 1e-12 < np.min(np.linalg.norm(places[-1] - places[0], axis=1)[bodies != "base"])
+    turned = np.radians([frame["lengths"][0] for frame in view["frames"]])
+    names = [point["name"] for point in view["points"]]
+    arm = places[:, names.index("1:2")] - places[:, names.index("1:1")]
+    cosines = np.sum(arm * arm[view["zero"]], axis=1) / np.sum(arm[0] ** 2)
+    np.testing.assert_allclose(np.cos(turned - turned[view["zero"]]), cosines, atol=1e-12)
+    assert len(measured) == len(view["rows"])
 
 
 def assert_words_are_clear(shown: Drawing) -> None:
