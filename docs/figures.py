@@ -1,16 +1,27 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters.
+robots with their parameters; the gallery of robots given joint by joint on one sheet, and the Delta of robots.md.
 """
 
+import re
+import tomllib
 from pathlib import Path
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
 from screwsynth.models import model_names
-from screwsynth.nlp import build_model, load_case, plot, solve
+from screwsynth.models.catalog import gallery_names
+from screwsynth.nlp import build_model, case_from_tables, load_case, plot, solve
 from screwsynth.nlp.case.robots import model_options
+from screwsynth.nlp.output.pictures.drawing import drawing_of_model
+from screwsynth.nlp.output.pictures.painting import Panel
+from screwsynth.nlp.output.pictures.view import clearest_view
 
 FOLDER = Path(__file__).parent / "figures"
+#: Columns of the gallery's sheet, and width and height of a robot on it, inches.
+COLUMNS, WIDTH, HEIGHT = 4, 5.2, 4.8
 CASES = {
     "fig-4-helical": "paper-4.1-helical",
     "fig-5-rotation": "paper-4.1-rotation",
@@ -27,10 +38,35 @@ CASES = {
     "flight-simulator": "flight-simulator",
 }
 
+
+def draw_gallery() -> None:
+    """Draw all robots that are given joint by joint on one sheet, with their names and without labels."""
+    names = gallery_names()
+    rows = -(-len(names) // COLUMNS)
+    figure = Figure(figsize=(COLUMNS * WIDTH, rows * HEIGHT), facecolor="white")
+    FigureCanvasAgg(figure)
+    for k, name in enumerate(names):
+        left, bottom = k % COLUMNS / COLUMNS, 1 - (k // COLUMNS + 1) / rows
+        axes = figure.add_axes((left + 0.01, bottom + 0.005, 0.98 / COLUMNS, 0.9 / rows))
+        drawing = drawing_of_model(build_model(name))
+        Panel(axes, clearest_view(drawing), drawing).paint()
+        figure.text(left + 0.012, bottom + 0.96 / rows, name, fontsize=24, fontweight="bold", va="top")
+    figure.savefig(FOLDER / "gallery.png", dpi=60, metadata={"Software": None})
+
+
+def case_of_page(page: str, number: int) -> dict[str, object]:
+    """Return the tables of one of the case files that a page of the documentation shows."""
+    text = (FOLDER.parent / page).read_text(encoding="utf-8")
+    blocks = re.findall(r"^```toml\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    return tomllib.loads([block for block in blocks if "[[task]]" in block][number])
+
+
 FOLDER.mkdir(exist_ok=True)
+draw_gallery()
+plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
 for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
-for model in model_names():
+for model in (name for name in model_names() if name not in gallery_names()):
     choices = next(((option.name, option.choices) for option in model_options(model) if option.choices), None)
     variants = (
         [build_model(model)] if choices is None else [build_model(model, {choices[0]: each}) for each in choices[1]]

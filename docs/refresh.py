@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -41,3 +42,17 @@ _put(
     "<!-- end -->",
     _output_of(*check),
 )
+_put(
+    ROOT / "docs" / "robots.md",
+    "<!-- begin: screwsynth models delta -->",
+    "<!-- end -->",
+    f"```text\n{_output_of('models', 'delta')}```\n",
+)
+page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+(shown,) = (each for each in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL) if "[[task]]" in each)
+with tempfile.TemporaryDirectory() as folder:
+    (Path(folder) / "delta.toml").write_text(shown, encoding="utf-8")
+    lines = _output_of("solve", str(Path(folder) / "delta.toml")).splitlines(keepends=True)
+words = ("largest F", "        value", "rb ", "arm ", "p_z ", "actuator rates", "freedoms", "rank of J")
+kept = "".join(line for line in lines if line.startswith(words))
+_put(ROOT / "docs" / "robots.md", "<!-- begin: solve -->", "<!-- end -->", f"```text\n{kept}```\n")

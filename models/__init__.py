@@ -1,8 +1,12 @@
 """Symbolic robots, and the screw algebra in which they are written."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from .arrays import FloatArray, frozen_array, frozen_vector
+from .basis import constraint_rows, rank_of_rows, reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
-from .drawing import Body, Circle, Direction, Link, Mark, MarkKind, Point, Scene
+from .drawing import Body, Circle, Direction, JointKind, JointSymbol, Link, LinkKind, Mark, MarkKind, Point, Scene
 from .hexapod import hexapod
 from .instance import (
     LegInstance,
@@ -15,8 +19,22 @@ from .instance import (
     reason_for_zero_row,
 )
 from .legs import LeggedPlatform, legged_platform
+from .member import Member
 from .model import Model, ModelError
-from .parts import Closure, Dimension, Leg, Parameter, PoseSymbols, Quantity, Unknown, component_names
+from .parts import (
+    Actuator,
+    Closure,
+    Dimension,
+    GenericRanks,
+    JointScrews,
+    Leg,
+    Parameter,
+    PathStructure,
+    PoseSymbols,
+    Quantity,
+    Unknown,
+    component_names,
+)
 from .rotation import (
     AxisAngle,
     axis_angle_from_matrix,
@@ -38,9 +56,14 @@ from .screws import (
 )
 from .stewart_gough import stewart_gough
 from .three_upu import three_upu
-from .wrench import Wrench, WrenchKind, couple_about, force_along
+from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along
+
+if TYPE_CHECKING:
+    from .joints.robot import robot
+    from .joints.words import RobotError
 
 __all__ = [
+    "Actuator",
     "AmbiguousModelError",
     "AxisAngle",
     "Body",
@@ -50,20 +73,29 @@ __all__ = [
     "Direction",
     "Displacement",
     "FloatArray",
+    "GenericRanks",
+    "JointKind",
+    "JointScrews",
+    "JointSymbol",
     "Leg",
     "LegInstance",
     "LeggedPlatform",
     "Link",
+    "LinkKind",
     "Mark",
     "MarkKind",
+    "Member",
     "Model",
     "ModelError",
     "Parameter",
+    "PathStructure",
     "Point",
     "PoseSymbols",
     "Quantity",
+    "RobotError",
     "RobotFunction",
     "RobotInstance",
+    "RowLabel",
     "Scene",
     "Screw",
     "Substitution",
@@ -74,6 +106,7 @@ __all__ = [
     "axis_angle_from_matrix",
     "axis_from_screw",
     "component_names",
+    "constraint_rows",
     "couple_about",
     "displacement",
     "force_along",
@@ -91,8 +124,11 @@ __all__ = [
     "model_names",
     "moved_screw",
     "objective",
+    "rank_of_rows",
     "reason_for_zero_row",
     "reciprocal_product",
+    "reporting_matrix",
+    "robot",
     "robot_function",
     "screw_displacement",
     "screw_from_axis",
@@ -100,3 +136,11 @@ __all__ = [
     "three_upu",
     "unit_vector",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Return a name of :mod:`.joints`, which most runs do not need and which is imported when it is first used."""
+    if name not in ("RobotError", "robot"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found: object = getattr(import_module(".joints", __name__), name)
+    return found

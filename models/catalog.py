@@ -8,8 +8,11 @@ case files, its object is a function that takes the robot's options as keyword a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .hexapod import hexapod
 from .model import Model
@@ -37,9 +40,49 @@ SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
 )
 
 
+#: Folder of the robots that are given joint by joint, one robot file each.
+_GALLERY = Path(__file__).parent / "robots"
+
+
 def model_names() -> tuple[str, ...]:
     """Return the names of all robots on this machine, the shipped ones first, without importing any robot."""
-    return (*SHIPPED, *sorted({offer.point.name for offer in _offers()} - set(SHIPPED)))
+    shipped = (*SHIPPED, *gallery_names())
+    return (*shipped, *sorted({offer.point.name for offer in _offers()} - set(shipped)))
+
+
+def gallery_names() -> tuple[str, ...]:
+    """Return the names of the shipped robots that are given joint by joint, in order."""
+    return tuple(sorted(path.stem for path in _GALLERY.glob("*.toml")))
+
+
+def gallery_description(name: str) -> str | None:
+    """Return what a robot of the gallery is, without building it; None where no robot of the gallery has the name."""
+    return _gallery_tables(name)["description"] if name in gallery_names() else None
+
+
+def _gallery_tables(name: str) -> dict[str, Any]:
+    """Return the tables of a robot of the gallery."""
+    import tomllib  # noqa: PLC0415 - most runs do not need it
+
+    return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def gallery_robot(name: str) -> Model:
+    """Return a shipped robot that is given joint by joint.
+
+    Args:
+        name: one of :func:`gallery_names`.
+
+    Raises:
+        UnknownModelError: there is no such robot.
+    """
+    from .joints import robot  # noqa: PLC0415 - most runs do not need it
+
+    if name not in gallery_names():
+        raise UnknownModelError(name)
+    # A case file names the robot by its file, and people by its own name.
+    return replace(robot(**(_gallery_tables(name) | {"name": name})), options={})
 
 
 def robot_function(name: str) -> RobotFunction:
@@ -54,6 +97,12 @@ def robot_function(name: str) -> RobotFunction:
     """
     if name in SHIPPED:
         return SHIPPED[name]
+    if name in gallery_names():
+
+        def build() -> Model:
+            return gallery_robot(name)
+
+        return build
     offers = {offer.package: offer.point for offer in _offers() if offer.point.name == name}
     if not offers:
         raise UnknownModelError(name)

@@ -1,4 +1,4 @@
-"""The drawing of a robot as symbols: points, links, circles, directions and marks, without colours or line widths."""
+"""The drawing of a robot as symbols: points, links, joints, circles, directions, marks; without colours or widths."""
 
 from __future__ import annotations
 
@@ -26,6 +26,14 @@ class Point:
     body: Body
 
 
+class LinkKind(enum.Enum):
+    """Kind of a straight line: a bar or an edge of an outline, a thin rod, or a rail that a slide runs on."""
+
+    BAR = "bar"
+    ROD = "rod"
+    RAIL = "rail"
+
+
 @dataclass(frozen=True, eq=False)
 class Link:
     """A straight line of the drawing between two named points.
@@ -34,12 +42,57 @@ class Link:
         start, end: names of the two points.
         body: the body that the link moves with.
         limb: name of the limb that the link is part of, if any.
+        kind: bar, rod or rail.
+        row: index, among the rows of the limb, of the one that the link carries alone; None for a link that carries
+            others too.
     """
 
     start: str
     end: str
     body: Body
     limb: str | None = None
+    kind: LinkKind = LinkKind.BAR
+    row: int | None = None
+
+
+class JointKind(enum.Enum):
+    """Kind of a joint, by its letter."""
+
+    REVOLUTE = "R"
+    PRISMATIC = "P"
+    HELICAL = "H"
+    CYLINDRICAL = "C"
+    UNIVERSAL = "U"
+    SPHERICAL = "S"
+    PARALLELOGRAM = "Pa"
+
+    @property
+    def words(self) -> str:
+        """Its name for people."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True, eq=False)
+class JointSymbol:
+    """The symbol of a joint.
+
+    Attributes:
+        name: unique within the drawing: limb and number, such as ``1:2``.
+        kind: of the joint; a parallelogram has a symbol at each of its four hinges.
+        place: (3, 1) in world coordinates, length.
+        axes: each (3, 1) in world coordinates, of any length but zero; none for a spherical joint.
+        body: the body that the joint is drawn with.
+        limb: name of the limb that the joint is part of, if it has a wrench.
+        is_actuated: whether an actuator drives the joint.
+    """
+
+    name: str
+    kind: JointKind
+    place: SX
+    axes: tuple[SX, ...]
+    body: Body
+    limb: str | None = None
+    is_actuated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +164,17 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The drawing of a robot: points and straight links, and optionally circles, directions and marks."""
+    """The drawing of a robot: points and straight links, and optionally circles, directions, marks and joints.
+
+    Joints stand for the round dots at the ends of links, which a drawing without joints has.
+    """
 
     points: tuple[Point, ...] = ()
     links: tuple[Link, ...] = ()
     circles: tuple[Circle, ...] = ()
     directions: tuple[Direction, ...] = ()
     marks: tuple[Mark, ...] = ()
+    joints: tuple[JointSymbol, ...] = ()
 
     @property
     def expressions(self) -> tuple[tuple[str, SX], ...]:
@@ -127,6 +184,7 @@ class Scene:
             *((f"circle {i} {name}", part) for i, circle in enumerate(self.circles) for name, part in _vectors(circle)),
             *((f"direction {item.name}", part) for item in self.directions for part in (item.origin, item.vector)),
             *((f"mark of {mark.parameter}", part) for mark in self.marks for part in mark.points),
+            *((f"joint {each.name}", part) for each in self.joints for part in (each.place, *each.axes)),
         )
 
     def faults(self, limbs: Iterable[str], parameters: Iterable[str]) -> Iterable[str]:
@@ -144,7 +202,8 @@ class Scene:
             for end in (link.start, link.end):
                 if end not in points:
                     yield f"a link ends at {end!r}, which is no point of the drawing"
-        for kind, item in [("link", link) for link in self.links] + [("direction", each) for each in self.directions]:
+        owned = [("link", link) for link in self.links] + [("direction", each) for each in self.directions]
+        for kind, item in [*owned, *(("joint", each) for each in self.joints)]:
             if item.limb is not None and item.limb not in limbs:
                 yield f"a {kind} belongs to limb {item.limb!r}, which has no wrench"
         for mark in self.marks:

@@ -5,19 +5,22 @@ F is written here and nowhere else. For rows ``L_i = (f_i, m_i) / sqrt(square_i)
     F = sum_i (L_i ^ chi)^2,        L_i ^ chi = m_i . omega + f_i . v            (equations 5 and 14)
 
 with moments about the world origin. A row that is a couple is multiplied by the characteristic length, so that its work
-rate has the unit of the others.
+rate has the unit of the others. A :class:`~.member.Member` adds ``|P x(chi)|^2``, the same sum over any orthonormal
+basis of its wrenches; its rows here are all rows of ``P``, which are not independent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
+from .member import Member, resisted_parts, scaled_twists
 from .model import Model
 from .wrench import Wrench, WrenchKind
 
@@ -83,10 +86,10 @@ class RobotInstance:
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
         jacobian: (m, 6) unit wrenches ``J``, force, then moment about the world origin; couple rows multiplied by the
-            characteristic length.
+            characteristic length. The rows of the model's wrenches, then all rows of its members' projectors.
         rates: (m, tasks) work rates ``L_i ^ chi_j``.
         F: (tasks, 1) objective of each task (equation 14).
-        squares: (m, 1) squared length of each row's direction; 0 for a limb of zero length.
+        squares: (w, 1) squared length of the direction of each of the model's wrenches; 0 for a limb of zero length.
         magnitude: (tasks, 1) F without cancellation, never below F; see :func:`magnitude`.
         quantities: (n, 1) values of each of the model's quantities.
         legs: the model's legs.
@@ -94,6 +97,8 @@ class RobotInstance:
         rows: the rows before normalisation.
         inputs: (k, 1) all that these depend on: parameters, unknowns, rotation column after column, position,
             characteristic length, twists.
+        loops: (k, 1) left sides of all loop equations, those beyond the closure included.
+        actuators: (6, a) current unit screw of each of the model's actuators.
     """
 
     parameters: SX
@@ -109,6 +114,8 @@ class RobotInstance:
     closure: SX
     rows: tuple[Wrench, ...]
     inputs: SX
+    loops: SX
+    actuators: SX
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -121,26 +128,34 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
     """
     outputs = [
-        ca.horzcat(*[row.force for row in model.wrenches]),
-        ca.horzcat(*[row.moment for row in model.wrenches]),
-        ca.vertcat(*[row.square for row in model.wrenches]),
+        ca.horzcat(SX(3, 0), *[row.force for row in model.wrenches]),
+        ca.horzcat(SX(3, 0), *[row.moment for row in model.wrenches]),
+        ca.vertcat(SX(0, 1), *[row.square for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure]),
+        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
+        ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
+        *[part for member in model.members for part in (member.centre, member.screws)],
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, *others = function.call(substitution.all)
-    quantities, joints = others[: len(model.quantities)], others[len(model.quantities) :]
+    force, moment, square, closure, loops, actuators, *others = function.call(substitution.all)
+    ends = np.cumsum([len(model.quantities), 2 * len(model.legs)])
+    quantities, joints, parts = others[: ends[0]], others[ends[0] : ends[1]], others[ends[1] :]
+    members = [
+        replace(member, centre=centre, screws=screws)
+        for member, centre, screws in zip(model.members, parts[::2], parts[1::2], strict=True)
+    ]
     rows = [Wrench(row.limb, row.kind, force[:, i], moment[:, i], square[i]) for i, row in enumerate(model.wrenches)]
     return RobotInstance(
         parameters=substitution.parameters,
         rotation=substitution.rotation,
         position=substitution.position,
-        jacobian=jacobian(rows, length),
-        rates=ca.horzcat(*[rates(rows, twist, length) for twist in twists]),
-        F=ca.vertcat(*[objective(rows, twist, length) for twist in twists]),
+        jacobian=jacobian(rows, length, members),
+        rates=ca.horzcat(*[rates(rows, twist, length, members) for twist in twists]),
+        F=ca.vertcat(*[objective(rows, twist, length, members) for twist in twists]),
         squares=square,
-        magnitude=ca.vertcat(*[magnitude(rows, twist, substitution.position, length) for twist in twists]),
+        magnitude=ca.vertcat(*[magnitude(rows, twist, substitution.position, length, members) for twist in twists]),
         quantities=tuple(quantities),
         legs=tuple(
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
@@ -149,55 +164,68 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         closure=closure,
         rows=tuple(rows),
         inputs=ca.veccat(*substitution.all, length, *twists),
+        loops=loops,
+        actuators=actuators,
     )
 
 
-def jacobian(rows: Sequence[Wrench], length: SX) -> SX:
+def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ()) -> SX:
     """Return the Jacobian (m, 6): unit wrenches, force, then moment about the world origin; couples times the length.
 
     Args:
-        rows: m wrenches.
+        rows: wrenches.
         length: (1, 1) characteristic length.
+        members: members, whose rows follow: those of the projector, 3 or 6 each.
     """
-    return ca.vertcat(
-        *[_row_factor(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
-    )
+    own = [_row_factor(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
+    unit_twists = ca.vertcat(ca.horzcat(SX(3, 3), SX.eye(3)), ca.horzcat(SX.eye(3), SX(3, 3)))
+    return ca.vertcat(SX(0, 6), *own, *[_resistance(member, unit_twists, length) for member in members])
 
 
-def rates(rows: Sequence[Wrench], twist: SX, length: SX) -> SX:
+def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
     """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); couples times the length."""
-    return ca.vertcat(*[_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows])
+    own = [_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows]
+    return ca.vertcat(SX(0, 1), *own, *[_resistance(member, twist, length) for member in members])
 
 
-def objective(rows: Sequence[Wrench], twist: SX, length: SX) -> SX:
+def objective(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
     """Return F, (1, 1), in a twist (6, 1) (equation 14).
 
     F is written as a sum of ``(m . omega + f . v)^2 / square`` and not as a sum of squared products of unit vectors:
     the former is smoother and has tighter interval enclosures.
 
     Args:
-        rows: m wrenches.
+        rows: wrenches.
         twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
         length: (1, 1) characteristic length, by which couple rows are multiplied.
+        members: members of limbs, each of which adds ``|P x|^2``.
     """
-    return sum((_scaled_rate(row, twist, length) ** 2 / row.square for row in rows), SX(0))
+    own = sum((_scaled_rate(row, twist, length) ** 2 / row.square for row in rows), SX(0))
+    return own + sum((ca.sumsqr(_resistance(member, twist, length)) for member in members), SX(0))
 
 
-def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX) -> SX:
+def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX, members: Sequence[Member] = ()) -> SX:
     """Return F without cancellation, (1, 1): ``sum (|m_i| |omega| + |f_i| |v|)^2``, never below F.
 
     Moments and velocity are taken at the platform's origin, so that the number does not depend on where the world's
-    origin is.
+    origin is. A member adds the same bound of ``|x|^2`` about its centre.
 
     Args:
-        rows: m wrenches.
+        rows: wrenches.
         twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
         position: (3, 1) origin of the platform frame in the world frame, length.
         length: (1, 1) characteristic length, by which couple rows are multiplied.
+        members: members of limbs.
     """
     omega, v = twist[:3], twist[3:]
     at_origin = ca.norm_2(v + ca.cross(omega, position))
-    return sum(
+    turning = ca.norm_2(omega)
+    of_members = (
+        (at_origin + ca.norm_2(member.centre - position) * turning) ** 2
+        + (0 if member.is_pinned else length * turning) ** 2
+        for member in members
+    )
+    return sum(of_members, SX(0)) + sum(
         (
             _row_factor(row, length) ** 2
             * (
@@ -236,6 +264,12 @@ def reason_for_zero_row(row: Wrench) -> str:
     if row.kind is WrenchKind.COUPLE:
         return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
     return f"limb {row.limb!r} has zero length: its two joints coincide"
+
+
+def _resistance(member: Member, twists: SX, length: SX) -> SX:
+    """Return ``P x``, (size, n), of a member for twists (6, n)."""
+    columns = scaled_twists(member.screws, member.centre, length, member.size)
+    return resisted_parts(columns, member.rank, scaled_twists(twists, member.centre, length, member.size))
 
 
 def _row_factor(row: Wrench, length: SX) -> SX:

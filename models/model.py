@@ -16,10 +16,22 @@ import casadi as ca
 from casadi import SX
 
 from .drawing import Scene
-from .parts import Closure, Leg, Parameter, PoseSymbols, Quantity, Unknown
+from .member import Member
+from .parts import (
+    Actuator,
+    Closure,
+    GenericRanks,
+    JointScrews,
+    Leg,
+    Parameter,
+    PathStructure,
+    PoseSymbols,
+    Quantity,
+    Unknown,
+)
 from .shown import Shown
 from .whole import Whole
-from .wrench import Wrench, WrenchKind
+from .wrench import RowLabel, Wrench, WrenchKind
 
 
 class ModelError(ValueError):
@@ -41,10 +53,16 @@ class Model(Whole, Shown):
         pose: symbols of the platform's pose.
         home: (3,) a sensible platform position for the typical values of the parameters, length.
         wrenches: the rows of the Jacobian, any number of them.
+        members: parts of limbs that resist with a whole space of wrenches; their rows follow those of ``wrenches``.
         quantities: named quantities for results and limits.
         scene: the drawing.
         unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
-        closure: the equations that determine the unknowns.
+        closure: the independent equations that determine the unknowns.
+        loops: all equations of closed loops, which hold where the robot is put together; empty for the closure alone.
+        actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
+        joint_screws: screws of the joints of its limbs, where they are known.
+        generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
+        structure: the structure of each path of joints; empty for a robot given by its rows.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -65,6 +83,12 @@ class Model(Whole, Shown):
     options: Mapping[str, object] = field(default_factory=dict)
     legs: tuple[Leg, ...] = ()
     built: tuple[Wrench, ...] = ()
+    members: tuple[Member, ...] = ()
+    loops: tuple[Closure, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    joint_screws: tuple[JointScrews, ...] = ()
+    generic: GenericRanks | None = None
+    structure: tuple[PathStructure, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
@@ -74,19 +98,31 @@ class Model(Whole, Shown):
         _check_references(self)
 
     def __repr__(self) -> str:
-        options = "".join(f", {key}={value!r}" for key, value in self.options.items())
-        counts = f"{len(self.parameters)} parameters, {len(self.limbs)} limbs, {len(self.wrenches)} rows"
+        options = "".join(f", {key}={value!r}" for key, value in self.options.items() if not isinstance(value, Mapping))
+        counts = f"{len(self.parameters)} parameters, {len(self.limbs)} limbs, {len(self.rows)} rows"
         return f"<Model {self.name!r}{options}: {counts}>"
 
     @property
     def limbs(self) -> tuple[str, ...]:
         """Limb names, each once, in the order of their first row."""
-        return tuple(dict.fromkeys(row.limb for row in self.wrenches))
+        return tuple(dict.fromkeys([*(row.limb for row in self.wrenches), *(member.limb for member in self.members)]))
+
+    @property
+    def rows(self) -> tuple[RowLabel, ...]:
+        """Limb and kind of each row of the Jacobian as results state it: for a member, a basis of its wrenches."""
+        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, kind) for each in self.members for kind in each.kinds))
+
+    @property
+    def frame_rows(self) -> tuple[RowLabel, ...]:
+        """Limb and kind of each row of a :class:`~.instance.RobotInstance`: for a member, all rows of its projector."""
+        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, each.kind) for each in self.members for _ in range(each.size)))
 
     @property
     def has_couples(self) -> bool:
-        """Whether a row is a constraint couple, so that F depends on a characteristic length."""
-        return any(row.kind is WrenchKind.COUPLE for row in self.wrenches)
+        """Whether a row has a couple that counts, so that F depends on a characteristic length."""
+        return any(row.kind is not WrenchKind.FORCE for row in self.rows)
 
 
 def _model_error(model: Model, fault: str) -> ModelError:
@@ -96,7 +132,7 @@ def _model_error(model: Model, fault: str) -> ModelError:
 
 def _check_names(model: Model) -> None:
     """Refuse a model without wrenches, names that appear twice and unknowns without finite bounds."""
-    if not model.wrenches:
+    if not (model.wrenches or model.members):
         raise _model_error(model, "it has no wrenches, so it has no Jacobian")
     names = [name for parameter in model.parameters for name in parameter.components]
     names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
@@ -131,8 +167,14 @@ def _check_shapes(model: Model) -> None:
     expected += [
         (item.name, item.symbol, (3 if item.is_direction else len(item.typical), 1)) for item in model.parameters
     ]
+    for index, member in enumerate(model.members):
+        expected += [
+            (f"member {index} centre", member.centre, (3, 1)),
+            (f"member {index} screws", member.screws, (6, member.screws.shape[1])),
+        ]
+    expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
-    expected += [(equation.name, equation.expression, (1, 1)) for equation in model.closure]
+    expected += [(each.name, each.expression, (1, 1)) for each in (*model.closure, *model.loops)]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
     expected += [(name, expression, (3, 1)) for name, expression in model.scene.expressions]
     for leg in model.legs:
@@ -154,7 +196,10 @@ def _check_symbols(model: Model) -> None:
         raise _model_error(model, "a symbol stands for two things")
     used: Iterable[SX] = [
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
-        *(equation.expression for equation in model.closure),
+        *(part for member in model.members for part in (member.centre, member.screws)),
+        *(each.screw for each in model.actuators),
+        *(part for each in model.joint_screws for part in (each.passive, each.all)),
+        *(equation.expression for equation in (*model.closure, *model.loops)),
         *(quantity.values for quantity in model.quantities),
         *(expression for _, expression in model.scene.expressions),
         *(joint for leg in model.legs for joint in (leg.base, leg.platform)),

@@ -148,3 +148,79 @@ class Leg:
     def built(self) -> Leg:
         """The leg between joint centres with their errors."""
         return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """An actuated joint of a limb given joint by joint.
+
+    Attributes:
+        name: unique within the model.
+        limb: name of the limb that it is part of.
+        screw: (6, 1) its current unit screw as a twist, the world's origin as reference.
+        dimension: length for a slide or a parallelogram, angle for a rotation.
+    """
+
+    name: str
+    limb: str
+    screw: SX
+    dimension: Dimension
+
+
+@dataclass(frozen=True, eq=False)
+class JointScrews:
+    """Current screws of a limb's joints, whose ranks tell a limb's singularities.
+
+    Attributes:
+        limb: name of the limb.
+        passive: (6, n) screws of its passive joints as twists, the world's origin as reference.
+        all: (6, k) screws of all its joints.
+        passive_rank, all_rank: their ranks at almost all dimensions and poses.
+    """
+
+    limb: str
+    passive: SX
+    all: SX
+    passive_rank: int
+    all_rank: int
+
+
+@dataclass(frozen=True)
+class GenericRanks:
+    """Ranks of a robot given joint by joint, at almost all dimensions and closed configurations.
+
+    Attributes:
+        jacobian: rank of all rows.
+        constraints: rank of the wrenches that do no work in the actuated joints: the platform has six freedoms less
+            this rank.
+    """
+
+    jacobian: int
+    constraints: int
+
+
+@dataclass(frozen=True)
+class PathStructure:
+    """Structure of a path of joints from base to platform, for almost all dimensions and poses.
+
+    Attributes:
+        limb: name of the limb.
+        name: of the path: that of the limb, with the number of the branch where there are several.
+        joints: letters of its joints from base to platform, an actuated one with a star.
+        opened: the place at which its loop is opened, in words.
+        wrenches: dimension of the wrenches with which it resists the platform, actuators locked: of ``W``.
+        constraints: dimension of those that do no work in its actuated joints: of ``C``.
+        unknowns: number of its joint variables that are unknowns and that no path before it has.
+        equations: number of its loop equations.
+        kept: number of those that do not follow from others.
+    """
+
+    limb: str
+    name: str
+    joints: str
+    opened: str
+    wrenches: int
+    constraints: int
+    unknowns: int
+    equations: int
+    kept: int

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
@@ -14,6 +15,14 @@ class WrenchKind(enum.Enum):
 
     FORCE = "force"
     COUPLE = "couple"
+    WRENCH = "wrench"
+
+
+class RowLabel(NamedTuple):
+    """Limb and kind of a row of the Jacobian."""
+
+    limb: str
+    kind: WrenchKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +35,7 @@ class Wrench:
 
     Attributes:
         limb: name of the limb that applies it.
-        kind: a force along a line, or a constraint couple.
+        kind: a force along a line, or a constraint couple; rows that are neither belong to members.
         force: (3, 1) in world coordinates, of any length but zero; zero for a couple.
         moment: (3, 1) about the world origin; the direction of the couple for a couple.
         square: (1, 1) squared length of ``force``, or of ``moment`` for a couple.

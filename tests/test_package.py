@@ -2,6 +2,7 @@
 
 import ast
 import html
+import importlib.util
 import os
 import pkgutil
 import re
@@ -165,14 +166,56 @@ def test_links_in_the_documentation_lead_somewhere() -> None:
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_the_robot_of_the_documentation_is_a_model() -> None:
+def test_the_robots_of_the_documentation_are_models(capsys: pytest.CaptureFixture[str]) -> None:
     text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     space: dict[str, object] = {}
-    exec(compile(code, "robots.md", "exec"), space)  # noqa: S102 - our own page
+    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert len(blocks) == 2
+    for code in blocks:
+        exec(compile(code, "robots.md", "exec"), space)  # noqa: S102 - our own page
+    assert capsys.readouterr().out.startswith("F = ")
     model = space["tripod"](crossed=True)  # type: ignore[operator]
     assert isinstance(model, screwsynth.models.Model)
     assert model.limbs == ("1", "2", "3")
+
+
+def test_the_robot_files_of_the_documentation_are_read() -> None:
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    files = [tomllib.loads(each) for each in re.findall(r"^```toml\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)]
+    robots = [each for each in files if "limb" in each]
+    assert [each["name"] for each in robots] == ["my-robot", "Delta"]
+    folder = Path(screwsynth.models.__file__).parent / "robots"
+    shipped = tomllib.loads((folder / "delta.toml").read_text(encoding="utf-8"))
+    # The same robot as the shipped one, whose file has a description too.
+    assert robots[1] == {key: value for key, value in shipped.items() if key != "description"}
+    assert screwsynth.models.robot(**robots[0]).limbs == ("1", "2", "3")
+
+
+def test_the_delta_of_the_documentation_is_what_the_commands_print(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    (case,) = (each for each in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if "[[task]]" in each)
+    (tmp_path / "delta.toml").write_text(case, encoding="utf-8")
+    for opening, arguments in (
+        ("screwsynth models delta", ["models", "delta"]),
+        ("solve", ["solve", str(tmp_path / "delta.toml")]),
+    ):
+        (shown,) = re.findall(rf"<!-- begin: {opening} -->\n```text\n(.*?)```", text, flags=re.DOTALL)
+        command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        lines = [line.rstrip() for line in printed.splitlines()]
+        assert shown
+        assert [line for line in shown.splitlines() if line not in lines] == []
+
+
+def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
+    spec = importlib.util.spec_from_file_location("docs_gallery", ROOT / "docs" / "gallery.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    (written,) = re.findall(r"<!-- begin: gallery -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
+    assert written == module.table(), "run `make docs`"
 
 
 def test_the_case_file_of_the_documentation_is_valid() -> None:

@@ -127,7 +127,7 @@ class TableOrigins:
         return CaseError(f"row {row}{where}", error.fault, error.value, source.file)
 
 
-def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
+def named_csv_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
     """Return the CSV files that a document names.
 
     Args:

@@ -17,8 +17,16 @@ from .limits.limits import Limits
 from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 from .overrides import Settings, override_number
 from .pose import Free, OverPoses, Pose, Rotation, Value
-from .robots import build_model
-from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable, parse_document
+from .robots import insert_robot_file, model_of_table
+from .schema import (
+    Document,
+    ExpectTable,
+    PublishedTable,
+    Range,
+    RotationTable,
+    TaskTable,
+    parse_document,
+)
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, read_text, tables_of
 from .task import Method, Sense, Task, unit_twist
@@ -85,29 +93,31 @@ def case_from_tables(
     origins = TableOrigins()
     try:
         origins = insert_rows(tables, folder or Path())
+        robot_file = insert_robot_file(tables, folder or Path())
         written = parse_document(tables)
         if settings:
             for key, value in settings.items():
                 override_number(tables, key, value)
             written = parse_document(tables)
-        return _case_of(written, name, source)
+        return _case_of(written, name, source, robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
 
 
-def _case_of(written: Document, name: str, source: str) -> Case:
+def _case_of(written: Document, name: str, source: str, robot_file: str | None = None) -> Case:
     """Return the case of a document.
 
     Args:
         written: the document.
         name: name of the case in results.
         source: name of the document in messages.
+        robot_file: name of the file from which the robot's definition is; None where the document has it.
 
     Raises:
         CaseError: the document holds a fault.
     """
     units = Units(written.units.length, written.units.angle)
-    model = build_model(written.robot.model, written.robot.options)
+    model = model_of_table(written.robot, robot_file)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}

@@ -80,9 +80,14 @@ class UnitsTable(Table):
 class RobotTable(Table):
     """The robot: its model, the model's own options, and its dimensions."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={"oneOf": [{"required": [each]} for each in ("model", "file", "definition")]},
+    )
 
-    model: str = Field(description="name of the robot; `screwsynth models` lists them")
+    model: str | None = Field(default=None, description="name of the robot; `screwsynth models` lists them")
+    file: FileName | None = Field(default=None, description="robot file beside this one, instead of a name")
+    definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of a name")
     parameters: dict[str, VectorOrValue] = Field(
         default_factory=dict, description="a number or { min, max } for each parameter; a list of three for a point"
     )
@@ -91,6 +96,16 @@ class RobotTable(Table):
         gt=0,
         description="length by which unit couples are made comparable with unit forces",
     )
+
+    @model_validator(mode="after")
+    def _refuse_two_robots(self) -> RobotTable:
+        """Return the table, or refuse one that gives no robot, or gives it twice."""
+        if self.model is None and self.definition is None:
+            raise PydanticCustomError("reason", "{fault}", {"key": "model", "fault": "is missing"})
+        if self.model is not None and self.definition is not None:
+            fault = "cannot stand beside model: give the robot in one way"
+            raise PydanticCustomError("reason", "{fault}", {"key": "definition", "fault": fault})
+        return self
 
     @property
     def options(self) -> dict[str, Any]:

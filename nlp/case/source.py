@@ -1,4 +1,4 @@
-"""Files of cases: found by name, read as text and as tables, with the CSV files that they name.
+"""Files of cases: found by name, read as text and as tables, with the CSV and robot files that they name.
 
 A case is named by its path; a shipped case also by its bare name.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 from ... import cases
 from ..errors import InputError, nearest
-from .csvrows import named_files
+from .csvrows import named_csv_files
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
 _LARGEST_FILE = 4 * 2**20
@@ -90,6 +90,19 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
+    """Return the CSV files and the robot file that a document names, which need not exist.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it.
+        folder: folder of the document, beside which the files are.
+    """
+    robot = tables.get("robot")
+    file = robot.get("file") if isinstance(robot, dict) else None
+    of_robot = (folder / file,) if isinstance(file, str) and file else ()
+    return (*named_csv_files(tables, folder), *of_robot)
 
 
 def inputs_of(path: Path, tables: Mapping[str, Any]) -> Mapping[Path, str]:

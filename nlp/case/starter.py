@@ -8,12 +8,19 @@ from collections.abc import Sequence
 
 from ...models import Dimension, Model, Parameter
 from ..units import Units
+from .plain import plain_value
 from .settings import Search
+from .toml import toml_text
 
 _UNITS = Units("cm", "deg")
 
 #: Half range of a starter's free numbers, as a part of their typical values.
 _SPREAD = 0.25
+#: Other rotations, for a robot that can make them: one with fewer than six freedoms keeps to its own.
+_ROTATIONS = (
+    "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
+    "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
+)
 
 
 def starter_case(model: Model) -> str:
@@ -25,8 +32,12 @@ def starter_case(model: Model) -> str:
         model: the robot.
     """
     z, search = model.home[2], Search()
-    reach = _SPREAD * abs(z) or 1.0
-    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items()]
+    lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
+    reach = _SPREAD * (math.hypot(*model.home) or max(lengths, default=0.0)) or 1.0
+    position = ", ".join(_free_number(value, reach) for value in model.home)
+    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
+    definition = model.options.get("definition")
+    robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -35,7 +46,7 @@ def starter_case(model: Model) -> str:
         f'angle = "{_UNITS.angle}"               # or "rad"',
         "",
         "[robot]",
-        f'model = "{model.name}"',
+        robot,
         *options,
         *(
             ["characteristic_length = 1   # by which unit couples count beside unit forces"]
@@ -48,10 +59,9 @@ def starter_case(model: Model) -> str:
         *(_parameter_line(parameter, is_free=index == 0) for index, parameter in enumerate(model.parameters)),
         "",
         "[pose]                        # of the platform in the base's frame, z along the base's normal",
-        f"position = [{_free_number(0, reach)}, {_free_number(0, reach)}, {_free_number(z, reach)}]",
+        f"position = [{position}]",
         "rotation = { angle = { min = -20, max = 20 } }                        # any axis, at most 20 deg",
-        "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
-        "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
+        *(_ROTATIONS if model.generic is None or model.generic.constraints == 0 else ()),
         "",
         "[[task]]                      # the motion that the platform must make",
         'name = "my task"',

@@ -9,16 +9,17 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
-from ..errors import CaseError, one_line
+from ..errors import CaseError
 from ..units import Units
 from .case import Case
 from .displacements import written_displacements
+from .plain import plain_value
 from .pose import Free, Pose, Value
 from .reader import case_from_tables
 from .settings import Expectation, Search
@@ -62,8 +63,9 @@ def _lines(case: Case) -> Iterator[str]:
     yield from toml_lines({"title": case.title or None})
     yield from toml_table("[units]", {"length": units.length, "angle": units.angle})
     length = case.characteristic_length if model.has_couples else None
-    options: dict[str, TomlValue | None] = {key: _plain(value) for key, value in model.options.items()}
-    yield from toml_table("[robot]", {"model": model.name, **options, "characteristic_length": length})
+    options: dict[str, TomlValue | None] = {key: plain_value(value) for key, value in model.options.items()}
+    name = None if "definition" in options else model.name
+    yield from toml_table("[robot]", {"model": name, **options, "characteristic_length": length})
     parameters: dict[str, TomlValue] = {}
     for item in model.parameters:
         values = case.components(item.name)
@@ -187,21 +189,6 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
     return found
 
 
-def _plain(value: object) -> TomlValue:
-    """Return the value of a robot's option as TOML has it; a tuple is a list.
-
-    Raises:
-        CaseError: TOML has no such value.
-    """
-    if isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): _plain(part) for key, part in value.items()}
-    if isinstance(value, Sequence):
-        return [_plain(part) for part in value]
-    raise CaseError("robot", f"has an option that cannot be written to a case file: {one_line(repr(value))[:60]}")
-
-
 def _are_same(one: Model, other: Model) -> bool:
     """Return whether two robots have the same parameters, rows and measures: their values are equal at a point."""
     names = [[item.components for item in model.parameters] for model in (one, other)]
@@ -212,6 +199,7 @@ def _are_same(one: Model, other: Model) -> bool:
 
     def rows(model: Model) -> FloatArray:
         outputs = [part for row in model.wrenches for part in (row.force, row.moment)]
+        outputs += [ca.vec(part) for each in model.members for part in (each.centre, each.screws)]
         outputs += [*(each.values for each in model.quantities), *(each.expression for each in model.closure)]
         function = ca.Function("model", Substitution.identity(model).all, [ca.vertcat(*outputs)])
         return np.array(function.call(point)[0])

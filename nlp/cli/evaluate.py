@@ -31,7 +31,7 @@ def evaluate(
     """
     from ..case.reader import read_case
     from ..evidence import state
-    from ..evidence.kkt import close_equations
+    from ..evidence.closing import closed_start
     from ..output.files import check_outputs
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
@@ -42,7 +42,7 @@ def evaluate(
     check_outputs(given.inputs, {"--json": json_file, "--csv": csv_file})
     check_csv(csv_file, table, json_file, loaded, at_point=True)
     nlps = formulate_each(loaded)
-    x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
+    x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     if json_file is not None:
         write_json(json_file, result)

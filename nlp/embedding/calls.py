@@ -141,7 +141,9 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
             inputs = ca.veccat(robot.position, robot.rotation, leg.platform, leg.base)
             calls.append(InnerCall(Call(Form(span_of_leg), inputs), leg.span))
         rows = [_inputs_of_row(row, legs) for row in robot.rows]
-        if len(program.robots) == 1 or all(row.form == _FORCE_OF_LEG for row in rows):
+        # The rows of a member are those of one projector: they are no rows that one form gives each by itself.
+        is_by_row = len(program.robots) == 1 or all(row.form == _FORCE_OF_LEG for row in rows)
+        if is_by_row and not program.model.members:
             calls += _calls_of_rows(robot, rows)
         if len(program.robots) > 1:
             values = robot_values(robot)

@@ -156,7 +156,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
     n, c = nlp.n, len(program.constraints)
-    rows = len(program.model.wrenches)
+    rows = len(program.model.frame_rows)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c, and multipliers. A test in solver.c keeps it from compiling with too little.
@@ -236,9 +236,9 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
         string_table(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
         number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
-        "/* Rows of the Jacobian: the limb of each, and whether it applies a force or a couple. */",
-        string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.wrenches]),
-        string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.wrenches]),
+        "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
+        string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.frame_rows]),
+        string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.frame_rows]),
         "/* Constraints: names and bounds; 1e300 is none. */",
         string_table(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
         number_table(f"{prefix}_constraint_lower", C, lower),

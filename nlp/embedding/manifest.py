@@ -68,7 +68,7 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
             {"name": each.name, "lower": _finite(lower), "upper": _finite(upper)}
             for each, lower, upper in zip(program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
         ],
-        "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.wrenches],
+        "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.frame_rows],
         "tasks": [{"name": task.name, "twist": np.asarray(task.twist).tolist()} for task in case.tasks],
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],

@@ -38,6 +38,8 @@ _NOTABLE = 1e-10
 #: Largest number of Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a
 #: change of the active set, or an optimum where F is flatter than a parabola, takes more.
 _NEWTON_STEPS = 40
+#: Steps with some of the variables only, before more may move: from home, loops close in five or six.
+_FIRST_STEPS = 12
 #: Largest step of a correction in a scaled variable: a correction improves a point and does not search.
 _LONGEST_STEP = 0.1
 #: Singular values below this part of the largest are zero in the Newton system, which is singular at optima that are
@@ -296,7 +298,8 @@ def _newton_step(
 def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
     """Return the point, nearest to the given one to first order, at which the program's equations hold.
 
-    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops.
+    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
+    the robot has internal unknowns, these move alone if that closes the loops, else with the pose, else with all.
 
     Args:
         nlp: the program.
@@ -305,11 +308,30 @@ def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
     Returns:
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
     """
-    at = linearise(nlp, x)
-    for _ in range(_NEWTON_STEPS):
-        rows = np.flatnonzero(nlp.sides.equal)
-        if not len(rows) or np.max(np.abs(at.residual[rows])) <= _ROUNDING or not np.isfinite(at.violation):
+    start = linearise(nlp, x)
+    rows = np.flatnonzero(nlp.sides.equal)
+    if not len(rows):
+        return start.x
+    at = start
+    for movable in _movable(nlp):
+        at = start
+        for _ in range(_NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS):
+            if np.max(np.abs(at.residual[rows])) <= _ROUNDING or not np.isfinite(at.violation):
+                break
+            step = np.zeros(nlp.n)
+            step[movable] = np.linalg.lstsq(at.normals[rows][:, movable], -at.residual[rows], rcond=None)[0]
+            at = linearise(nlp, np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper))
+        if np.max(np.abs(at.residual[rows])) <= FEASIBLE:
             break
-        step = np.linalg.lstsq(at.normals[rows], -at.residual[rows], rcond=None)[0]
-        at = linearise(nlp, np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper))
     return at.x
+
+
+def _movable(nlp: Nlp) -> list[list[int]]:
+    """Return the indices of the variables that close a program's equations: the unknowns, then more, then all."""
+    places, every = nlp.program.places, list(range(nlp.n))
+    unknowns = sorted({index for at_pose in places.unknowns for index in at_pose})
+    if not unknowns:
+        return [every]
+    count = sum(len(item.typical) for item in nlp.program.model.parameters)
+    dimensions = {place.index for place in places.numbers[:count] if place.vector == "x"}
+    return [unknowns, [index for index in every if index not in dimensions], every]

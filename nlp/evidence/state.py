@@ -8,7 +8,15 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...models import Displacement, FloatArray, axis_angle_from_matrix, frozen_array, homogenised, reason_for_zero_row
+from ...models import (
+    Displacement,
+    FloatArray,
+    axis_angle_from_matrix,
+    frozen_array,
+    homogenised,
+    reason_for_zero_row,
+    reporting_matrix,
+)
 from ..case.case import Case
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
@@ -20,6 +28,8 @@ ZERO_F = 1e-12
 #: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
 #: the square root of the rounding unit of double precision: a point known to rounding error gives no better accuracy.
 ZERO_SINGULAR_VALUE = 1.5e-8
+#: Largest residual of a loop equation, of order 1, of a closed loop: in another assembly it is of order 0.1.
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +109,14 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
-    rotation, position, jacobian, rates = numbers.rotation, numbers.position, numbers.jacobian, numbers.rates
+    rotation, position = numbers.rotation, numbers.position
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if not square > 0:
             raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
-    if not (np.isfinite(jacobian).all() and np.isfinite(rates).all() and np.isfinite(rotation).all()):
+    if not all(np.isfinite(each).all() for each in (numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
+    reporting = reporting_matrix(model, numbers.jacobian, numbers.actuators)
+    jacobian, rates = reporting @ numbers.jacobian, reporting @ numbers.rates
     axis, angle = axis_angle_from_matrix(rotation)
     stated, step = _pose_displacements(case)[pose]
     if step.is_identity:
@@ -122,7 +134,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
         axis=axis,
         angle=angle,
         jacobian=frozen_array(jacobian, jacobian.shape),
-        rates=frozen_array(rates[:, 0], (len(model.wrenches),)),
+        rates=frozen_array(rates[:, 0], (len(model.rows),)),
         F=float(numbers.F[0, 0]),
         size=float(numbers.magnitude[0, 0]),
         singular_values=frozen_array(singular_values, singular_values.shape),
@@ -135,6 +147,17 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             }
         ),
     )
+
+
+def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
+    """Return whether all loop equations of the robot hold at a point (n,), those beyond the program's own included.
+
+    The program has independent equations only, which other ways to assemble the joints fulfil too.
+    """
+    if not nlp.program.model.loops:
+        return True
+    states = (kernel(x, nlp.arguments) for kernel in nlp.program.kernels.robot_states)
+    return all(float(np.abs(each.loops).max(initial=0.0)) <= _CLOSED for each in states)
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:

@@ -43,6 +43,7 @@ from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError
 from .limits import ProgramNumbers, limit_constraints
+from .loops import needed_equations
 from .places import FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
 
 
@@ -145,7 +146,8 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         if item.is_direction
     ]
     values = ca.vertcat(SX(0, 1), *[placed.symbols for placed in parameters])
-    robots = []
+    robots: list[RobotInstance] = []
+    loops: list[BoundedConstraint] = []
     poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.displacements]
     for k, (rotation, position) in enumerate(poses):
         own_unknowns = ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]])
@@ -153,13 +155,16 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         robot = instantiate(model, substitution, length, [twist.symbols for twist in twists])
         robots.append(robot)
         where = f" pose {k + 1}" if len(poses) > 1 else ""
-        constraints += [
+        loops += [
             BoundedConstraint(
                 Constraint(f"{equation.name}{where}", robot.closure[i], Reading(Dimension.NUMBER)), 0.0, 0.0
             )
             for i, equation in enumerate(model.closure)
         ]
-    constraints = _variable_constraints(case, constraints, table)
+    if model.loops:
+        own = [each.places[0].index for at_pose in unknowns for each in at_pose]
+        loops = [loops[k] for k in needed_equations([item.constraint.expression for item in loops], table, own)]
+    constraints = _variable_constraints(case, [*constraints, *loops], table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
     limits = limit_constraints(
         case,

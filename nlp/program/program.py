@@ -57,6 +57,8 @@ class RobotNumbers(NamedTuple):
         F: (tasks, 1) objective of each task.
         squares: (m, 1) squared length of each row's direction.
         magnitude: (tasks, 1) F without cancellation.
+        loops: (k, 1) left sides of all the model's loop equations.
+        actuators: (6, a) current unit screws of the model's actuators.
         quantities: (n, 1) values of each of the model's quantities, radians for angles.
     """
 
@@ -68,13 +70,27 @@ class RobotNumbers(NamedTuple):
     F: FloatArray
     squares: FloatArray
     magnitude: FloatArray
+    loops: FloatArray
+    actuators: FloatArray
     quantities: tuple[FloatArray, ...]
 
     @classmethod
     def from_outputs(cls, *outputs: FloatArray) -> RobotNumbers:
         """Return the numbers from the outputs of :meth:`Program.robot_state`."""
-        parameters, rotation, position, jacobian, rates, F, squares, magnitude, *quantities = outputs
-        return cls(parameters, rotation, position, jacobian, rates, F, squares, magnitude, tuple(quantities))
+        parameters, rotation, position, jacobian, rates, F, squares, magnitude, loops, actuators = outputs[:10]
+        return cls(
+            parameters,
+            rotation,
+            position,
+            jacobian,
+            rates,
+            F,
+            squares,
+            magnitude,
+            loops,
+            actuators,
+            tuple(outputs[10:]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +166,7 @@ class Program(Whole):
         """Return the function ``(x, p) -> RobotNumbers`` at one of the poses; its last outputs are the quantities."""
         robot = self.robots[pose]
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
-        outputs += [robot.squares, robot.magnitude, *robot.quantities]
+        outputs += [robot.squares, robot.magnitude, robot.loops, robot.actuators, *robot.quantities]
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
 
     @cached_property

@@ -148,6 +148,38 @@ class PosesData(JsonObject):
     poses: tuple[PoseStateData, ...]
 
 
+class ActuatorData(JsonObject):
+    """An actuated joint of a robot given joint by joint.
+
+    Attributes:
+        name: of the actuator: its limb, with a number where the limb has several.
+        kind: ``angle`` or ``length``.
+        rate: for the task's motion, radians or length per unit of time; null where it cannot drive the platform.
+    """
+
+    name: str
+    kind: Literal["angle", "length"]
+    rate: float | None
+
+
+class JointsData(JsonObject):
+    """Joints of a robot given joint by joint, at its first pose.
+
+    Attributes:
+        freedoms: of the platform with free actuators.
+        actuators: with their rates for the task's motion; absent where there are several tasks.
+        constrained: part of F that constraints carry, which no actuator can move with; 0 for a motion that is possible.
+        singularities: sentences about the singularities found.
+        assembly: sentences about joints that are assembled in another way than at home, or perhaps; empty for home's.
+    """
+
+    freedoms: int
+    actuators: Absent[tuple[ActuatorData, ...]]
+    constrained: Absent[float]
+    singularities: tuple[str, ...]
+    assembly: tuple[str, ...]
+
+
 class RobotData(JsonObject):
     """The robot at a point; with several poses, at the first.
 
@@ -166,6 +198,7 @@ class RobotData(JsonObject):
         quantities: leg lengths, joint angles and the like, by limb.
         limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
         characteristic_length: that relates couples to forces; absent for robots without constraint couples.
+        joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
         several: the robot at every pose; absent where there is one.
     """
 
@@ -183,6 +216,7 @@ class RobotData(JsonObject):
     quantities: Mapping[str, ByOwner]
     limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
+    joints: Absent[JointsData]
     several: Inline[PosesData | None]
 
 

@@ -15,15 +15,19 @@ import numpy as np
 from ...models import Dimension, FloatArray, Quantity, axis_from_screw
 from .. import __version__
 from ..case.case import Case
+from ..evidence.assembly import assembly_of
 from ..evidence.kkt import FEASIBLE, linearise
+from ..evidence.mobility import mobility_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .jsondata import Vector, matrix, vector
+from .jsondata import Vector, finite_or_none, matrix, vector
 from .parts import (
     SCHEMA,
+    ActuatorData,
     ByOwner,
     HeadData,
+    JointsData,
     MotionData,
     PoseData,
     PosesData,
@@ -78,7 +82,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         parameters=parameters_data(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
         task=None if task is None else task_data(case, task),
-        limbs=tuple(row.limb for row in case.model.wrenches),
+        limbs=tuple(row.limb for row in case.model.rows),
         jacobian=matrix(state.jacobian),
         rates=None if task is None else vector(state.rates),
         rank=state.rank,
@@ -89,7 +93,33 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         quantities=_quantities(case, state),
         limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
+        joints=_joints_data(nlp, x, state, with_task=task is not None),
         several=several,
+    )
+
+
+def _joints_data(nlp: Nlp, x: FloatArray, state: RobotState, *, with_task: bool) -> JointsData | None:
+    """Return the joints of a robot given joint by joint; None for others."""
+    found = mobility_of(nlp, x, state)
+    if found is None:
+        return None
+    assembly = assembly_of(nlp, x, state)
+    actuators = (
+        ActuatorData(
+            name=each.name,
+            kind="angle" if each.dimension is Dimension.ANGLE else "length",
+            rate=finite_or_none(found.actuator_rates.get(each.name, math.inf)),
+        )
+        for each in nlp.program.model.actuators
+    )
+    return JointsData(
+        freedoms=found.freedoms,
+        actuators=tuple(actuators) if with_task else None,
+        constrained=found.constrained if with_task else None,
+        singularities=tuple(
+            f"{'' if each.limb is None else f'limb {each.limb}: '}{each.kind.value}" for each in found.singularities
+        ),
+        assembly=() if assembly is None else assembly.sentences,
     )
 
 

@@ -139,13 +139,13 @@ def _signed_angle(case: Case, index: int, pose: PoseStateData) -> float:
 
 def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterator[TextTable]:
     """Yield the rates, then each measure, with a row for each pose and a column for each limb."""
-    rows, task = case.model.wrenches, robot.task
+    rows, task = case.model.rows, robot.task
     folded = len(several.poses) - _POSES
     folded = folded if folded >= FEWEST_FOLDED else 0
     if task is not None:
         values = [_settled_pose_F(pose, task) for pose in several.poses]
         marks = ["worst" if worst else "" for worst in _worst(values, task)]
-        couples = any(row.kind is WrenchKind.COUPLE for row in rows)
+        couples = any(row.kind is not WrenchKind.FORCE for row in rows)
         unit = rate_unit(task.motion.twist, case.units)
         labels = [f"{row.limb} {row.kind.value}\n{unit}" if couples else f"{row.limb}\n{unit}" for row in rows]
         cells = []
@@ -179,7 +179,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
     if task is not None and robot.rates is not None:
         sizes = rate_sizes(robot.jacobian, task.motion.twist, robot.pose.position)
         rates = settled_rates(robot.rates, sizes, is_free=bool(robot.task_is_free))
-    couples = any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
+    couples = any(row.kind is not WrenchKind.FORCE for row in model.rows)
     measures = _measures(case, robot)
     found: list[Mapping[str, str]] = [
         dict(zip(each.of(robot), _measure_cells(each.of(robot), list(each.of(robot)), each, case), strict=True))
@@ -187,7 +187,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
     ]
     total = sum(rate**2 for rate in rates)
     rows = []
-    for k, row in enumerate(model.wrenches):
+    for k, row in enumerate(model.rows):
         cells = [row.limb, *([row.kind.value] if couples else [])]
         if rates:
             part = 100 * rates[k] ** 2 / total if total > 0 else 0.0
@@ -204,7 +204,7 @@ def jacobian_table(case: Case, robot: RobotData) -> TextTable:
     """Return the Jacobian: forces are parts of a unit vector, and moments have the error of the longest arm."""
     arm = max((abs(value) for row in robot.jacobian for value in row[3:]), default=0.0)
     rows = []
-    for row, values in zip(case.model.wrenches, robot.jacobian, strict=True):
+    for row, values in zip(case.model.rows, robot.jacobian, strict=True):
         cells = [number(value, 1.0, digits=6, signed=True) for value in values[:3]]
         cells += [number(value, arm, digits=6, signed=True) for value in values[3:]]
         rows.append((row.limb, *cells))

@@ -42,11 +42,40 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
             for item in model.parameters
         ),
     )
-    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.wrenches)]
+    if model.structure:
+        yield from _structure_words(model)
+    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "measures", "what it is"), tuple(rows))
+
+
+def _structure_words(model: Model) -> Iterator[Line | TextTable]:
+    """Yield the structure of a robot given joint by joint: its members, ranks and freedoms, and its opened loops."""
+    rows = [(each.name, each.joints, str(each.wrenches), str(each.constraints)) for each in model.structure]
+    yield TextTable(("member", "joints (* actuated)", "dim W", "dim C"), tuple(rows))
+    if model.generic is not None:
+        freedoms, rank = 6 - model.generic.constraints, model.generic.jacobian
+        yield Line(f"{freedoms} with free actuators", label="freedoms")
+        yield Line(f"{rank} of all wrenches, {model.generic.constraints} of the constraints", label="ranks")
+    unknowns, every = len(model.unknowns), sum(each.equations for each in model.structure)
+    if every == 0:
+        yield Line("closed by the pose alone: no unknowns, no equations", label="loops")
+        return
+    loops = [
+        (each.name, each.opened, str(each.unknowns), str(each.equations), str(each.equations - each.kept))
+        for each in model.structure
+    ]
+    yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
+    kept = len(model.closure)
+    words = f"{unknowns} unknowns, {every} equations"
+    words += (
+        f", of which {every - kept} follow from the others"
+        if kept < every
+        else ", none of which follows from the others"
+    )
+    yield Line(words, label="loops")
 
 
 def _domain(parameter: Parameter) -> str:

@@ -12,6 +12,7 @@ from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import CURVED, PointKind
 from ..solver.status import Status
 from ..units import Units, objective_unit
+from .jointwording import joint_lines
 from .rounding import number, robot_size, settled, task_F
 from .text import Line, Tone
 
@@ -234,6 +235,8 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         words = task_words(robot.task, units)
         free = f"singular: F is 0, so the platform can make the task's motion ({words}) with every actuator locked"
         yield Line(free, tone=Tone.CAUTION)
+    if robot.joints is not None:
+        yield from joint_lines(robot, robot.joints, units)
     if not robot.singular:
         yield Line(f"{robot.rank}", label="rank of J")
         return

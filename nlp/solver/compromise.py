@@ -27,7 +27,7 @@ import numpy as np
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
 from ..case.task import Method, Sense, Task
-from ..evidence.kkt import FEASIBLE, correct_point, linearise
+from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
@@ -266,7 +266,8 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
         if isinstance(rotation, FreeRotation):
             q = list(rotation.q)
             Q[q] = _mean_rotation([point[q] for point in points], shares)
-    return np.asarray(Q, dtype=np.float64)
+    # The unknowns of joints are no design: at the averaged dimensions and pose they follow from closed loops.
+    return close_equations(nlp, Q) if nlp.program.model.unknowns else np.asarray(Q, dtype=np.float64)
 
 
 def _mean_rotation(vectors: Sequence[FloatArray], shares: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from ...models import FloatArray, frozen_array
 from ...models.whole import Whole
 from ..case.settings import Search
 from ..errors import EvaluationError
+from ..evidence.closing import close_near, closed_start
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
@@ -189,6 +190,10 @@ def _search(
     if nlp.n == 0:
         return _evaluate_without_variables(nlp, search, began)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
+    if nlp.program.model.unknowns:
+        # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
+        home = closed_start(nlp)
+        points = np.array([close_near(nlp, home, x) for x in points])
     nlp = with_pairs_at(nlp, points)
     found: dict[int, Start] = {}
     left = list(range(len(points)))
@@ -257,7 +262,8 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
 
     With such a start, the best optimum found is not the global one, and must not be reported as the answer.
     """
-    feasible = [start for start in starts if start.status is not StartStatus.CONVERGED and start.violation <= FEASIBLE]
+    others = (StartStatus.CONVERGED, StartStatus.OPEN)  # a robot with open loops is no point of the case
+    feasible = [start for start in starts if start.status not in others and start.violation <= FEASIBLE]
     if not (feasible and optima):
         return None
     best = min(feasible, key=lambda start: nlp.sign * start.F)

@@ -18,6 +18,7 @@ import numpy as np
 from ...models import FloatArray
 from ..case.settings import Search
 from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers
+from ..evidence.state import loops_are_closed
 from ..interruption import is_requested
 from ..program.nlp import Nlp
 from .interface import LocalSearch, Solver, SolverResult, StopReason
@@ -54,6 +55,7 @@ class StartStatus(enum.Enum):
     SADDLE = "ended where F is stationary but neither largest nor smallest"
     UNDEFINED = "met a point where the robot's equations have no finite value"
     STALLED = "stopped before it was stationary"
+    OPEN = "ended where loops of the robot are open: another way to assemble its joints"
 
 
 _FAILURES = {
@@ -170,7 +172,9 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
             at, stationarity = corrected, left
         if kept and corrected.violation <= FEASIBLE and left <= max(_POLISHED, corrected.rounding):
             break
-    if at.violation <= FEASIBLE and stationarity <= STATIONARY:
+    if at.violation <= FEASIBLE and not loops_are_closed(nlp, at.x):
+        status = StartStatus.OPEN
+    elif at.violation <= FEASIBLE and stationarity <= STATIONARY:
         status = StartStatus.CONVERGED
     else:
         status = _FAILURES.get(found.reason, StartStatus.STALLED)

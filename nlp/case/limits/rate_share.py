@@ -59,6 +59,6 @@ class RateShare(Limit[AtMost]):
         for j, task in enumerate(pose.tasks):
             whose = f" task {task}" if len(pose.tasks) > 1 else ""
             for limb in pose.model.limbs:
-                own = [robot.rates[i, j] for i, row in enumerate(pose.model.wrenches) if row.limb == limb]
+                own = [robot.rates[i, j] for i, row in enumerate(pose.model.frame_rows) if row.limb == limb]
                 part = Call(Form(_share), ca.vertcat(robot.F[j], robot.magnitude[j], *own))
                 yield between(f"rate_share limb {limb}{whose}{pose.where}", part, _PART, "rate_share", upper=self.max)

@@ -2,6 +2,6 @@
 
 The modules import each other in this order: ``poses`` (the robot at each pose), ``posture`` (numbers at one pose),
 ``drawing`` (the robot with its task), ``solutions`` (drawings of a solution), ``view``; then, with Matplotlib,
-``labels``, ``canvas``, ``painting`` and ``figures``; at last ``plot``, which is public. ``style``, ``requirements``,
-``crossings`` and ``fonts`` stand alone.
+``labels``, ``canvas``, ``joints`` (symbols), ``painting`` and ``figures``; at last ``plot``, which is public.
+``style``, ``requirements``, ``crossings`` and ``fonts`` stand alone.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -59,10 +60,16 @@ class Canvas:
         """Draw a filled polygon with corners (k, 3); words may cover it."""
         self._axes.add_patch(Polygon(self.view.project(points), **style))
 
-    def marker(self, point: FloatArray, name: str, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
-        """Draw a round marker at a point (3,); words may cover it."""
+    def marker(
+        self,
+        point: FloatArray,
+        name: str,
+        symbol: str = "o",
+        **style: Any,  # noqa: ANN401 - Matplotlib's own words
+    ) -> None:
+        """Draw a marker at a point (3,), round or with one of Matplotlib's symbols; words may cover it."""
         x, y = self.view.project(point)
-        self._axes.plot([x], [y], marker="o", linestyle="none", gid=name, **style)
+        self._axes.plot([x], [y], marker=symbol, linestyle="none", gid=name, **style)
 
     def arrow(self, start: FloatArray, end: FloatArray, name: str, colour: Colour, width: float, zorder: float) -> None:
         """Draw an arrow between two points (3,); towards the eye it is only its head."""
@@ -133,3 +140,12 @@ class Canvas:
         # Limbs stand closest together: their words get the free places first.
         ordered = sorted(self._labels, key=lambda label: not label.owner)
         place_labels(self._axes, renderer, ordered, Obstacles(np.vstack(self._segments), tuple(self._owners)))
+
+
+def arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
+    """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
+    axis, ray = normal / np.linalg.norm(normal), through - centre
+    across = np.cross(axis, ray)
+    turn = 2 * math.pi if last is None else math.atan2(float(last @ across), float(last @ ray))
+    angles = np.linspace(0.0, turn, 97 if last is None else 25)
+    return np.asarray(centre + np.outer(np.cos(angles), ray) + np.outer(np.sin(angles), across))

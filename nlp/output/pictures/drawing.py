@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from ....models import (
     Body,
     FloatArray,
     Link,
+    LinkKind,
     Model,
     WrenchKind,
     axis_from_screw,
@@ -51,12 +52,14 @@ class LimbRate:
         kind: a force, or a couple.
         rate: work rate ``L_i ^ chi``.
         share: part of F, ``rate^2 / F``; nan where F is 0.
+        driving: its work rate in an actuated joint of the limb at unit rate; 0 for a constraint.
     """
 
     limb: str
     kind: WrenchKind
     rate: float
     share: float
+    driving: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +131,23 @@ class Drawing:
         """Return the work rates (m,) of the task at a posture; empty without a motion."""
         return reciprocal_product(posture.jacobian, self.motion.twist) if self.motion is not None else np.zeros(0)
 
+    def limb_rows(self) -> dict[str, int]:
+        """Return the index of the row that colours each limb; empty without a motion.
+
+        It is the row that drives the limb's actuator most; without such a row, that of its force, or of its couple
+        where it applies no force.
+        """
+        order = sorted(enumerate(self.rows), key=lambda each: (each[1].driving, each[1].kind is WrenchKind.FORCE))
+        return {row.limb: k for k, row in order}
+
     def limb_rates(self) -> dict[str, float]:
-        """Return the rate that colours each limb: of its force, or of its couple where it applies no force."""
-        rates: dict[str, float] = {}
-        for row in sorted(self.rows, key=lambda row: row.kind is WrenchKind.FORCE):
-            rates[row.limb] = row.rate
-        return rates
+        """Return the rate that colours each limb, of the row that :meth:`limb_rows` names."""
+        return {limb: self.rows[k].rate for limb, k in self.limb_rows().items()}
+
+    def link_row(self, link: Link) -> int | None:
+        """Return the index of the row that a link carries alone; None for a link that carries others too."""
+        own = [k for k, row in enumerate(self.rows) if row.limb == link.limb]
+        return None if link.row is None or link.row >= len(own) else own[link.row]
 
     def attachment(self, limb: str) -> int | None:
         """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
@@ -154,7 +168,7 @@ def drawing_of_model(model: Model) -> Drawing:
     parameters = np.array([value for item in model.parameters for value in item.typical])
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
     linkage = Linkage(model, parameters)
-    headline = ", ".join(f"{key} = {value}" for key, value in model.options.items())
+    headline = ", ".join(f"{key} = {value}" for key, value in model.options.items() if not isinstance(value, Mapping))
     guess = linkage.posture_at(np.eye(3), np.array(model.home), middles)
     # A motion of zero length closes the loops.
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
@@ -200,8 +214,8 @@ def drawing_of(
     return replace(
         drawing,
         rows=tuple(
-            LimbRate(row.limb, row.kind, float(rate), float(share))
-            for row, rate, share in zip(model.wrenches, rates, shares, strict=True)
+            LimbRate(row.limb, row.kind, float(rate), float(share), float(driving))
+            for row, rate, share, driving in zip(model.rows, rates, shares, posture.driving, strict=True)
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name),
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
@@ -279,7 +293,7 @@ def _drawing_without_task(case: Case | None, model: Model, linkage: Linkage, pos
 
 def _loop(links: Sequence[tuple[int, int, Link]], body: Body) -> tuple[int, ...]:
     """Return indices of the points around a body's outline; none where the body's lines are not one closed loop."""
-    following = {start: end for start, end, link in links if link.body is body}
+    following = {start: end for start, end, link in links if link.body is body and link.kind is LinkKind.BAR}
     if len(following) < 3:
         return ()
     first = next(iter(following))

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -18,6 +19,7 @@ from ...units import rate_unit
 from .canvas import INK, MUTED, RED
 from .drawing import Drawing
 from .fonts import families, legible, needs_other_font
+from .joints import Handles
 from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
@@ -39,6 +41,8 @@ _METADATA: dict[str, dict[str, str | None]] = {
 _ACROSS = 3
 #: Width and height of a panel, and room for the heading, the legend and the colour bar, in inches.
 _WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
+#: Room for the line of joints' symbols, in inches.
+_SYMBOLS = 0.22
 
 
 def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = None) -> bytes:
@@ -79,14 +83,15 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
     view = view or clearest_view(drawings[0])
     across = len(drawings) if len(drawings) <= _ACROSS else 2
     side = _SIDE if drawings[0].rows else 0.2
-    row_height = _HEIGHT + _TOP + _BOTTOM
+    room = _BOTTOM + (_SYMBOLS if any(each.model.scene.joints for each in drawings) else 0.0)
+    row_height = _HEIGHT + _TOP + room
     width, height = across * (_WIDTH + side), -(-len(drawings) // across) * row_height
     figure = Figure(figsize=(width, height), facecolor="white")
     canvas = FigureCanvasAgg(figure)
     for k, drawing in enumerate(drawings):
         left, top = k % across * (_WIDTH + side), height - k // across * row_height
         bottom = top - row_height
-        place = (left / width, (bottom + _BOTTOM) / height, _WIDTH / width, _HEIGHT / height)
+        place = (left / width, (bottom + room) / height, _WIDTH / width, _HEIGHT / height)
         axes = figure.add_axes(place)
         panel = Panel(axes, view, drawing)
         panel.paint()
@@ -94,7 +99,10 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
             bar = ((left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height)
             _add_colour_bar(figure, *bar, 0.16 / width, 0.5 * row_height / height, drawing, panel.largest)
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
-        _add_legend(figure, (left + 0.25) / width, (bottom + 0.02 * row_height) / height, panel)
+        low = bottom + 0.02 * (_HEIGHT + _TOP + _BOTTOM)
+        if panel.symbols:
+            _add_legend(figure, (left + 0.25) / width, low / height, panel.symbols, len(panel.symbols))
+        _add_legend(figure, (left + 0.25) / width, (low + room - _BOTTOM) / height, panel.legend)
         _write_heading(figure, (left + 0.25) / width, top / height, height, drawing)
     return figure
 
@@ -151,9 +159,10 @@ def _add_colour_bar(
     bar.ax.hlines(rates, 0, 1, color=INK, linewidth=1.0, gid="rates")
 
 
-def _add_legend(figure: Figure, left: float, bottom: float, panel: Panel) -> None:
-    """Write a panel's legend; the place is in parts of the figure."""
-    entries = panel.legend
+def _add_legend(
+    figure: Figure, left: float, bottom: float, entries: Sequence[tuple[Artist | Handles, str]], columns: int = 1
+) -> None:
+    """Write a legend of handles and texts; the place is in parts of the figure."""
     if entries:
         figure.legend(
             handles=[handle for handle, _ in entries],
@@ -162,9 +171,10 @@ def _add_legend(figure: Figure, left: float, bottom: float, panel: Panel) -> Non
             bbox_to_anchor=(left, bottom),
             frameon=False,
             fontsize=8.5,
-            ncols=1,
+            ncols=columns,
             labelcolor=INK,
             borderaxespad=0,
-            handlelength=2.2,
-            columnspacing=2.0,
+            handlelength=2.2 if columns == 1 else 1.4,
+            columnspacing=1.6,
+            handletextpad=0.8 if columns == 1 else 0.4,
         )

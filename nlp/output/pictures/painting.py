@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -11,16 +12,20 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 
-from ....models import Body, FloatArray, MarkKind, WrenchKind
+from ....models import Body, FloatArray, Link, LinkKind, MarkKind, WrenchKind
 from ...units import rate_unit
-from .canvas import FAINT, INK, MUTED, RED, Canvas
+from .canvas import FAINT, INK, MUTED, RED, Canvas, Colour, arc
 from .drawing import Drawing, Motion
+from .joints import Handles, paint_joint_symbols, symbol_legend
 from .posture import Posture
 from .style import RATE_COLOURS, rate_text
 from .view import View, painting_order
 
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"
 VELOCITY, FREE = "#6d2a8c", "#0b6b57"
+RAIL, PLAIN = "#8a949d", "#7d8a96"
+#: Width of a link with its edges, in points.
+_WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 #: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
@@ -50,6 +55,7 @@ class Panel:
     Attributes:
         largest: rate at the ends of the colour scale, positive.
         legend: a handle and a text for everything that needs an explanation.
+        symbols: the same for the symbols of joints.
     """
 
     def __init__(self, axes: Axes, view: View, drawing: Drawing) -> None:
@@ -58,6 +64,7 @@ class Panel:
         sizes = [abs(row.rate) for row in drawing.rows if not math.isnan(row.share)]
         self.largest = max(sizes, default=0.0) or 1.0
         self.legend: list[tuple[Artist, str]] = []
+        self.symbols: list[tuple[Handles, str]] = []
         self._canvas = Canvas(axes, view, np.mean(drawing.posture.points, axis=0))
         self._colours = rate_colour_map()
         self._scale = Normalize(-self.largest, self.largest)
@@ -121,7 +128,7 @@ class Panel:
         for circle, (centre, through, normal) in zip(self.drawing.model.scene.circles, posture.circles, strict=True):
             if circle.body is body:
                 self._canvas.line(
-                    _arc(centre, through, normal),
+                    arc(centre, through, normal),
                     f"circle {body.value}",
                     color=MUTED,
                     linewidth=0.8,
@@ -132,27 +139,53 @@ class Panel:
     def _paint_limbs(self) -> None:
         """Paint limbs with a dark edge and a light side, in the order in which they cover each other."""
         rates = self.drawing.limb_rates()
-        lines = [(self.drawing.posture.points[[a, b]], link.limb) for a, b, link in self.drawing.links if link.limb]
+        points = self.drawing.posture.points
+        self._paint_rails()
+        lines = [
+            (points[[a, b]], link)
+            for a, b, link in self.drawing.links
+            if link.kind is not LinkKind.RAIL and (link.limb or link.body is Body.LIMB)
+        ]
         for place, index in enumerate(painting_order(self._canvas.view, [line for line, _ in lines])):
-            line, limb = lines[index]
-            colour = self._colour(rates[limb]) if rates else "#7d8a96"
-            at = 10 + 20 * place / len(lines)
+            line, link = lines[index]
+            limb, colour = link.limb, self._link_colour(link, rates)
+            at, wide = 10 + 20 * place / len(lines), _WIDTHS[link.kind]
             # The line of the limb itself is what no other limb's words may cover.
-            self._canvas.line(line, f"limb edge {limb}", color=INK, linewidth=7.0, zorder=at)
-            self._canvas.line(line, f"limb {limb}", color=colour, linewidth=5.4, zorder=at + 0.1, limb=limb)
-            self._canvas.line(line, f"limb light {limb}", color="white", alpha=0.35, linewidth=1.4, zorder=at + 0.2)
-        for limb in dict.fromkeys(limb for _, limb in lines):
-            # One label a limb, on its longest link.
-            link = max(
-                (line for line, name in lines if name == limb),
-                key=lambda ends: float(np.linalg.norm(np.ptp(ends, axis=0))),
+            self._canvas.line(line, f"limb edge {limb}", color=INK, linewidth=wide, zorder=at)
+            self._canvas.line(
+                line, f"limb {limb}", color=colour, linewidth=wide - 1.6, zorder=at + 0.1, limb=limb or ""
             )
-            places = link[0] + np.outer(_ALONG_LINK, link[1] - link[0])
-            text = f"limb {limb}" if not rates else f"limb {limb}\n{self._rate_text(rates[limb])}"
+            self._canvas.line(
+                line, f"limb light {limb}", color="white", alpha=0.35, linewidth=0.2 * wide, zorder=at + 0.2
+            )
+        for limb in dict.fromkeys(link.limb for _, link in lines if link.limb):
+            # One label a limb, on its longest link.
+            line, link = max(
+                ((line, link) for line, link in lines if link.limb == limb),
+                key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))),
+            )
+            places = line[0] + np.outer(_ALONG_LINK, line[1] - line[0])
+            own = list(dict.fromkeys(rate for _, each in lines if each.limb == limb and (rate := self._own_rate(each))))
+            text = f"limb {limb}" if not rates else f"limb {limb}\n{self._rates_text(own or [rates[limb]])}"
             self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
+    def _paint_rails(self) -> None:
+        """Paint rails, and bars of base and platform that are no outline of an area."""
+        drawing = self.drawing
+        plates = {body for body, _ in drawing.plates}
+        for first, last, link in drawing.links:
+            ends = drawing.posture.points[[first, last]]
+            if link.kind is LinkKind.RAIL:
+                self._canvas.line(ends, f"rail {link.limb}", color=RAIL, linewidth=3.2, zorder=7)
+            elif link.body is not Body.LIMB and link.body not in plates:
+                self._canvas.line(ends, f"bar {link.body.value}", color=MUTED, linewidth=4.5, zorder=9)
+
     def _paint_joints(self) -> None:
-        """Paint a circle at every point that ends a line."""
+        """Paint the symbol of every joint; in a drawing without them, a circle at every point that ends a line."""
+        if self.drawing.model.scene.joints:
+            paint_joint_symbols(self._canvas, self.drawing)
+            self.symbols = symbol_legend(self.drawing)
+            return
         for point, place in zip(self.drawing.model.scene.points, self.drawing.posture.points, strict=True):
             used = any(point.name in (link.start, link.end) for _, _, link in self.drawing.links)
             if used:
@@ -205,12 +238,16 @@ class Panel:
         return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}, path in purple)"
 
     def _paint_couples(self) -> None:
-        """Paint couples as arrows with two heads, at the points that join their limbs to the platform."""
+        """Paint couples as arrows with two heads, at the points that join their limbs to the platform.
+
+        Of several couples of one limb only their plane has a meaning: they have no arrows.
+        """
+        couples = [row.limb for row in self.drawing.rows if row.kind is WrenchKind.COUPLE]
         for row, wrench, values in zip(
-            self.drawing.rows, self.drawing.model.wrenches, self.drawing.posture.jacobian, strict=True
+            self.drawing.rows, self.drawing.model.rows, self.drawing.posture.jacobian, strict=True
         ):
             index = self.drawing.attachment(row.limb)
-            if wrench.kind is not WrenchKind.COUPLE or index is None:
+            if wrench.kind is not WrenchKind.COUPLE or index is None or couples.count(row.limb) > 1:
                 continue
             at = self.drawing.posture.points[index]
             direction = values[3:] / np.linalg.norm(values[3:])
@@ -270,15 +307,32 @@ class Panel:
         normal = np.cross(start - vertex, end - vertex)
         if not normal.any():
             return
-        arc = _arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
-        self._canvas.line(arc, name, color=colour, linewidth=1.8, zorder=55)
-        middle = arc[len(arc) // 2]
+        curve = arc(vertex, vertex + _ARC * (start - vertex), normal, last=end - vertex)
+        self._canvas.line(curve, name, color=colour, linewidth=1.8, zorder=55)
+        middle = curve[len(curve) // 2]
         away = self._canvas.view.project(middle - vertex)
         self._canvas.label(parameter, middle, away, colour, 11.0, bold=True, is_led=True)
 
     def _colour(self, rate: float) -> tuple[float, float, float, float]:
         red, green, blue, alpha = self._colours(self._scale(rate))
         return red, green, blue, alpha
+
+    def _link_colour(self, link: Link, rates: Mapping[str, float]) -> Colour:
+        """Return the colour of a link: of its own rate, or else of its limb's."""
+        if link.limb is None or link.limb not in rates:
+            return PLAIN
+        own = self._own_rate(link)
+        return self._colour(rates[link.limb] if own is None else own)
+
+    def _own_rate(self, link: Link) -> float | None:
+        """Return the rate of the row that a link carries alone; None for a link that carries others too."""
+        row = self.drawing.link_row(link)
+        return None if row is None else self.drawing.rows[row].rate
+
+    def _rates_text(self, rates: Sequence[float]) -> str:
+        """Return rates with their unit, those of a limb's rods side by side."""
+        unit = self._rate_unit()
+        return " and ".join(self._rate_text(each).removesuffix(unit).strip() for each in rates) + f" {unit}".rstrip()
 
     def _rate_text(self, rate: float) -> str:
         """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""
@@ -289,12 +343,3 @@ class Panel:
         """Return the unit of rates and velocities; an empty one without a task or a case."""
         motion, case = self.drawing.motion, self.drawing.case
         return rate_unit(motion.twist, case.units) if motion is not None and case is not None else ""
-
-
-def _arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
-    """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
-    axis, ray = normal / np.linalg.norm(normal), through - centre
-    across = np.cross(axis, ray)
-    turn = 2 * math.pi if last is None else math.atan2(float(last @ across), float(last @ ray))
-    angles = np.linspace(0.0, turn, 97 if last is None else 25)
-    return np.asarray(centre + np.outer(np.cos(angles), ray) + np.outer(np.sin(angles), across))

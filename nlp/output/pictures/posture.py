@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian
+from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian, reporting_matrix
 from ...program.kernel import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
@@ -28,7 +29,10 @@ class Posture:
         circles: (c, 3, 3) centre, point and normal of each circle.
         directions: (d, 2, 3) origin and unit vector of each direction.
         marks: points of each mark, (k, 3) each.
+        joints: of each joint, (1 + a, 3) its place and the unit vectors of its axes.
         jacobian: (m, 6) unit wrenches, couple rows scaled by the characteristic length.
+        driving: (m,) work rate of each row in the actuated joints of its limb, each at unit rate; zero for a
+            constraint, and for a robot without actuated joints.
         quantities: each of the model's quantities, radians for angles.
     """
 
@@ -39,7 +43,9 @@ class Posture:
     circles: FloatArray
     directions: FloatArray
     marks: tuple[FloatArray, ...]
+    joints: tuple[FloatArray, ...]
     jacobian: FloatArray
+    driving: FloatArray
     quantities: tuple[FloatArray, ...]
 
 
@@ -58,7 +64,8 @@ class Linkage:
         own = Substitution.identity(model)
         outputs = [
             ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
-            jacobian(model.wrenches, SX(characteristic_length)),
+            jacobian(model.wrenches, SX(characteristic_length), model.members),
+            ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
@@ -76,12 +83,14 @@ class Linkage:
         """
         scene = self.model.scene
         arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
-        columns, rows, *quantities = self._drawing(*arguments)
-        counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions)]
-        points, circles, directions, marks = np.split(columns.T, np.cumsum(counts))
+        columns, rows, screws, *quantities = self._drawing(*arguments)
+        rows = reporting_matrix(self.model, rows, screws) @ rows
+        sizes = [mark.kind.size for mark in scene.marks]
+        counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions), sum(sizes)]
+        points, circles, directions, marks, joints = np.split(columns.T, np.cumsum(counts))
         directions = directions.reshape(-1, 2, 3)
         directions[:, 1] /= np.linalg.norm(directions[:, 1], axis=1, keepdims=True)
-        ends = np.cumsum([mark.kind.size for mark in scene.marks])[:-1]
+        ends = np.cumsum(sizes)[:-1]
         return Posture(
             rotation=frozen_array(rotation, (3, 3)),
             position=frozen_array(position, (3,)),
@@ -90,9 +99,18 @@ class Linkage:
             circles=frozen_array(circles.reshape(-1, 3, 3), (len(scene.circles), 3, 3)),
             directions=frozen_array(directions, directions.shape),
             marks=tuple(frozen_array(part, part.shape) for part in np.split(marks, ends)) if scene.marks else (),
-            jacobian=frozen_array(rows, (len(self.model.wrenches), 6)),
+            joints=_joints(joints, [1 + len(each.axes) for each in scene.joints]),
+            jacobian=frozen_array(rows, (len(self.model.rows), 6)),
+            driving=frozen_array(self._driving(rows, screws), (len(self.model.rows),)),
             quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
         )
+
+    def _driving(self, rows: FloatArray, screws: FloatArray) -> FloatArray:
+        """Return the largest work rate (m,) of each row (m, 6) in one of the actuated joints (6, a) of its limb."""
+        works = np.abs(rows @ np.vstack([screws[3:], screws[:3]]))
+        owners = np.array([each.limb for each in self.model.actuators], dtype=object)
+        own = [works[k, owners == row.limb] for k, row in enumerate(self.model.rows)]
+        return np.array([each.max(initial=0.0) for each in own])
 
     def posture_after(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
         """Return the drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
@@ -116,3 +134,14 @@ class Linkage:
             if not np.max(np.abs(residual)) <= np.sqrt(_ROUNDING):
                 return None
         return reached if np.isfinite(reached.jacobian).all() else None
+
+
+def _joints(columns: FloatArray, sizes: Sequence[int]) -> tuple[FloatArray, ...]:
+    """Return place and unit axes of each joint from the stacked vectors (n, 3) of all of them."""
+    found = []
+    for part in np.split(columns, np.cumsum(sizes)[:-1]) if sizes else ():
+        lengths = np.linalg.norm(part[1:], axis=1, keepdims=True)
+        # An axis has no direction where the two lines that define it are parallel.
+        axes = np.divide(part[1:], lengths, out=np.zeros_like(part[1:]), where=lengths > 0)
+        found.append(frozen_array(np.vstack([part[:1], axes]), part.shape))
+    return tuple(found)

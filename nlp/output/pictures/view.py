@@ -8,12 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....models import FloatArray
+from ....models import FloatArray, LinkKind
 from .drawing import Drawing
 
 #: Azimuths that are tried for a view, and its elevation, in degrees.
 _AZIMUTHS = range(-170, 190, 10)
 _ELEVATION = 18.0
+#: A robot given joint by joint that is lower than this part of its size is seen from above, x to the right.
+_FLAT = 0.1
+#: Part of the axis z, in parts of the robot's size, that limbs should not cover.
+_SHOWN_Z = 0.12
+#: Places on a link, in parts of its length, whose distances on paper are compared.
+_PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)
 #: Two lines that cross on paper nearer to an end than this part of their lengths are joined there, and do not cross.
 _JOINED = 0.02
 
@@ -51,14 +57,22 @@ class View:
         return np.asarray(points @ self.axes[2])
 
 
+#: The view of a flat robot.
+_FROM_ABOVE = View(-90.0, 62.0)
+
+
 def clearest_view(drawing: Drawing) -> View:
     """Return the view in which limbs stand farthest apart on paper and the task's axis is least foreshortened."""
+    if drawing.model.scene.joints and np.ptp(drawing.posture.points, axis=0)[2] < _FLAT * drawing.size:
+        return _FROM_ABOVE
     return max((View(float(azimuth)) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
 
 
 def _clearness(view: View, drawing: Drawing) -> float:
     """Return a score: least and mean distance on paper between points of limbs, and the visible part of the axis."""
     points = drawing.posture.points
+    if drawing.model.scene.joints:
+        return _clearness_of_joints(view, drawing)
     middles = [
         view.project(points[start] + part * (points[end] - points[start]))
         for start, end, link in drawing.links
@@ -70,6 +84,29 @@ def _clearness(view: View, drawing: Drawing) -> float:
     if drawing.motion is not None:
         seen = np.linalg.norm(view.project(drawing.motion.axis))
         shown += 0.5 * float(seen)
+    return shown
+
+
+def _clearness_of_joints(view: View, drawing: Drawing) -> float:
+    """Return the same score for a robot given joint by joint, whose limbs have several links.
+
+    Rods of one limb, such as those of a parallelogram, are near to each other in every view: they do not count.
+    """
+    links = [(a, b, link) for a, b, link in drawing.links if link.limb is not None and link.kind is not LinkKind.RAIL]
+    points, parts = drawing.posture.points, np.array(_PARTS)[:, None, None]
+    starts, ends = points[[each[0] for each in links]], points[[each[1] for each in links]]
+    places = view.project(starts + parts * (ends - starts)).reshape(-1, 2)
+    limbs = np.tile([str(link.limb) for *_, link in links], len(_PARTS))
+    rods = np.tile([link.kind is LinkKind.ROD for *_, link in links], len(_PARTS))
+    own = np.tile(np.arange(len(links)), len(_PARTS))
+    counts = np.where(limbs[:, None] == limbs, ~(rods[:, None] | rods) & (own[:, None] != own), True)
+    counts &= np.tri(len(places), k=-1, dtype=np.bool_)
+    apart = np.linalg.norm(places[:, None] - places, axis=2)[counts]
+    frame = view.project(np.array([0.0, 0.0, _SHOWN_Z * drawing.size]))
+    apart = np.append(apart, np.linalg.norm(places - frame, axis=1))
+    shown = (float(apart.min()) + 0.2 * float(apart.mean())) / drawing.size
+    if drawing.motion is not None:
+        shown += 0.5 * float(np.linalg.norm(view.project(drawing.motion.axis)))
     return shown
 
 

@@ -15,6 +15,17 @@ from ..pictures.drawing import Drawing, Motion
 from ..pictures.posture import Posture
 from ..pictures.style import RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
+from .limbs import (
+    JointData,
+    LinkData,
+    MeasureData,
+    RowData,
+    joint_data,
+    link_data,
+    measure_data,
+    measured_values,
+    row_data,
+)
 
 #: Postures on each side of the one found, at most, at least, and in all views of a page together.
 _SIDE, _LEAST_SIDE, _SIDES = 20, 2, 80
@@ -34,22 +45,6 @@ class PointData(TypedDict):
     body: str
 
 
-class LinkData(TypedDict):
-    """A line between two points, by their indices."""
-
-    ends: list[int]
-    limb: str | None
-    body: str
-
-
-class RowData(TypedDict):
-    """A row of the Jacobian, and the index of the point that joins its limb to the platform."""
-
-    limb: str
-    kind: str
-    at: int | None
-
-
 class MotionData(TypedDict):
     """A twist with the lines that show it; see :class:`~screwsynth.nlp.output.pictures.drawing.Motion`."""
 
@@ -63,8 +58,8 @@ class MotionData(TypedDict):
 class FrameData(TypedDict):
     """The robot at one posture.
 
-    ``t`` is the time along the motion, ``lengths`` has the limb's length for each row, and a rate below ``noise`` is
-    rounding error.
+    ``t`` is the time along the motion, ``lengths`` has the measure of the limb for each row, ``joints`` has place and
+    axes of each joint, and a rate below ``noise`` is rounding error.
     """
 
     t: float
@@ -73,11 +68,12 @@ class FrameData(TypedDict):
     position: list[float]
     rotation: list[list[float]]
     directions: list[list[list[float]]]
+    joints: list[list[list[float]]]
     jacobian: list[list[float]]
     rates: list[float]
     F: float
     noise: float
-    lengths: list[float]
+    lengths: list[float | None]
     velocities: list[list[float]]
 
 
@@ -95,11 +91,13 @@ class ViewData(TypedDict):
     is_worst: bool
     headline: str
     is_answer: bool
-    unit: str
+    measure: MeasureData
     rate_unit: str
+    unit: str
     size: float
     points: list[PointData]
     links: list[LinkData]
+    joints: list[JointData]
     plates: dict[str, list[int]]
     corners: list[int]
     rows: list[RowData]
@@ -167,16 +165,16 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
+        "measure": measure_data(drawing, units),
         "unit": units.length,
         "rate_unit": "" if motion is None else rate_unit(motion.twist, units),
         "size": drawing.size,
         "points": [{"name": point.name, "body": point.body.value} for point in model.scene.points],
-        "links": [{"ends": [a, b], "limb": link.limb, "body": link.body.value} for a, b, link in drawing.links],
+        "links": link_data(drawing),
+        "joints": joint_data(drawing),
         "plates": {body.value: list(loop) for body, loop in drawing.plates},
         "corners": list(drawing.corners),
-        "rows": [
-            {"limb": row.limb, "kind": row.kind.value, "at": drawing.attachment(row.limb)} for row in drawing.rows
-        ],
+        "rows": row_data(drawing),
         "directions": [item.name for item in model.scene.directions],
         "motion": None if motion is None else _motion_data(motion, units),
         "free": [_motion_data(each, units) for each in drawing.free],
@@ -236,11 +234,12 @@ def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray,
         "position": posture.position.tolist(),
         "rotation": posture.rotation.tolist(),
         "directions": posture.directions.tolist(),
+        "joints": [each.tolist() for each in posture.joints],
         "jacobian": posture.jacobian.tolist(),
         "rates": rates.tolist(),
         "F": float(rates @ rates),
         "noise": _noise(drawing, posture),
-        "lengths": _lengths(drawing, posture),
+        "lengths": measured_values(drawing, posture, units),
         "velocities": drawing.velocities_at(posture).tolist(),
     }
 
@@ -266,19 +265,6 @@ def _words(drawing: Drawing, t: float, units: Units) -> str:
     if abs(pitch * turn) < 1e-9 * drawing.size:
         return turned
     return f"{turned}, moved {signed_text(pitch * turn)} {units.length} along it"
-
-
-def _lengths(drawing: Drawing, posture: Posture) -> list[float]:
-    """Return the length of each row's limb: the robot's own measure of it, or else the length of the limb's lines."""
-    lengths: dict[str, float] = {}
-    for start, end, link in drawing.links:
-        if link.limb is not None:
-            part = float(np.linalg.norm(posture.points[end] - posture.points[start]))
-            lengths[link.limb] = lengths.get(link.limb, 0.0) + part
-    for item, values in zip(drawing.model.quantities, posture.quantities, strict=True):
-        if item.name == "leg_length":
-            lengths |= dict(zip(item.owners, map(float, values), strict=True))
-    return [lengths.get(row.limb, 0.0) for row in drawing.model.wrenches]
 
 
 def _motion_data(motion: Motion, units: Units) -> MotionData:

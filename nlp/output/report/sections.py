@@ -167,9 +167,21 @@ def _legend(view: ViewData) -> Markup:
         " Dotted grey: the start." if view["reference"] else "",
         " Green, dashed: motions that nothing resists." if view["free"] else "",
         " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
-        " Point at a limb for its length, rate, share of F and wrench.",
+        " Nothing moves: the loops open along the task's motion."
+        if view["motion"] and len(view["frames"]) == 1
+        else "",
+        " Joints: dark where an actuator drives them." if view["joints"] else "",
+        f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
+        ", at a joint for its kind." if view["joints"] else ".",
     ]
     return join_markup([bar, *words])
+
+
+def _measure_header(view: ViewData) -> str:
+    """Return the header of the measure of limbs, with its unit where all rows have one."""
+    words = "actuator from home" if view["joints"] else view["measure"]["words"]
+    units = {unit for unit in view["measure"]["units"] if unit}
+    return f"{words}, {units.pop()}" if len(units) == 1 else words
 
 
 def _rates(view: ViewData) -> Markup:
@@ -183,7 +195,7 @@ def _rates(view: ViewData) -> Markup:
     headers = [
         "limb",
         *(["wrench"] if couples else []),
-        f"length, {view['unit']}",
+        _measure_header(view),
         f"rate, {view['rate_unit']}",
         "",
         "share of F",
@@ -194,7 +206,8 @@ def _rates(view: ViewData) -> Markup:
         part = rate / largest
         bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
         share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
-        cells = [f"{frame['lengths'][k]:.5g}", f"{rate:+.6g}", bar, share]
+        length = frame["lengths"][k]
+        cells = ["" if length is None else f"{length:.5g}", f"{rate:+.6g}", bar, share]
         kinds = ["length number", "rate number", "bars", "share number"]
         body.append(
             tag(

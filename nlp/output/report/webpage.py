@@ -39,7 +39,7 @@ def page_of(report: Report) -> str:
         "contents": contents,
         "body": body,
         "style": Markup(_file("style.css")),
-        "script": Markup(_file("tables.js") + _file("tools.js") + _file("page.js")),
+        "script": Markup(_file("tables.js") + _file("tools.js") + _file("joints.js") + _file("page.js")),
         "data": script_json(report.as_data()),
         # Within a script element, only an end tag of a script and the start of a comment have a meaning.
         "plotly": Markup(get_plotlyjs().replace("</script", "<\\/script").replace("<!--", "<\\!--")),

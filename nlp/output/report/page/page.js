@@ -44,7 +44,8 @@
   function limbText(frame, limb) {
     const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
     const text = [`<b>limb ${plain(limb)}</b>`];
-    if (rows.length) text.push(`length ${shown(frame.lengths[rows[0][1]], 5)} ${plain(view.unit)}`);
+    const length = rows.length ? frame.lengths[rows[0][1]] : null;
+    if (length !== null) text.push(`${view.measure.words} ${shown(length, 5)} ${plain(view.measure.units[rows[0][1]])}`);
     for (const [row, k] of rows) {
       const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
       const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value));
@@ -69,7 +70,9 @@
         color: FACES[body], opacity: 0.55, hoverinfo: "skip", showlegend: false, lighting: { ambient: 0.9, diffuse: 0.2, specular: 0 },
       });
     }
-    const edges = view.links.filter((link) => link.limb === null);
+    const rails = view.links.filter((link) => link.kind === "rail");
+    if (rails.length) found.push(lines("rails", rails.map((link) => link.ends.map((end) => points[end])), { color: "#8a949d", width: 6 }));
+    const edges = view.links.filter((link) => link.limb === null && link.kind !== "rail");
     if (edges.length) found.push(lines("edges", edges.map((link) => link.ends.map((end) => points[end])), { color: MUTED, width: 4 }));
     if (view.motion) {
       found.push(lines("axis", [view.motion.line], { color: INK, width: 9 }));
@@ -83,24 +86,16 @@
       }
     }
     view.free.forEach((each) => found.push(lines("free motion", [each.line], { color: FREE, width: 5, dash: "dash" })));
-    const limbs = [...new Set(view.links.filter((link) => link.limb !== null).map((link) => link.limb))];
-    for (const limb of limbs) {
-      const own = view.links.filter((link) => link.limb === limb);
+    for (const own of groupedLinks(view.links)) {
+      const { limb, row, kind } = own[0];
       // Points along the limb, so that it answers wherever it is pointed at.
       const parts = own.map(({ ends: [a, b] }) => Array.from({ length: 13 }, (_, n) => plus(points[a], plus(points[b], points[a], -1), n / 12)));
-      // Coloured by its force, or by its couple where it has no force.
-      const force = view.rows.findIndex((each) => each.limb === limb && each.kind === "force");
-      const row = force < 0 ? view.rows.findIndex((each) => each.limb === limb) : force;
       const text = limbText(frame, limb);
-      found.push(lines(`limb ${limb}`, parts, { color: row < 0 ? MUTED : colour(frame.rates[row]), width: 12 }, {
+      found.push(lines(`limb ${limb}`, parts, { color: row === null ? MUTED : colour(frame.rates[row]), width: kind === "rod" ? 7 : 12 }, {
         hoverinfo: "text", hovertext: parts.flatMap((part) => [...part.map(() => text), text]), hoverlabel: { align: "left", bgcolor: "#fff", bordercolor: INK, font: { color: INK, size: 13 } },
       }));
     }
-    const joints = [...new Set(view.links.filter((link) => link.limb !== null).flatMap((link) => link.ends))].map((each) => points[each]);
-    found.push({
-      type: "scatter3d", mode: "markers", name: "joints", x: joints.map((p) => p[0]), y: joints.map((p) => p[1]), z: joints.map((p) => p[2]),
-      marker: { size: 5, color: "#fff", line: { color: INK, width: 2 } }, hoverinfo: "skip", showlegend: false,
-    });
+    found.push(...jointTraces(view, frame, INK));
     const factor = speedScale();
     if (factor > 0) {
       const starts = [], tips = [], ways = [];
@@ -134,10 +129,12 @@
   // Names of limbs, each on its longest link.
   function names(frame) {
     const found = new Map();
-    for (const { limb, ends: [a, b] } of view.links) {
-      if (limb === null) continue;
+    for (const { limb, kind, ends: [a, b] } of view.links) {
+      if (limb === null || kind === "rail") continue;
       const way = plus(frame.points[b], frame.points[a], -1), long = norm(way);
-      if (!found.has(limb) || found.get(limb).long < long) found.set(limb, { long, start: frame.points[a], way });
+      // Rods of several limbs come together at the platform: a name is on a bar where there is one.
+      const size = long + (kind === "bar" ? 100 * view.size : 0);
+      if (!found.has(limb) || found.get(limb).size < size) found.set(limb, { size, start: frame.points[a], way });
     }
     // Each at another height, so that names of limbs side by side do not meet.
     return [...found].map(([limb, { start, way }], k) => {
@@ -210,7 +207,7 @@
     byId("F-there").textContent = shown(frame.F, 7);
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
       const rate = frame.rates[k];
-      row.querySelector(".length").textContent = shown(frame.lengths[k], 5);
+      row.querySelector(".length").textContent = frame.lengths[k] === null ? "" : shown(frame.lengths[k], 5);
       row.querySelector(".rate").textContent = shown(rate, 6, true);
       row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
       const bar = row.querySelector(".bar");

@@ -1,0 +1,72 @@
+"""Write the table of the shipped robot files into docs/robots.md: run by ``make docs``. A test compares them."""
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import screwsynth.models
+from screwsynth.models import Model, robot_function
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "robots.md"
+FOLDER = Path(screwsynth.models.__file__).parent / "robots"
+OPENING, CLOSING = "<!-- begin: gallery -->", "<!-- end -->"
+
+
+def source_of(text: str) -> str:
+    """Return the sentences behind ``Source:`` in the heading of a robot file."""
+    heading = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        heading.append(line.removeprefix("#").strip())
+    return " ".join(heading).partition("Source: ")[2]
+
+
+def limbs_of(model: Model) -> str:
+    """Return the joints of all limbs, equal limbs together; the chains of a limb with branches in brackets."""
+    paths: dict[str, list[str]] = {}
+    for each in model.structure:
+        paths.setdefault(each.limb, []).append(each.joints.replace("*", "\\*"))
+    words = [own[0] if len(own) == 1 else f"({', '.join(own)})" for own in paths.values()]
+    return ", ".join(f"{count} x {joints}" for joints, count in Counter(words).items())
+
+
+def counted(values: list[int]) -> str:
+    """Return numbers with equal ones together, such as ``3 x 2``."""
+    return ", ".join(f"{count} x {value}" for value, count in Counter(values).items())
+
+
+def table() -> str:
+    """Return the table as Markdown."""
+    lines = [
+        "| robot | limbs (\\* actuated) | freedoms | rows | dim W | dim C | rank of J | source |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for path in sorted(FOLDER.glob("*.toml")):
+        model = robot_function(path.stem)()
+        assert model.generic is not None  # noqa: S101 - a script of the documentation
+        members = model.structure
+        cells = [
+            f"`{path.stem}`",
+            limbs_of(model),
+            str(6 - model.generic.constraints),
+            str(len(model.rows)),
+            counted([each.wrenches for each in members]),
+            counted([each.constraints for each in members]),
+            str(model.generic.jacobian),
+            source_of(path.read_text(encoding="utf-8")),
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Put the table into the page."""
+    pattern = f"({re.escape(OPENING)}\n).*?({re.escape(CLOSING)})"
+    old = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(re.sub(pattern, lambda m: m[1] + table() + m[2], old, flags=re.DOTALL), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

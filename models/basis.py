@@ -1,0 +1,125 @@
+"""Rows of the Jacobian as results state them: an orthonormal basis of each member's wrenches, not its projector.
+
+Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
+characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
+then forces through the centre, then the others. Behind them are those by which the actuators drive the platform.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import FloatArray
+from .model import Model
+from .wrench import WrenchKind
+
+#: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
+_ZERO = 1e-9
+#: Singular values of unit wrenches below this are zero, or below this part of the largest: a closed loop is known to
+#: the root of rounding at worst.
+_RANK = 1e-7
+
+
+class Basis(NamedTuple):
+    """An orthonormal basis (d, size) of a member's wrenches in scaled coordinates, and the kind of each."""
+
+    rows: FloatArray
+    kinds: tuple[WrenchKind, ...]
+
+
+def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int) -> Basis:
+    """Return a basis of a member's wrenches.
+
+    Args:
+        projector: (size, size) or, with columns in other coordinates, (size, k) of the same column space.
+        actuation: (size, a) parts of the actuated joints' screws that the member resists, in scaled coordinates.
+        dimension: of the space.
+    """
+    space = np.linalg.svd(projector)[0][:, :dimension].T
+    driven = _span(actuation.T @ space.T @ space) if actuation.size else np.zeros((0, space.shape[1]))
+    works = driven @ actuation
+    if works.size:
+        # A wrench of actuation does positive work in the joint that it drives most.
+        most = np.take_along_axis(works, np.argmax(np.abs(works), axis=1)[:, None], axis=1)
+        driven = driven * np.where(most < 0, -1.0, 1.0)
+    constraints = space - (space @ driven.T) @ driven
+    constraints = np.linalg.svd(constraints)[2][: dimension - len(driven)]
+    couples, rest = _split(constraints, slice(0, 3))
+    forces, others = _split(rest, slice(3, None)) if space.shape[1] > 3 else (rest, rest[:0])
+    if space.shape[1] == 3:
+        couples, forces = constraints[:0], constraints
+    rows = np.vstack([couples, forces, others, driven])
+    return Basis(rows, tuple(_kind(row) for row in rows))
+
+
+def reporting_matrix(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
+    """Return the matrix (r, m) that turns the rows of a :class:`~.instance.RobotInstance` into those of results.
+
+    Args:
+        model: the robot.
+        jacobian: (m, 6) rows of its wrenches, which stay as they are, then of its members' projectors.
+        actuators: (6, a) current screws of its actuators.
+    """
+    count = len(model.wrenches)
+    matrix = np.zeros((len(model.rows), len(jacobian)))
+    matrix[:count, :count] = np.eye(count)
+    row, column = count, count
+    for member in model.members:
+        own = [k for k, each in enumerate(model.actuators) if each.limb == member.limb]
+        block, screws = jacobian[column : column + member.size], actuators[:, own]
+        basis = basis_of_member(block, block @ np.vstack([screws[3:], screws[:3]]), len(member.kinds)).rows
+        matrix[row : row + len(basis), column : column + member.size] = basis
+        row, column = row + len(basis), column + member.size
+    return matrix
+
+
+def constraint_rows(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
+    """Return wrenches (k, 6) of all limbs that do no work in their actuated joints: constraints on a free robot.
+
+    Args:
+        model: the robot.
+        jacobian: (m, 6) rows of a :class:`~.instance.RobotInstance`.
+        actuators: (6, a) current screws of its actuators.
+    """
+    found = [np.zeros((0, 6))]
+    for limb in model.limbs:
+        own = jacobian[[k for k, row in enumerate(model.frame_rows) if row.limb == limb]]
+        screws = actuators[:, [k for k, each in enumerate(model.actuators) if each.limb == limb]]
+        left, values, _ = np.linalg.svd(own @ np.vstack([screws[3:], screws[:3]]))
+        driven = int(np.count_nonzero(values > _ZERO * float(np.abs(own).max(initial=0.0))))
+        found.append(left[:, driven:].T @ own)
+    return np.vstack(found)
+
+
+def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
+    """Return the rank of wrenches (m, 6) with moments about a centre (3,) in parts of a length."""
+    if not len(rows):
+        return 0
+    scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return int(np.count_nonzero(values > _RANK * max(1.0, float(values[0]))))
+
+
+def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
+    """Return orthonormal bases of the combinations of rows in which some components are zero, and of the rest."""
+    if not len(rows):
+        return rows, rows
+    left, values, _ = np.linalg.svd(rows[:, part])
+    nonzero = int(np.count_nonzero(values > _ZERO))
+    turned = left.T @ rows
+    return turned[nonzero:], turned[:nonzero]
+
+
+def _span(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the span of rows."""
+    _, values, right = np.linalg.svd(rows)
+    return np.asarray(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+
+
+def _kind(row: FloatArray) -> WrenchKind:
+    """Return the kind of a wrench in scaled coordinates."""
+    if len(row) == 3 or not np.abs(row[3:]).max() > _ZERO:
+        return WrenchKind.FORCE
+    return WrenchKind.WRENCH if np.abs(row[:3]).max() > _ZERO else WrenchKind.COUPLE

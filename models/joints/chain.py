@@ -1,0 +1,248 @@
+"""Joints and limbs at home, as expressions of the robot's dimensions.
+
+A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a limb
+that is repeated are its rotations about the axis of repetition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..parts import Dimension
+from ..screws import Displacement, Screw, screw_displacement, unit_vector
+from .expression import ExpressionError, evaluate
+from .motion import AxisKind, JointAxis
+from .words import JointWords, LimbWords, RepeatWords, RobotError, RobotWords, VectorExpression
+
+#: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
+#: leaves no entries of rounding error in the expressions.
+_EXACT = 1e-15
+#: Letters of an expression that a message shows.
+_LONGEST_SHOWN = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint at home.
+
+    Attributes:
+        place: limb and joint, for messages.
+        type: its letter, ``R, P, H, C, U, S`` or ``Pa``.
+        point: (3, 1) its centre or a point of its axis, length.
+        axes: its axes, each with one variable, the base side first; those of a spherical joint are along x, y and z.
+        actuated: whether an actuator drives it.
+        parts: the joints as they are written that this one stands for; empty for a joint as it is written.
+    """
+
+    place: str
+    type: str
+    point: SX
+    axes: tuple[JointAxis, ...]
+    actuated: bool
+    parts: tuple[Joint, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """A limb at home.
+
+    Attributes:
+        name: of the limb.
+        place: for messages.
+        group: index of the written limb that it is a copy of.
+        stem: joints that all paths share, from the base on.
+        branches: joints of each path behind the stem; one empty path for a limb without branches.
+        centre: (3, 1) the centre that the user gives, length; None for that of the rule.
+    """
+
+    name: str
+    place: str
+    group: int
+    stem: tuple[Joint, ...]
+    branches: tuple[tuple[Joint, ...], ...]
+    centre: SX | None
+
+    @property
+    def paths(self) -> list[tuple[Joint, ...]]:
+        """Joints of each path from base to platform."""
+        return [(*self.stem, *branch) for branch in self.branches]
+
+
+@dataclass(frozen=True, eq=False)
+class HomeRobot:
+    """A robot at home.
+
+    Attributes:
+        words: as it is written.
+        symbols: (d, 1) symbols of its dimensions, in order; radians for angles.
+        typical: (d,) their typical values.
+        home: (3, 1) origin of the platform frame, length.
+        size: (1, 1) a length of the order of the robot's own, by which lengths become plain numbers.
+        limbs: its limbs.
+    """
+
+    words: RobotWords
+    symbols: SX
+    typical: FloatArray
+    home: SX
+    size: SX
+    limbs: tuple[Limb, ...]
+
+
+def home_robot(words: RobotWords) -> HomeRobot:
+    """Return a robot at home, from its words.
+
+    Raises:
+        RobotError: an expression has a fault.
+    """
+    symbols = {name: SX.sym(name) for name in words.dimensions}
+    typical = [
+        math.radians(item.typical) if item.kind is Dimension.ANGLE else item.typical
+        for item in words.dimensions.values()
+    ]
+    names: dict[str, SX] = dict(symbols)
+    for name, text in words.derived.items():
+        names[name] = _scalar(f"derived.{name}", text, names)
+    home = _vector("home", words.home, names)
+    limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, names)]
+    stacked = ca.vertcat(SX(0, 1), *symbols.values())
+    lengths = [symbols[name] for name, item in words.dimensions.items() if item.kind is Dimension.LENGTH]
+    return HomeRobot(words, stacked, np.array(typical), home, _size(lengths, limbs, stacked), tuple(limbs))
+
+
+def _size(lengths: Sequence[SX], limbs: Sequence[Limb], symbols: SX) -> SX:
+    """Return a length of the order of the robot's, smooth and positive for all dimensions but zero.
+
+    It is the root of the sum of the squares of the dimensions that are lengths; without any, the largest coordinate of
+    a joint, or 1 where all joints are at the origin.
+    """
+    if lengths:
+        return ca.norm_2(ca.vertcat(*lengths))
+    points = ca.veccat(*[joint.point for limb in limbs for path in limb.paths for joint in path])
+    middle = ca.Function("points", [symbols], [ca.densify(points)])(1.0).full()
+    largest = float(np.nan_to_num(np.abs(middle)).max())
+    return SX(largest or 1.0)
+
+
+def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
+    """Return the copies of a limb."""
+    known = dict(names)
+    for name, written in words.points.items():
+        if name in known:
+            raise RobotError(f"{words.place}, point {name}", "has the name of a dimension")
+        known[name] = _vector(f"{words.place}, point {name}", written, known)
+    stem = tuple(_joint(joint, known) for joint in words.stem)
+    branches = tuple(tuple(_joint(joint, known) for joint in branch) for branch in words.branches) or ((),)
+    centre = None if words.centre is None else _vector(f"{words.place}, centre", words.centre, known)
+    first = Limb("", words.place, group, stem, branches, centre)
+    turns = [None] if words.repeat is None else _turns(words.repeat)
+    return [_turned(first, name, turn) for name, turn in zip(words.names, turns, strict=True)]
+
+
+def _turns(repeat: RepeatWords) -> list[Displacement]:
+    """Return the displacement of each copy of a repeated limb."""
+    axis = unit_vector(repeat.axis)
+    screw = Screw(axis, np.array(repeat.through), 0.0, 1.0)
+    turns = []
+    for angle in repeat.angles:
+        rotation = np.array(screw_displacement(screw, math.radians(angle)).rotation)
+        for exact in (-1.0, -0.5, 0.0, 0.5, 1.0):
+            rotation[np.abs(rotation - exact) < _EXACT] = exact
+        through = np.array(repeat.through)
+        turns.append(Displacement.by(rotation, through - rotation @ through))
+    return turns
+
+
+def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
+    """Return a copy of a limb after a displacement."""
+    if turn is None or turn.is_identity:
+        return replace(limb, name=name)
+    Q, t = SX(turn.rotation.tolist()), SX(turn.translation.tolist())
+
+    def joint(each: Joint) -> Joint:
+        axes = each.axes if each.type == "S" else tuple(replace(one, axis=Q @ one.axis) for one in each.axes)
+        axes = tuple(replace(one, point=Q @ one.point + t, rod=Q @ one.rod) for one in axes)
+        return replace(each, point=Q @ each.point + t, axes=axes)
+
+    return replace(
+        limb,
+        name=name,
+        stem=tuple(joint(each) for each in limb.stem),
+        branches=tuple(tuple(joint(each) for each in branch) for branch in limb.branches),
+        centre=None if limb.centre is None else Q @ limb.centre + t,
+    )
+
+
+def _joint(words: JointWords, names: Mapping[str, SX]) -> Joint:
+    """Return a joint at home."""
+    point = _vector(f"{words.place}, at", words.at, names)
+    none = SX.zeros(3)
+
+    def axis(kind: AxisKind, direction: SX, pitch: SX | None = None, rod: SX = none) -> JointAxis:
+        return JointAxis(kind, direction, point, words.actuated, SX(0) if pitch is None else pitch, rod)
+
+    given = [_direction(f"{words.place}, axis", each, names) for each in words.axes]
+    match words.type:
+        case "S":
+            axes = [axis(AxisKind.ROTATION, SX(np.eye(3)[k].tolist())) for k in range(3)]
+        case "P":
+            axes = [axis(AxisKind.TRANSLATION, given[0])]
+        case "C":
+            axes = [axis(AxisKind.ROTATION, given[0]), axis(AxisKind.TRANSLATION, given[0])]
+        case "H":
+            axes = [axis(AxisKind.ROTATION, given[0], _scalar(f"{words.place}, pitch", words.pitch, names))]
+        case "Pa":
+            to = _vector(f"{words.place}, to", words.to if words.to is not None else words.at, names)
+            axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
+        case _:
+            axes = [axis(AxisKind.ROTATION, each) for each in given]
+    return Joint(words.place, words.type, point, tuple(axes), words.actuated)
+
+
+def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:
+    """Return a unit vector (3, 1)."""
+    vector = _vector(place, written, names)
+    if vector.is_constant():
+        numbers = np.array(ca.DM(vector)).ravel()
+        if not numbers.any():
+            raise RobotError(place, f"is {written!r}, which is zero; a direction is needed")
+        return SX(unit_vector(numbers).tolist())
+    return vector / ca.norm_2(vector)
+
+
+def _vector(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:
+    """Return the value of a vector expression, (3, 1)."""
+    if not isinstance(written, str):
+        return ca.vertcat(*[_scalar(place, each, names) for each in written])
+    value = _evaluated(place, written, names)
+    if value.shape != (3, 1):
+        raise RobotError(place, f"is {written!r}, which is a number; a vector is needed")
+    return value
+
+
+def _scalar(place: str, written: str | float, names: Mapping[str, SX]) -> SX:
+    """Return the value of a scalar expression, (1, 1)."""
+    value = _evaluated(place, written, names)
+    if not value.is_scalar():
+        raise RobotError(place, f"is {written!r}, which is a vector; a number is needed")
+    return value
+
+
+def _evaluated(place: str, written: str | float, names: Mapping[str, SX]) -> SX:
+    try:
+        return evaluate(written, names)
+    except ExpressionError as error:
+        raise RobotError(place, f"is {_shown(written)}, which {error}") from None
+
+
+def _shown(written: str | float) -> str:
+    """Return an expression for a message, cut to a length that is read."""
+    text = repr(written)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."

@@ -1,0 +1,129 @@
+"""The joint at which a limb's loop is opened, so that few variables of joints become unknowns.
+
+The variables of the joint at the cut, and of the joints of a rod, never become unknowns. A rod is a passive spherical
+joint next to a passive universal or spherical joint, or with one actuated slide between: its length is then given by
+the two points, or is driven by the actuator.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from .chain import HomeRobot, Joint
+from .generic import are_parallel, meeting_point
+from .motion import AxisKind, JointAxis
+
+
+class Cut(NamedTuple):
+    """The place at which a path of joints is opened: joints ``first`` to ``last`` are left out of both sides.
+
+    Attributes:
+        type: letter of the joint at the cut; empty where no joint is cut.
+        joint: index of the joint at the cut.
+        first, last: first and last joint between the two sides; ``last`` is below ``first`` where no joint is cut.
+        far: index of the joint at the rod's other end; None without a rod.
+        slide: index of the actuated slide of the rod; None for a rod of constant length.
+    """
+
+    type: str
+    joint: int
+    first: int
+    last: int
+    far: int | None = None
+    slide: int | None = None
+
+
+def simplified(robot: HomeRobot, joints: Sequence[Joint], samples: FloatArray) -> list[Joint]:
+    """Return joints with three passive rotations through one point as a spherical joint, and two as a universal one.
+
+    Rotations count where they follow each other, and where no two that follow each other are parallel.
+    """
+    found = list(joints)
+    for count, kind in ((3, "S"), (2, "U")):
+        end = len(found)
+        while end > 0:
+            start = _window(found, end, count)
+            if start is not None and end - start > 1:
+                point = _common_point(robot, [axis for each in found[start:end] for axis in each.axes], samples)
+                if point is not None:
+                    found[start:end] = [_merged(found[start:end], kind, point)]
+                    end = start
+                    continue
+            end -= 1
+    return found
+
+
+def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
+    """Return the first of the joints before ``end`` whose axes are so many passive rotations; None without such."""
+    start, left = end, count
+    while start > 0 and left > 0:
+        joint = joints[start - 1]
+        if joint.type not in ("R", "U") or joint.actuated:
+            return None
+        start, left = start - 1, left - len(joint.axes)
+    return start if left == 0 else None
+
+
+def _common_point(robot: HomeRobot, axes: Sequence[JointAxis], samples: FloatArray) -> SX | None:
+    pairs = itertools.pairwise(axes)
+    if any(are_parallel(robot, one.axis, other.axis, samples) for one, other in pairs):
+        return None
+    return meeting_point(robot, [(axis.point, axis.axis) for axis in axes], samples)
+
+
+def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
+    axes = tuple(axis for joint in joints for axis in joint.axes)
+    if kind == "S":
+        basis = (SX(np.eye(3)[k].tolist()) for k in range(3))
+        axes = tuple(
+            JointAxis(AxisKind.ROTATION, each, point, actuated=False, pitch=SX(0), rod=SX.zeros(3)) for each in basis
+        )
+    return Joint(joints[0].place, kind, point, axes, actuated=False, parts=tuple(joints))
+
+
+def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:
+    """Return the place at which a path is opened.
+
+    The cut is at the passive spherical joint nearest the platform; without one at a universal joint, else at a joint R,
+    of several the one that leaves sides with equal numbers of variables.
+
+    Args:
+        joints: from base to platform.
+        stem: number of joints at the base that are shared with other paths, and must stay on the base's side.
+        with_rods: whether a rod may be left out as a whole.
+    """
+    spherical = [j for j in range(stem, len(joints)) if joints[j].type == "S"]
+    if spherical:
+        j = spherical[-1]
+        rod = _rod(joints, stem, j) if with_rods else None
+        return Cut("S", j, j, j) if rod is None else rod
+    for kind in ("U", "R"):
+        found = [j for j in range(stem, len(joints)) if joints[j].type == kind and not joints[j].actuated]
+        if found:
+            j = min(found, key=lambda each: (_imbalance(joints, each, each + 1), -each))
+            return Cut(kind, j, j, j)
+    first = min(range(stem, len(joints) + 1), key=lambda each: (_imbalance(joints, each, each), -each))
+    return Cut("", first, first, first - 1)
+
+
+def _imbalance(joints: Sequence[Joint], first: int, behind: int) -> int:
+    """Return the difference of the numbers of variables before ``first`` and from ``behind`` on."""
+    before, after = (sum(len(joint.axes) for joint in part) for part in (joints[:first], joints[behind:]))
+    return abs(before - after)
+
+
+def _rod(joints: Sequence[Joint], stem: int, j: int) -> Cut | None:
+    """Return the cut at a rod that ends at a spherical joint; None where there is no rod."""
+    for step in (-1, 1):
+        far, slide = j + step, None
+        if stem <= far < len(joints) and joints[far].type == "P" and joints[far].actuated:
+            far, slide = far + step, far
+        if stem <= far < len(joints) and joints[far].type in ("U", "S") and not joints[far].actuated:
+            return Cut("S", j, min(j, far), max(j, far), far, slide)
+    return None

@@ -1,0 +1,185 @@
+"""The language of a robot's numbers: ``rb + arm*cos(tilt)``, ``E + w/2*y``, ``cross(y, A - E)``.
+
+An expression consists of numbers, names, ``+ - * / ^``, brackets, and the functions of :data:`FUNCTIONS`. Values are
+scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser only makes a tree
+of the text; each node of the tree is accepted here by its type, and anything else is refused, so that a text can
+neither reach an attribute nor call anything but these functions.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import casadi as ca
+from casadi import SX
+
+#: Longest text of an expression. The longest that a person writes has a few hundred letters.
+_LONGEST = 2000
+#: Deepest nesting of an expression: far below the depth at which Python's own recursion ends.
+_DEEPEST = 60
+_LARGEST_POWER = 100.0
+
+
+class ExpressionError(ValueError):
+    """Error of a text that is no expression; the message is a clause about the text."""
+
+
+def _scalar(function: Callable[[SX], SX]) -> Callable[..., SX]:
+    """Return a function of one scalar that refuses vectors."""
+
+    def of_scalar(value: SX) -> SX:
+        if not value.is_scalar():
+            raise ExpressionError("needs a number here, not a vector")
+        return function(value)
+
+    return of_scalar
+
+
+def _of_vectors(function: Callable[..., SX]) -> Callable[..., SX]:
+    """Return a function of vectors that refuses scalars."""
+
+    def of_vectors(*values: SX) -> SX:
+        if any(value.is_scalar() for value in values):
+            raise ExpressionError("needs a vector here, not a number")
+        return function(*values)
+
+    return of_vectors
+
+
+def _atan2(first: SX, second: SX) -> SX:
+    if not (first.is_scalar() and second.is_scalar()):
+        raise ExpressionError("needs numbers in atan2, not vectors")
+    return ca.atan2(first, second)
+
+
+#: The functions by name, each with its number of arguments.
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = MappingProxyType(
+    {
+        "sin": (1, _scalar(ca.sin)),
+        "cos": (1, _scalar(ca.cos)),
+        "tan": (1, _scalar(ca.tan)),
+        "sqrt": (1, _scalar(ca.sqrt)),
+        "abs": (1, _scalar(ca.fabs)),
+        "atan2": (2, _atan2),
+        "cross": (2, _of_vectors(ca.cross)),
+        "dot": (2, _of_vectors(ca.dot)),
+        "norm": (1, _of_vectors(ca.norm_2)),
+        "unit": (1, _of_vectors(lambda vector: vector / ca.norm_2(vector))),
+    }
+)
+#: Names that every expression knows.
+CONSTANTS: Mapping[str, SX] = MappingProxyType(
+    {"x": SX([1, 0, 0]), "y": SX([0, 1, 0]), "z": SX([0, 0, 1]), "pi": SX(math.pi)}
+)
+
+
+def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
+    """Return the value of an expression, (1, 1) or (3, 1).
+
+    Args:
+        written: its text, or a number.
+        names: values of the names that it may use, beside those of :data:`CONSTANTS`.
+
+    Raises:
+        ExpressionError: the text is no expression, or its value is a constant that is not finite.
+    """
+    value = _value(_tree(written), names, 0) if isinstance(written, str) else _number(written)
+    if value.is_constant() and not value.is_regular():
+        raise ExpressionError("has no finite value")
+    return ca.densify(value)
+
+
+def _tree(text: str) -> ast.expr:
+    """Return the syntax tree of a text, in which ``^`` is a power."""
+    if len(text) > _LONGEST:
+        raise ExpressionError(f"is longer than {_LONGEST} letters")
+    if "**" in text:
+        raise ExpressionError("has '**': a power is written '^'")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's advice on texts such as 1if: they are refused below
+            return ast.parse(text.strip().replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError("is no expression of numbers, names, + - * / ^ and functions") from None
+
+
+def _value(node: ast.expr, names: Mapping[str, SX], depth: int) -> SX:  # noqa: PLR0911 - one return a kind of node
+    """Return the value of a node, (1, 1) or (3, 1)."""
+    if depth > _DEEPEST:
+        raise ExpressionError(f"has more than {_DEEPEST} operations in each other")
+    match node:
+        case ast.Constant(value=value):
+            return _number(value)
+        case ast.Name(id=name) if name in names:
+            return names[name]
+        case ast.Name(id=name) if name in CONSTANTS:
+            return CONSTANTS[name]
+        case ast.Name(id=name):
+            raise ExpressionError(f"has the name {name!r}, which is unknown; {_hint(name, [*names, *CONSTANTS])}")
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _value(operand, names, depth + 1)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_value(operand, names, depth + 1)
+        case ast.BinOp(left=left, op=operator, right=right):
+            return _operation(operator, _value(left, names, depth + 1), _value(right, names, depth + 1))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+            return _call(name, [_value(each, names, depth + 1) for each in arguments])
+    raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+
+
+def _number(value: object) -> SX:
+    """Return a number as an expression."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ExpressionError("has a number that is not finite")
+    return SX(number)
+
+
+def _operation(operator: ast.operator, first: SX, second: SX) -> SX:
+    """Return the value of an operation."""
+    match operator:
+        case ast.Add() | ast.Sub():
+            if first.shape != second.shape:
+                raise ExpressionError("adds or subtracts a number and a vector")
+            return first + second if isinstance(operator, ast.Add) else first - second
+        case ast.Mult():
+            if not (first.is_scalar() or second.is_scalar()):
+                raise ExpressionError("multiplies two vectors: use dot or cross")
+            return first * second
+        case ast.Div():
+            if not second.is_scalar():
+                raise ExpressionError("divides by a vector")
+            return first / second
+        case ast.Pow():
+            if not (first.is_scalar() and second.is_scalar()):
+                raise ExpressionError("has a vector in a power")
+            if second.is_constant() and abs(float(second)) > _LARGEST_POWER:
+                raise ExpressionError(f"has a power larger than {_LARGEST_POWER:g}")
+            return first**second
+    raise ExpressionError("may have only the operations + - * / ^")
+
+
+def _call(name: str, arguments: list[SX]) -> SX:
+    """Return the value of a function."""
+    if name not in FUNCTIONS:
+        raise ExpressionError(f"has the function {name!r}, which is unknown; {_hint(name, FUNCTIONS)}")
+    count, function = FUNCTIONS[name]
+    if len(arguments) != count:
+        raise ExpressionError(f"gives {name} {len(arguments)} arguments instead of {count}")
+    return function(*arguments)
+
+
+def _hint(name: str, known: Mapping[str, object] | list[str]) -> str:
+    """Return a clause about the names that are known."""
+    near = difflib.get_close_matches(name, list(known), 1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"

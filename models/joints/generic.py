@@ -1,0 +1,146 @@
+"""Ranks and incidences of a limb that hold for almost all dimensions, found at random numbers.
+
+One limb alone needs no closed loop: any values of its joints' variables are possible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from .chain import HomeRobot, Joint
+from .motion import AxisKind, Motion
+from .words import RobotError
+
+#: Number of random points at which ranks are measured; the largest rank counts.
+SAMPLES = 6
+#: Part of a typical dimension by which the samples vary; halved while a sample has no finite value.
+_SPREAD = 0.2
+_HALVINGS = 8
+#: Singular values below this part of the largest, of columns of unit length, are zero: rounding leaves 1e-15, and a
+#: limb that is this near to a lower rank at every one of several random points has it.
+RANK_TOLERANCE = 1e-7
+#: Axes are parallel or meet where their cross product, or their distance in parts of the robot's size, is below this.
+_INCIDENT = 1e-9
+
+
+def sampled_dimensions(robot: HomeRobot) -> FloatArray:
+    """Return values (SAMPLES, d) of the dimensions around the typical ones, at which the robot's home is finite.
+
+    Raises:
+        RobotError: the home has no finite value at the typical dimensions.
+    """
+    joints = [joint for limb in robot.limbs for path in limb.paths for joint in path]
+    parts = [part for joint in joints for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)]
+    outputs = ca.densify(ca.veccat(robot.home, *parts))
+    function = ca.Function("home", [robot.symbols], [outputs])
+    for joint in joints:
+        own = ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])
+        if not np.isfinite(ca.Function("joint", [robot.symbols], [ca.densify(own)])(robot.typical).full()).all():
+            raise RobotError(joint.place, "has no finite place or axis at the typical dimensions")
+    if not np.isfinite(function(robot.typical).full()).all():
+        raise RobotError("home", "has no finite value at the typical dimensions")
+    rng = np.random.default_rng(0)
+    scale = np.where(robot.typical == 0, float(np.abs(robot.typical).max(initial=0.0)) or 1.0, robot.typical)
+    shares = rng.uniform(-1.0, 1.0, (SAMPLES, len(robot.typical)))
+    rows = []
+    for share in shares:
+        spread = _SPREAD
+        for _ in range(_HALVINGS):
+            row = robot.typical + spread * share * scale
+            if np.isfinite(function(row).full()).all():
+                break
+            spread /= 2
+        else:
+            row = robot.typical
+        rows.append(row)
+    return np.array(rows)
+
+
+def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
+    """Return the current screws (6, 1) of each joint's axes for any values of their variables, from the base on.
+
+    Args:
+        joints: from base to platform.
+        values: (n, 1) a variable for each axis in order.
+    """
+    at, k, found = Motion.none(), 0, []
+    for joint in joints:
+        own = []
+        for axis in joint.axes:
+            own.append(axis.screw(values[k], at))
+            at = at.after(axis.motion(values[k]))
+            k += 1
+        found.append(own)
+    return found
+
+
+def rank_of(columns: FloatArray) -> int:
+    """Return the rank of columns, each taken with unit length."""
+    lengths = np.linalg.norm(columns, axis=0)
+    unit = columns[:, lengths > 0] / lengths[lengths > 0]
+    if not unit.size:
+        return 0
+    values = np.linalg.svd(unit, compute_uv=False)
+    return int(np.count_nonzero(values > RANK_TOLERANCE * values[0]))
+
+
+def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray:
+    """Return random values of the variables of joints: angles in radians, and lengths of the robot's size."""
+    rng = np.random.default_rng(seed)
+    axes = [axis for joint in joints for axis in joint.axes]
+    unit = np.array([size if axis.kind is AxisKind.TRANSLATION else 1.0 for axis in axes])
+    return np.asarray(unit * rng.uniform(-0.7, 0.7, len(axes)))
+
+
+def generic_rank(robot: HomeRobot, joints: Sequence[Joint], columns: SX, values: SX, samples: FloatArray) -> int:
+    """Return the largest rank of columns of a limb's screws at random dimensions and joint variables.
+
+    Args:
+        robot: the robot.
+        joints: of the limb.
+        columns: (k, n) expressions of the dimensions and of the values.
+        values: (v, 1) symbols of the joints' variables.
+        samples: (s, d) dimensions.
+    """
+    if columns.shape[1] == 0:
+        return 0
+    function = ca.Function("columns", [robot.symbols, values], [ca.densify(columns)])
+    size = ca.Function("size", [robot.symbols], [robot.size])
+    ranks = []
+    for k, sample in enumerate(samples):
+        reach = float(size(sample))
+        found = function(sample, random_values(joints, reach, k)).full()
+        if found.shape[0] == 6:
+            found[3:] /= reach
+        ranks.append(rank_of(found))
+    return max(ranks)
+
+
+def are_parallel(robot: HomeRobot, one: SX, other: SX, samples: FloatArray) -> bool:
+    """Return whether two unit vectors (3, 1) are parallel for all dimensions."""
+    function = ca.Function("parallel", [robot.symbols], [ca.norm_2(ca.cross(one, other))])
+    return all(float(function(sample)) < _INCIDENT for sample in samples)
+
+
+def meeting_point(robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: FloatArray) -> SX | None:
+    """Return the point (3, 1) through which lines pass for all dimensions; None where they do not meet in one point.
+
+    Args:
+        robot: the robot.
+        lines: two or more, each a point (3, 1) and a unit direction (3, 1); the first two must not be parallel.
+        samples: (s, d) dimensions.
+    """
+    (p1, a1), (p2, a2), *_ = lines
+    normal = ca.cross(a1, a2)
+    met = p1 + a1 * (ca.dot(ca.cross(p2 - p1, a2), normal) / ca.sumsqr(normal))
+    for candidate in (p1, p2, met):
+        off = ca.vertcat(*[ca.cross(candidate - point, direction) for point, direction in lines]) / robot.size
+        function = ca.Function("meeting", [robot.symbols], [ca.densify(off)])
+        if all(np.abs(function(sample).full()).max() < _INCIDENT for sample in samples):
+            return candidate
+    return None

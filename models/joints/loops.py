@@ -1,0 +1,120 @@
+"""Independent loop equations: those of an overconstrained robot depend on each other, and a program needs some alone.
+
+The equations are measured at random closed configurations: random dimensions, and a pose near home from which Newton's
+method with least-norm steps closes all loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..rotation import matrix_from_cayley
+from ..rows import DEPENDENT, independent_rows
+from .chain import HomeRobot
+from .words import RobotError
+
+#: Closed configurations that are tried; the largest rank among them counts.
+_POINTS = 5
+#: Newton steps to a closed configuration, and the residual that ends them: equations are of order 1.
+_STEPS = 40
+_CLOSED = 1e-12
+#: Largest random change of the pose's coordinates and of the unknowns, in the robot's size and radians.
+_CHANGES = (0.15, 0.05)
+
+
+class ClosedPoint(NamedTuple):
+    """A closed configuration.
+
+    Attributes:
+        dimensions: (d,) values.
+        rotation: (3, 3) of the platform.
+        position: (3,) of the platform's origin, length.
+        unknowns: (u,) values.
+    """
+
+    dimensions: FloatArray
+    rotation: FloatArray
+    position: FloatArray
+    unknowns: FloatArray
+
+
+class Loops(NamedTuple):
+    """Closed configurations of a robot, and the indices of the independent ones among its loop equations."""
+
+    points: tuple[ClosedPoint, ...]
+    independent: tuple[int, ...]
+
+
+class PoseOf(NamedTuple):
+    """Symbols of the platform's pose in the equations: rotation (3, 3), and position (3, 1), length."""
+
+    rotation: SX
+    position: SX
+
+
+def examine_loops(robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unknowns: SX, samples: FloatArray) -> Loops:
+    """Return closed configurations near home, and which of the loop equations are independent there.
+
+    Args:
+        robot: the robot.
+        equations: (1, 1) expressions of dimensions, pose and unknowns; zero where the loops are closed.
+        pose: symbols of the pose.
+        unknowns: (u, 1) symbols.
+        samples: (s, d) random dimensions.
+
+    Raises:
+        RobotError: no closed configuration was found near home.
+    """
+    c, shift = SX.sym("c", 3), SX.sym("shift", 3)
+    moving = ca.vertcat(c, shift, unknowns)
+    rotation, position = matrix_from_cayley(c), robot.home + robot.size * shift
+    stacked = ca.vertcat(SX(0, 1), *equations)
+    (residual,) = ca.Function("closure", [robot.symbols, unknowns, pose.rotation, pose.position], [stacked]).call(
+        [robot.symbols, unknowns, rotation, position]
+    )
+    slopes = _slopes(residual, moving, robot)
+    function = ca.Function("loops", [moving, robot.symbols], [ca.densify(residual), ca.densify(slopes)])
+    placed = ca.Function("placed", [moving, robot.symbols], [rotation, ca.densify(position)])
+    points: list[ClosedPoint] = []
+    jacobians: list[FloatArray] = []
+    rng = np.random.default_rng(1)
+    free = moving.numel()
+    for change in _CHANGES:
+        for sample in samples:
+            if len(points) >= _POINTS:
+                break
+            z = change * rng.uniform(-1.0, 1.0, free)
+            found = _closed(function, z, sample)
+            if found is not None:
+                R, p = (each.full() for each in placed(found, sample))
+                points.append(ClosedPoint(sample, R, p.ravel(), found[6:]))
+                jacobians.append(function(found, sample)[1].full())
+    if not points:
+        raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")
+    return Loops(tuple(points), independent_rows(jacobians))
+
+
+def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
+    """Return the Jacobian by pose, unknowns and dimensions, lengths in parts of the robot's size."""
+    own = ca.jacobian(residual, robot.symbols)
+    scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
+    scaled = [own[:, k] * scale for k, scale in enumerate(scales)]
+    return ca.horzcat(ca.jacobian(residual, moving), *scaled)
+
+
+def _closed(function: ca.Function, z: FloatArray, sample: FloatArray) -> FloatArray | None:
+    """Return pose and unknowns at which the loops are closed; None where Newton's method does not converge."""
+    for _ in range(_STEPS):
+        residual, slopes = (each.full() for each in function(z, sample))
+        if not np.isfinite(residual).all() or not np.isfinite(slopes).all():
+            return None
+        if not residual.size or float(np.abs(residual).max()) < _CLOSED:
+            return z
+        z = z - np.linalg.lstsq(slopes[:, : len(z)], residual.ravel(), rcond=DEPENDENT)[0]
+    return z if float(np.abs(residual).max()) < np.sqrt(_CLOSED) else None

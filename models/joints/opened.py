@@ -1,0 +1,251 @@
+"""A path of joints whose loop through base and platform is opened: its current screws, and the equations that close it.
+
+From the base on, a body is displaced by the joints before it; from the platform on, by the pose and the joints behind
+it. The two sides meet at the cut, where equations say that the joint there holds together:
+
+* spherical: its two centres coincide (3 equations);
+* universal: the same, and the angle between its axes is that at home (4);
+* R: its two centres coincide, and its two axes are parallel (5);
+* a rod of constant length: the distance of its ends is that at home (1); of a rod that is driven: none;
+* no joint: the two bodies coincide (6).
+
+Lengths in the equations are divided by the robot's size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from .chain import Joint
+from .cut import Cut
+from .motion import Motion
+
+#: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
+_STRAIGHT = 1e-14
+#: Returns the variable of one axis of a joint: a symbol, times the robot's size for a translation.
+Variables = Callable[[Joint, int], SX]
+
+
+@dataclass(eq=False)
+class OpenedPath:
+    """A path of joints at any pose.
+
+    Attributes:
+        joints: from base to platform.
+        cut: where it is opened.
+        screws: current screws (6, 1) of the axes of each joint; none for a joint of a rod whose axes are not known.
+        behind: displacement of the body behind each joint, on the platform's side; none for joints between two sides.
+        points: (3, 1) current place of each joint on the body before it, on the base's side, length.
+        sides: displacement of the bodies on the base's and on the platform's side of the cut.
+        rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
+        equations: expressions that are zero where the path is closed.
+        checks: further expressions that are zero there: signs that the equations leave open.
+    """
+
+    joints: Sequence[Joint]
+    cut: Cut
+    screws: list[list[SX]]
+    behind: list[Motion | None]
+    points: list[SX]
+    sides: tuple[Motion, Motion]
+    rod: SX | None = None
+    equations: list[SX] = field(default_factory=list)
+    checks: list[SX] = field(default_factory=list)
+
+
+class PathFrame:
+    """Values that all paths of a robot share: its size, the platform's displacement, and numbers of its dimensions.
+
+    Args:
+        size: (1, 1) the robot's size, length.
+        platform: displacement of the platform from home.
+        symbols: (d, 1) of the dimensions.
+        typical: (d,) their typical values.
+        samples: (s, d) other values of them.
+    """
+
+    def __init__(self, size: SX, platform: Motion, symbols: SX, typical: FloatArray, samples: FloatArray) -> None:
+        self.size, self.platform = size, platform
+        self._symbols, self._typical, self._samples = symbols, typical, samples
+
+    def typical_value(self, expression: SX) -> FloatArray:
+        """Return the typical value of an expression of the dimensions, as an array of its shape."""
+        found = ca.Function("typical", [self._symbols], [ca.densify(expression)])(self._typical)
+        return np.asarray(found.full(), dtype=np.float64)
+
+    def typical_triple(self, vector: SX) -> tuple[float, float, float]:
+        """Return the typical value of a vector (3, 1)."""
+        x, y, z = (float(value) for value in self.typical_value(vector).ravel())
+        return x, y, z
+
+    def sampled(self, expression: SX) -> list[float]:
+        """Return the values of a scalar expression of the dimensions at all samples."""
+        function = ca.Function("sampled", [self._symbols], [ca.densify(expression)])
+        return [float(function(each)) for each in self._samples]
+
+
+def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: PathFrame) -> OpenedPath:
+    """Return a path that is opened at a cut.
+
+    Args:
+        joints: from base to platform.
+        cut: where it is opened.
+        variables: of the axes of all joints that are not between the two sides.
+        frame: values that all paths of the robot share.
+    """
+    count = len(joints)
+    ends = Motion.none(), frame.platform
+    path = OpenedPath(joints, cut, [[] for _ in joints], [None] * count, [joint.point for joint in joints], ends)
+    base = Motion.none()
+    for j in range(cut.first):
+        path.points[j] = base.point(joints[j].point)
+        for a, axis in enumerate(joints[j].axes):
+            value = variables(joints[j], a)
+            path.screws[j].append(axis.screw(value, base))
+            base = base.after(axis.motion(value))
+        path.behind[j] = base
+    platform = frame.platform
+    for j in range(count - 1, cut.last, -1):
+        path.behind[j] = platform
+        for a in range(len(joints[j].axes) - 1, -1, -1):
+            axis, value = joints[j].axes[a], variables(joints[j], a)
+            path.screws[j].insert(0, axis.screw(value, platform))
+            platform = platform.after(axis.motion(value).inverse())
+        path.points[j] = platform.point(joints[j].point)
+    path.sides = base, platform
+    if cut.far is not None:
+        _join_rod(path, base, platform, frame)
+    elif cut.type:
+        _join_joint(path, base, platform, frame)
+    else:
+        turn = base.rotation.T @ platform.rotation
+        place = joints[min(cut.first, count - 1)].point
+        apart = base.rotation.T @ (platform.point(place) - base.point(place)) / frame.size
+        path.equations += [*ca.vertsplit(ca.inv_skew(turn - turn.T) / 2), *ca.vertsplit(apart)]
+        path.checks.append(3 - ca.trace(turn))
+    return path
+
+
+def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
+    """Add screws and equations of a joint at the cut."""
+    joints, j = path.joints, path.cut.joint
+    joint = joints[j]
+    ends = base.point(joint.point), platform.point(joint.point)
+    path.equations += ca.vertsplit((ends[0] - ends[1]) / frame.size)
+    shorter_base = sum(len(each.axes) for each in joints[:j]) < sum(len(each.axes) for each in joints[j + 1 :])
+    path.points[j] = ends[0] if shorter_base else ends[1]
+    path.behind[j] = platform
+    if joint.type == "S":
+        path.screws[j] = _rotations_about(path.points[j])
+        return
+    if joint.type == "U":
+        first, second = joint.axes
+        path.screws[j] = [first.screw(SX(0), base), second.screw(SX(0), platform)]
+        angle = ca.dot(first.axis, second.axis)
+        path.equations.append(ca.dot(base.rotation @ first.axis, platform.rotation @ second.axis) - angle)
+        return
+    (axis,) = joint.axes
+    path.screws[j] = [axis.screw(SX(0), base)]
+    across, turned = _normals(axis.axis, frame), platform.rotation @ axis.axis
+    path.equations += [ca.dot(base.rotation @ normal, turned) for normal in across]
+    path.checks.append(1 - ca.dot(base.rotation @ axis.axis, turned))
+
+
+def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
+    """Add screws, and the equation of a constant length, of a rod between the two sides."""
+    joints, cut = path.joints, path.cut
+    j, far, slide = cut.joint, cut.far, cut.slide
+    if far is None:
+        return
+    sides = (base, platform) if far < j else (platform, base)
+    home = joints[j].point - joints[far].point
+    path.points[far] = sides[0].point(joints[far].point)
+    path.points[j] = sides[1].point(joints[j].point)
+    path.rod = path.points[j] - path.points[far]
+    path.screws[j] = _rotations_about(path.points[j])
+    if joints[far].type == "S":
+        path.screws[far] = _rotations_about(path.points[far])
+    square = ca.sumsqr(home)
+    is_straight = True
+    if slide is not None:
+        offset = square - ca.dot(home, joints[slide].axes[0].axis) ** 2
+        is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
+    if joints[far].type == "U" and is_straight:
+        path.screws[far] = _universal_screws(path, sides[0], home, frame)
+    if slide is None:
+        path.equations.append((ca.sumsqr(path.rod) - square) / (2 * square))
+        return
+    # The slide's own direction is not known where it is not along the rod: only its part along the rod does work.
+    current = ca.sumsqr(path.rod)
+    part = 1 / ca.sqrt(current) if is_straight else ca.sqrt(current - offset) / current
+    path.screws[slide] = [ca.vertcat(SX.zeros(3), path.rod * part * _slide_sign(path, frame))]
+    path.points[slide] = (path.points[j] + path.points[far]) / 2
+
+
+def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame) -> list[SX]:
+    """Return the current screws of the universal joint at the far end of a rod, whose direction it follows.
+
+    One axis moves with the known body. The other keeps its angles against the first axis and against the rod. With the
+    first axis ``u`` and the rod's direction ``d`` it is ``a u + b d + g u x d``, where ``g`` has the sign of home. The
+    expressions have no value where the rod is along the first axis, or would have to be bent beyond its reach.
+
+    Args:
+        path: the path, with its rod.
+        side: displacement of the body that the first axis moves with.
+        home: (3, 1) the rod at home, length.
+        frame: values that all paths of the robot share.
+    """
+    far = path.cut.far
+    if far is None or path.rod is None:
+        return []
+    axes = path.joints[far].axes if far < path.cut.joint else path.joints[far].axes[::-1]
+    first, second = (axis.axis for axis in axes)
+    u, d, d_home = side.rotation @ first, path.rod / ca.norm_2(path.rod), home / ca.norm_2(home)
+    across, along, w = ca.dot(first, second), ca.dot(second, d_home), ca.dot(u, d)
+    a, b = (across - along * w) / (1 - w**2), (along - across * w) / (1 - w**2)
+    within = a * u + b * d
+    sign = -1.0 if frame.typical_value(ca.dot(second, ca.cross(first, d_home))).item() < 0 else 1.0
+    g = sign * ca.sqrt((1 - ca.sumsqr(within)) / (1 - w**2))
+    directions = [u, within + g * ca.cross(u, d)]
+    place = path.points[far]
+    return [ca.vertcat(each, ca.cross(place, each)) for each in directions]
+
+
+def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
+    """Return the way (1, 1) of the actuated slide of a path's rod from home, length; None without such a slide."""
+    cut = path.cut
+    if path.rod is None or cut.slide is None or cut.far is None:
+        return None
+    home = path.joints[cut.joint].point - path.joints[cut.far].point
+    along = ca.dot(home, path.joints[cut.slide].axes[0].axis)
+    way = ca.sqrt(ca.sumsqr(path.rod) - (ca.sumsqr(home) - along**2)) - ca.fabs(along)
+    return way * (_slide_sign(path, frame) if cut.far < cut.joint else -_slide_sign(path, frame))
+
+
+def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
+    """Return whether the slide of a path's rod points along the rod (1) or against it (-1)."""
+    cut = path.cut
+    if cut.slide is None or cut.far is None:
+        return 1.0
+    home = path.joints[cut.joint].point - path.joints[cut.far].point
+    along = frame.typical_value(ca.dot(path.joints[cut.slide].axes[0].axis, home)).item()
+    return -1.0 if along < 0 else 1.0
+
+
+def _rotations_about(point: SX) -> list[SX]:
+    """Return three rotations (6, 1) about a point."""
+    directions = (SX(np.eye(3)[k].tolist()) for k in range(3))
+    return [ca.vertcat(each, ca.cross(point, each)) for each in directions]
+
+
+def _normals(axis: SX, frame: PathFrame) -> list[SX]:
+    """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
+    order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
+    first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))
+    return [first, ca.cross(axis, first)]

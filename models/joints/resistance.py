@@ -1,0 +1,139 @@
+"""The rows and members of a path of joints: the wrenches with which it resists the platform, actuators locked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..member import Member
+from ..wrench import Wrench, force_along
+from .chain import HomeRobot, Joint
+from .cut import Cut
+from .generic import free_screws, generic_rank
+from .motion import AxisKind, Motion
+from .opened import OpenedPath
+
+
+class Ranks(NamedTuple):
+    """Ranks of a path at almost all dimensions and joint variables.
+
+    Attributes:
+        passive: of the screws of its passive joints.
+        all: of the screws of all its joints.
+        pinned: of the velocities that the passive joints but the one at the cut give to the centre of the spherical
+            joint there; None without such a joint.
+    """
+
+    passive: int
+    all: int
+    pinned: int | None
+
+
+class Centre(NamedTuple):
+    """A path's centre: a place at home (3, 1), length, on the body behind a joint."""
+
+    point: SX
+    behind: int
+
+
+def path_ranks(robot: HomeRobot, joints: Sequence[Joint], cut: Cut, samples: FloatArray) -> Ranks:
+    """Return the ranks of a path of joints."""
+    values = SX.sym("q", sum(len(joint.axes) for joint in joints))
+    screws = free_screws(joints, values)
+    passive = [j for j, joint in enumerate(joints) if not joint.actuated]
+
+    def rank(columns: list[SX], rows: int = 6) -> int:
+        return generic_rank(robot, joints, ca.horzcat(SX(rows, 0), *columns), values, samples)
+
+    pinned = None
+    if cut.type == "S":
+        at, k = Motion.none(), 0
+        for joint in joints[: cut.joint]:
+            for axis in joint.axes:
+                at = at.after(axis.motion(values[k]))
+                k += 1
+        centre = at.point(joints[cut.joint].point)
+        others = [screw for j in passive if j != cut.joint for screw in screws[j]]
+        pinned = rank([_velocity(screw, centre) for screw in others], 3)
+    return Ranks(
+        passive=rank([screw for j in passive for screw in screws[j]]),
+        all=rank([screw for own in screws for screw in own]),
+        pinned=pinned,
+    )
+
+
+def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> tuple[list[Wrench], Member | None]:
+    """Return the rows of a path, and its member where its wrenches are no few rows.
+
+    Args:
+        limb: name of the limb.
+        path: the path.
+        ranks: of the path.
+        given: (3, 1) the centre that the user gives at home, length; None for that of the rule.
+    """
+    if ranks.pinned is not None and given is None:
+        return _pinned(limb, path, ranks.pinned)
+    if ranks.passive == 6:
+        return [], None
+    screws = [screw for joint, own in zip(path.joints, path.screws, strict=True) if not joint.actuated for screw in own]
+    centre = _centre_of(path.joints, given)
+    body = path.behind[centre.behind]
+    place = path.points[centre.behind] if body is None else body.point(centre.point)
+    return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, ())
+
+
+def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Member | None]:
+    """Return the rows or the member of a path with a spherical joint at the cut: forces through its centre."""
+    centre = path.points[path.cut.joint]
+    if rank == 3:
+        return [], None
+    if path.rod is not None:
+        return [force_along(limb, centre, path.rod)], None
+    others = [
+        (axis.kind is AxisKind.ROTATION and bool(axis.pitch.is_zero()), screw)
+        for j, (joint, own) in enumerate(zip(path.joints, path.screws, strict=True))
+        if not joint.actuated and j != path.cut.joint
+        for axis, screw in zip(joint.axes, own, strict=True)
+    ]
+    velocities = [_velocity(screw, centre) for _, screw in others]
+    if rank == 0:
+        return [force_along(limb, centre, SX(np.eye(3)[k].tolist())) for k in range(3)], None
+    if rank == 2 and len(others) == 2:
+        return [force_along(limb, centre, ca.cross(velocities[0], velocities[1]))], None
+    if rank == 1 and len(others) == 1 and others[0][0]:
+        # The velocity w x d of a rotation about w is perpendicular to w.
+        direction = others[0][1][:3]
+        rows = [force_along(limb, centre, ca.cross(velocities[0], direction)), force_along(limb, centre, direction)]
+        return rows, None
+    screws = ca.horzcat(SX(6, 0), *[screw for _, screw in others])
+    return [], Member(limb, centre, screws, rank, (), is_pinned=True)
+
+
+def _centre_of(joints: Sequence[Joint], given: SX | None) -> Centre:
+    """Return the centre of a path without a spherical joint at the cut.
+
+    In this order: the one that the user gives; the meeting point of two passive rotations that follow each other,
+    nearest the platform; the point of the last passive joint.
+
+    Args:
+        joints: from base to platform, two rotations that meet as a universal joint.
+        given: (3, 1) the user's centre at home, length.
+    """
+    passive = [j for j, joint in enumerate(joints) if not joint.actuated]
+    last = passive[-1] if passive else len(joints) - 1
+    if given is not None:
+        return Centre(given, last)
+    for j in reversed(passive):
+        if joints[j].type == "U":  # two rotations that meet are a universal joint already
+            return Centre(joints[j].point, j)
+    return Centre(joints[last].point, last)
+
+
+def _velocity(screw: SX, point: SX) -> SX:
+    """Return the velocity (3, 1) that a twist (6, 1) gives to a point (3, 1)."""
+    return screw[3:] + ca.cross(screw[:3], point)

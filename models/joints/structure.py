@@ -1,0 +1,61 @@
+"""Structure of a path of joints for people: its joints, the place where its loop is opened, and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+
+from ..parts import Closure, PathStructure
+from .opened import OpenedPath
+from .resistance import Ranks
+
+
+def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns: int) -> PathStructure:
+    """Return the structure of a path, whose loop equations count as kept.
+
+    Args:
+        limb: name of the limb.
+        name: of the path: that of the limb, with the number of the branch where there are several.
+        path: the path.
+        ranks: of its screws.
+        unknowns: number of its joint variables that are unknowns and that no path before it has.
+    """
+    written = [part for joint in path.joints for part in (joint.parts or (joint,))]
+    count = len(path.equations)
+    return PathStructure(
+        limb=limb,
+        name=name,
+        joints=" ".join(f"{joint.type}*" if joint.actuated else joint.type for joint in written),
+        opened=_opened(path),
+        wrenches=6 - ranks.passive,
+        constraints=6 - ranks.all,
+        unknowns=unknowns,
+        equations=count,
+        kept=count,
+    )
+
+
+def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
+    """Return structures with the numbers of their loop equations among those that a program keeps."""
+    names = {each.name for each in kept}
+    return tuple(
+        replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
+        for each in structures
+    )
+
+
+def _opened(path: OpenedPath) -> str:
+    """Return the place at which a path is opened, in words, with the numbers of its joints as they are written."""
+    first: list[int] = [1]
+    for joint in path.joints:
+        first.append(first[-1] + (len(joint.parts) or 1))
+    cut = path.cut
+    if cut.far is not None:
+        start, end = sorted((cut.far, cut.joint))
+        words = "driven rod" if cut.slide is not None else "rod"
+        return f"{words} between joints {first[start]} and {first[end]}"
+    if not cut.type:
+        return f"behind joint {first[cut.first] - 1}"
+    last = first[cut.joint + 1] - 1
+    joints = f"joint {last}" if last == first[cut.joint] else f"joints {first[cut.joint]} to {last}"
+    return f"{joints} ({cut.type})"

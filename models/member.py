@@ -1,0 +1,108 @@
+"""Members: parts of a limb that resist the platform with a whole space of wrenches, and the projector on that space.
+
+With all actuators locked, a member lets the platform move in the span of the screws of its passive joints, and resists
+every other motion with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre
+``c``, with a length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``, so that their
+work rate is the plain product ``y . x``. A member resists a twist with ``r = P x``, where ``P`` projects orthogonally
+on the complement of the passive screws: ``|r|^2`` is the sum of the squared work rates of any orthonormal basis of the
+member's wrenches, and no basis is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import SX
+
+from .wrench import WrenchKind
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A part of a limb that resists the platform with the wrenches reciprocal to passive screws.
+
+    Attributes:
+        limb: name of the limb.
+        centre: (3, 1) its centre in the world frame, length: rotations about it cost only as ``l`` times their rate.
+        screws: (6, n) current screws of its passive joints as twists, the world's origin as reference; those of the
+            spherical joint at the centre are left out of a pinned member.
+        rank: of the screws, for almost all dimensions and poses. In a pinned member, of their velocities of the centre.
+        kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` of them, or
+            ``3 - rank`` of a pinned member.
+        is_pinned: whether a spherical joint at the centre leaves forces through the centre only.
+    """
+
+    limb: str
+    centre: SX
+    screws: SX
+    rank: int
+    kinds: tuple[WrenchKind, ...]
+    is_pinned: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of scaled coordinates: 3 for a pinned member, whose wrenches are forces through its centre, else 6."""
+        return 3 if self.is_pinned else 6
+
+    @property
+    def kind(self) -> WrenchKind:
+        """Kind of the rows of its projector."""
+        return WrenchKind.FORCE if self.is_pinned else WrenchKind.WRENCH
+
+
+def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
+    """Return twists in scaled coordinates about a centre, (size, n).
+
+    Args:
+        twists: (6, n) angular velocity, then velocity at the world's origin.
+        centre: (3, 1) length.
+        length: (1, 1) characteristic length.
+        size: 6, or 3 for the velocity of the centre alone.
+    """
+    columns = []
+    for k in range(twists.shape[1]):
+        omega, v = twists[:3, k], twists[3:, k]
+        velocity = v + ca.cross(omega, centre)
+        columns.append(velocity if size == 3 else ca.vertcat(velocity, length * omega))
+    return ca.horzcat(SX(size, 0), *columns)
+
+
+def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
+    """Return the parts (size, k) of vectors (size, k) that are orthogonal to the span of columns (size, n).
+
+    Independent columns are made orthogonal one after the other without square roots, and their parts subtracted from
+    the vectors themselves: the difference of two squares would lose a small result. Dependent columns have the
+    projector ``P = N_r / c_r`` of Faddeev and LeVerrier's recursion for ``M = sum a a'``, which chooses no columns:
+    ``N_0 = I``, ``c_k = -tr(M N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for every rank that does not
+    change.
+
+    Args:
+        columns: (size, n) spanning vectors.
+        rank: of the columns.
+        vectors: (size, k).
+    """
+    size, n = columns.shape
+    if rank < n:
+        gram = columns @ columns.T
+        scale = ca.trace(gram)  # a multiple of the identity's size keeps the coefficients of order 1
+        gram = gram / scale
+        power, coefficient = SX.eye(size), SX(1)
+        for k in range(1, rank + 1):
+            product = gram @ power
+            coefficient = -ca.trace(product) / k
+            power = product + coefficient * SX.eye(size)
+        return power @ vectors / coefficient
+    orthogonal: list[tuple[SX, SX]] = []
+    for k in range(n):
+        column = columns[:, k]
+        for base, square in orthogonal:
+            column = column - base * (ca.dot(base, column) / square)
+        orthogonal.append((column, ca.sumsqr(column)))
+    parts = []
+    for k in range(vectors.shape[1]):
+        left = vectors[:, k]
+        for base, square in orthogonal:
+            left = left - base * (ca.dot(base, left) / square)
+        parts.append(left)
+    return ca.horzcat(SX(size, 0), *parts)

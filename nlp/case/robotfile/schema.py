@@ -1,0 +1,126 @@
+"""Schema of robot files: tables and keys, as :func:`screwsynth.models.robot` takes them.
+
+The classes check keys and types. Everything else is checked where the robot is built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, FiniteFloat, StringConstraints, Tag, ValidationError
+from pydantic_core import ErrorDetails
+
+from ...errors import CaseError
+from ..faults import case_error
+from ..table import Table, Vector
+
+Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
+Expression = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Name, Tag("<word>")],
+    Discriminator(lambda value: "<word>" if isinstance(value, str) else "<number>"),
+]
+VectorExpression = Annotated[
+    Annotated[Name, Tag("<word>")] | Annotated[list[Expression], Field(min_length=3, max_length=3), Tag("<list>")],
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else "<word>"),
+]
+
+
+class DimensionTable(Table):
+    """A dimension that a case fixes or frees."""
+
+    typical: FiniteFloat = Field(description="a sensible value; degrees for an angle")
+    kind: Literal["length", "angle", "number"] = Field(default="length", description="what it measures")
+    description: str = Field(default="", description="a few words")
+
+
+class RepeatTable(Table):
+    """Copies of a limb by rotation about an axis."""
+
+    count: Annotated[int, Field(ge=1, le=24)] | None = Field(
+        default=None, description="number of copies, evenly spread"
+    )
+    angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=24)] | None = Field(
+        default=None, description="angle of each copy, degrees"
+    )
+    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="direction of the axis")
+    through: Vector = Field(default=[0.0, 0.0, 0.0], description="point of the axis")
+
+
+class JointTable(Table):
+    """A joint, at home."""
+
+    type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
+    at: VectorExpression = Field(description="its centre, or a point of its axis")
+    axis: VectorExpression | None = Field(default=None, description="direction of its axis")
+    axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="axes of a U, the base side first"
+    )
+    pitch: Expression | None = Field(default=None, description="way per radian of an H")
+    to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
+    actuated: bool | None = Field(default=None, description="whether an actuator drives it")
+
+
+class BranchTable(Table):
+    """One of several paths of a limb behind the joints that they share."""
+
+    joints: Annotated[list[JointTable], Field(min_length=1)] = Field(description="joints, towards the platform")
+
+
+class LimbTable(Table):
+    """A limb, with its copies."""
+
+    name: Name | None = Field(default=None, description="its name; copies are numbered")
+    repeat: RepeatTable | None = Field(default=None, description="copies of the limb")
+    points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
+    joints: list[JointTable] = Field(default_factory=list, description="joints from the base to the platform")
+    branch: list[BranchTable] = Field(default_factory=list, description="paths behind these joints")
+    centre: VectorExpression | None = Field(default=None, description="place where its wrenches are measured")
+
+
+class RobotFile(Table):
+    """A robot given joint by joint, at home."""
+
+    name: Name = Field(description="its name")
+    description: str = Field(default="", description="one sentence")
+    home: VectorExpression = Field(default="0*x", description="origin of the platform at home")
+    dimensions: dict[str, DimensionTable] = Field(default_factory=dict, description="dimensions by name")
+    derived: dict[str, Expression] = Field(default_factory=dict, description="further numbers by name")
+    limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
+
+
+def check_form(tables: dict[str, Any]) -> None:
+    """Refuse a robot file whose keys or types are not those of the schema.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it.
+
+    Raises:
+        CaseError: the first fault, with limb and joint in words.
+    """
+    try:
+        RobotFile.model_validate(tables)
+    except ValidationError as error:
+        raise _error(error.errors()[0]) from None
+
+
+def _error(fault: ErrorDetails) -> CaseError:
+    """Return a fault as an error whose key is a place in words, such as ``limb 2, joint 1, axis``."""
+    written = case_error(fault)
+    location = [*fault["loc"], *([fault["ctx"]["key"]] if "key" in fault.get("ctx", {}) else [])]
+    if fault["type"] == "string_type" and location[-1] == "<word>":
+        return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
+    if fault["type"] == "float_type" and location[-1] == "<number>":
+        return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
+    return CaseError(_place(location), written.fault, written.value)
+
+
+def _place(location: Sequence[int | str]) -> str:
+    """Return a path into the document in words; parts that stand for branches of a union are left out."""
+    parts: list[str] = []
+    for part in location:
+        if isinstance(part, int):
+            parts[-1] = f"{parts[-1].removesuffix('s')} {part + 1}"
+        elif not part.startswith("<"):
+            parts.append(part)
+    return ", ".join(parts) or "the file"

@@ -1,0 +1,200 @@
+"""The way in which a robot's joints are assembled at a point, compared with home along a path from there.
+
+The same dimensions and pose often allow several values of the internal unknowns, such as an elbow on either side, and
+the same loops several modes of operation, in which the platform moves otherwise. From home, where the robot file states
+the joints, dimensions and pose move along a straight line to those of the point, and Newton's method with least-norm
+steps keeps the loops closed. Where the line leaves the poses that the robot can take, the pose is the nearest one.
+Assemblies and modes meet at singularities of the loop equations, so the smallest singular values of their derivatives
+say how near the path comes to one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray, Model, Substitution, matrix_from_axis_angle
+from ..program.nlp import Nlp
+from .state import RobotState
+
+#: First and shortest step of the path, as parts of its length, and largest number of Newton steps at each.
+_FIRST = 1 / 16
+_SHORTEST = 1 / 2048
+_STEPS = 12
+#: Largest change of pose and unknowns, of order 1, in a step: a larger one that stays in the shortest step is a jump.
+_LARGE = 0.05
+#: Size of a step of the pose beside one of the unknowns in the norm: the pose only moves where unknowns do not suffice.
+_HEAVY = 1e-3
+#: Largest residual of closed loops; equations are of order 1.
+_CLOSED = 1e-10
+#: Singular values below this part of the largest are zero: such a loop moves by itself also at home.
+_ZERO = 1e-9
+#: A path is near a singularity where a singular value falls below this part of that at home.
+NEAR_SINGULAR = 0.1
+#: Largest difference of an unknown of order 1 within one assembly: in another one it is of order 0.1.
+_SAME = 1e-4
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Way in which the joints are assembled at a point.
+
+    Attributes:
+        is_home: whether the path from home ends at the point's own unknowns.
+        nearness: smallest singular value of the loop equations on the path, as a part of that at home; 0 where the path
+            jumps or does not reach the point's pose.
+    """
+
+    is_home: bool
+    nearness: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Sentences about an assembly that is not that of home, or that may not be."""
+        found = []
+        if not self.nearness >= NEAR_SINGULAR:
+            part = f"the loops' smallest singular value falls to {100 * self.nearness:.2g} % of home's on the way"
+            jump = "the straight path from there has a jump"
+            reason = part if self.nearness else jump
+            found.append(f"not reached from home without passing near a singularity: {reason}")
+        if not self.is_home:
+            found.append("another assembly than at home: the straight path from there ends at other joint positions")
+        return tuple(found)
+
+
+def assembly_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Assembly | None:
+    """Return the assembly at a point; None for a robot without internal unknowns or without a home.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        state: the robot there.
+        pose: index of the pose.
+    """
+    model = nlp.program.model
+    if model.generic is None or not model.unknowns:
+        return None
+    values = [state.parameters[item.name] for item in model.parameters]
+    turn = state.angle * state.axis
+    return assembly_at(
+        model,
+        np.concatenate([np.zeros(0), *values]),
+        np.concatenate([turn, state.position]),
+        x[list(nlp.program.places.unknowns[pose])],
+    )
+
+
+def assembly_at(model: Model, parameters: FloatArray, pose: FloatArray, unknowns: FloatArray) -> Assembly:
+    """Return the assembly of a robot given joint by joint.
+
+    Args:
+        model: the robot.
+        parameters: (k,) components of all parameters, radians for angles.
+        pose: (6,) rotation vector, radians, and position of the platform.
+        unknowns: (u,) internal unknowns.
+    """
+    found, nearness = _follow(model, parameters, pose)
+    if found is None:
+        return Assembly(is_home=False, nearness=0.0)
+    angles = np.array([item.dimension is Dimension.ANGLE for item in model.unknowns])
+    apart = np.abs(found - unknowns)
+    apart[angles] = np.abs(np.remainder(apart[angles] + np.pi, 2 * np.pi) - np.pi)
+    return Assembly(is_home=bool(apart.max(initial=0.0) <= _SAME), nearness=nearness)
+
+
+def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray) -> FloatArray | None:
+    """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
+
+    The arguments are those of :func:`assembly_at`.
+    """
+    return _follow(model, parameters, pose)[0]
+
+
+def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[FloatArray | None, float]:
+    """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it."""
+    path = _Path(model)
+    dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
+    start = np.concatenate([np.zeros(3), model.home])
+    at = np.concatenate([start, np.zeros(len(model.unknowns))])
+    at_home = path.singular_values(at, dimensions)
+    regular = at_home > _ZERO
+    nearness, done, step = 1.0, 0.0, _FIRST
+    while done < 1.0:
+        part = min(1.0, done + step)
+        here = (1 - part) * dimensions + part * parameters
+        target = np.concatenate([(1 - part) * start + part * pose, at[6:]])
+        # The last step ends at the pose itself, where the unknowns alone close the loops.
+        closed = path.closed(target, here, first=6 if part == 1.0 else 0)
+        change = np.inf if closed is None else float(np.linalg.norm((closed - at) / path.scale))
+        if change > _LARGE and part - done > _SHORTEST:
+            step = (part - done) / 2
+            continue
+        if closed is None:
+            return None, 0.0
+        if change > _LARGE:
+            nearness = 0.0  # the path jumps, and goes on elsewhere
+        at, done = closed, part
+        step = 2 * step if change < _LARGE / 4 else step
+        nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
+    return at[6:], nearness
+
+
+class _Path:
+    """Loop equations of a robot and their derivatives, by rotation vector, position and unknowns in one vector.
+
+    Args:
+        model: the robot.
+
+    Attributes:
+        scale: (6 + u,) size of each number: a length of the robot's for positions, 1 for the others.
+    """
+
+    def __init__(self, model: Model) -> None:
+        own = Substitution.identity(model)
+        z = SX.sym("z", 6 + len(model.unknowns))
+        # A rotation vector of zero has no direction: half a unit of rounding gives it one.
+        angle = ca.sqrt(ca.sumsqr(z[:3]) + np.finfo(float).tiny)
+        rotation = matrix_from_axis_angle(z[:3] / angle, angle)
+        equations = ca.vertcat(*[each.expression for each in model.closure])
+        (residual,) = ca.Function("closure", own.all, [equations]).call([own.parameters, z[6:], rotation, z[3:6]])
+        # About home, lengths of the robot's own size make the singular values those of equations of order 1.
+        outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
+        self._function = ca.Function("path", [z, own.parameters], outputs)
+        self.scale = np.ones(z.numel())
+        self.scale[3:6] = _size(model)
+
+    def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
+        """Return the smallest singular values (2,) of the derivatives by unknowns alone, and with the pose."""
+        slopes = self._function(z, parameters)[1].full() * self.scale
+        both = (np.linalg.svd(part, compute_uv=False) for part in (slopes[:, 6:], slopes))
+        return np.array([each[-1] for each in both])
+
+    def closed(self, z: FloatArray, parameters: FloatArray, first: int) -> FloatArray | None:
+        """Return the point near another at which the loops are closed, or None.
+
+        Args:
+            z: (6 + u,) the point.
+            parameters: (k,) of the robot.
+            first: index of the first number that may move.
+        """
+        for _ in range(_STEPS):
+            residual, slopes = (each.full() for each in self._function(z, parameters))
+            if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
+                return None
+            if float(np.abs(residual).max()) <= _CLOSED:
+                return z
+            scale = self.scale[first:].copy()
+            scale[: 6 - first] *= _HEAVY
+            step = np.linalg.lstsq(slopes[:, first:] * scale, -residual.ravel(), rcond=_ZERO)[0]
+            z = z.copy()
+            z[first:] += scale * step
+        return None
+
+
+def _size(model: Model) -> float:
+    """Return a length of the order of the robot's own: of its lengths and of the place of its home."""
+    lengths = [value for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
+    return float(np.linalg.norm([*lengths, *model.home])) or 1.0

@@ -1,0 +1,52 @@
+"""Starting points at which the robot's loops are closed, in the assembly of home.
+
+Newton's method from home may end in another assembly where the pose is far from there. At the first starting point the
+loops are therefore closed along a path from home. The other starting points take their unknowns from there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...models import FloatArray
+from ..program.nlp import Nlp
+from .assembly import unknowns_from_home
+from .kkt import close_equations
+from .state import evaluate
+
+
+def closed_start(nlp: Nlp) -> FloatArray:
+    """Return the first starting point (n,) of a program, with the robot's loops closed along a path from home."""
+    return close_equations(nlp, _with_unknowns_from_home(nlp, nlp.start))
+
+
+def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
+    """Return the point, near a given one, at which the program's equations hold, with unknowns near those of another.
+
+    Args:
+        nlp: the program.
+        first: (n,) point at which the equations hold.
+        x: (n,) the point; its internal unknowns do not count.
+
+    Returns:
+        (n,) the point, as :func:`.kkt.close_equations` returns it.
+    """
+    own = [index for at_pose in nlp.program.places.unknowns for index in at_pose]
+    target = x.copy()
+    target[own] = first[own]
+    return close_equations(nlp, target)
+
+
+def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
+    """Return a point (n,) with the unknowns to which the path from home leads; unchanged where it ends early."""
+    model, found = nlp.program.model, x.copy()
+    if model.generic is None or not model.unknowns:
+        return found
+    for pose, own in enumerate(nlp.program.places.unknowns):
+        state = evaluate(nlp, x, pose)
+        parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
+        place = np.concatenate([state.angle * state.axis, state.position])
+        unknowns = unknowns_from_home(model, parameters, place)
+        if unknowns is not None:
+            found[list(own)] = unknowns
+    return np.clip(found, nlp.lower, nlp.upper)

@@ -1,0 +1,43 @@
+// Links of limbs by what they have in common: limb, colouring row and kind.
+const groupedLinks = (links) => {
+  const found = new Map();
+  for (const link of links) {
+    if (link.limb === null || link.kind === "rail") continue;
+    const key = JSON.stringify([link.limb, link.row, link.kind]);
+    if (!found.has(key)) found.set(key, []);
+    found.get(key).push(link);
+  }
+  return [...found.values()];
+};
+
+// Marks of joints, as in picture files: shape by kind, dark where an actuator drives the joint, strokes for axes.
+const LOOKS = { R: ["circle", 5], P: ["square", 7], H: ["cross", 6], C: ["square", 7], U: ["diamond", 6], S: ["circle", 7], Pa: ["circle", 3] };
+const jointTraces = (view, frame, ink) => {
+  const dots = (name, places, marker, more = {}) => ({
+    type: "scatter3d", mode: "markers", name, x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
+    marker, hoverinfo: "skip", showlegend: false, ...more,
+  });
+  if (!view.joints.length) {
+    const ends = [...new Set(view.links.filter((link) => link.limb !== null).flatMap((link) => link.ends))];
+    return [dots("joints", ends.map((each) => frame.points[each]), { size: 5, color: "#fff", line: { color: ink, width: 2 } })];
+  }
+  const found = [], ends = [[], [], []];
+  view.joints.forEach(({ kind }, k) => {
+    if (kind === "P" || kind === "Pa") return;
+    const [place, ...axes] = frame.joints[k];
+    for (const axis of axes) {
+      for (const reach of [-0.06, 0.06]) plus(place, axis, reach * view.size).forEach((value, n) => ends[n].push(value));
+      ends.forEach((each) => each.push(null));
+    }
+  });
+  found.push({ type: "scatter3d", mode: "lines", name: "joint axes", x: ends[0], y: ends[1], z: ends[2], line: { color: ink, width: 3 }, hoverinfo: "skip", showlegend: false });
+  for (const kind of new Set(view.joints.map((each) => each.kind))) {
+    const own = view.joints.map((each, k) => [each, frame.joints[k][0]]).filter(([each]) => each.kind === kind), [symbol, size] = LOOKS[kind];
+    found.push(dots(`joints ${kind}`, own.map(([, place]) => place), { symbol, size, color: own.map(([each]) => (each.actuated ? ink : "#fff")), line: { color: ink, width: 2 } }, {
+      hoverinfo: "text", hovertext: own.map(([each]) => plain(each.words)),
+    }));
+    if (kind === "S" || kind === "C") found.push(dots(`joints ${kind} within`, own.map(([, place]) => place), { size: 2.5, color: ink }));
+  }
+  return found;
+};
+

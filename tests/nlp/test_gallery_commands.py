@@ -1,0 +1,168 @@
+"""Every command on robots given joint by joint: six of the gallery, in the case that ``new`` begins with."""
+
+import csv
+import json
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.models import robot_function
+from screwsynth.models.catalog import gallery_names
+from screwsynth.nlp import (
+    Case,
+    Free,
+    Limits,
+    Method,
+    OverPoses,
+    Pose,
+    QuantityLimit,
+    RateShare,
+    Search,
+    Sense,
+    Status,
+    Task,
+    case_from_tables,
+    evaluate,
+    formulate,
+    sensitivities,
+    solve,
+)
+from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.state import loops_are_closed
+
+Run = Callable[..., tuple[int, str, str]]
+
+SIX = ("3-rps", "6-rus", "delta", "delta-parallelogram", "3-upu", "planar-3-rrr")
+
+
+def starter(name: str) -> Case:
+    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
+
+
+def narrow(case: Case) -> Case:
+    """The case with its free numbers in a fifth of their ranges, where every robot stays in its own assembly."""
+
+    def less(value: float | Free) -> float | Free:
+        if not isinstance(value, Free):
+            return value
+        middle, half = (value.lower + value.upper) / 2, (value.upper - value.lower) / 10
+        return Free(middle - half, middle + half)
+
+    parameters = {name: [less(value) for value in case.components(name)] for name in case.parameters}
+    rotation = replace(case.rotation, angle=less(case.rotation.angle))
+    return replace(case, parameters=parameters, position=[less(value) for value in case.position], rotation=rotation)
+
+
+def test_evaluate_writes_json_and_csv_with_the_values_of_the_program(tmp_path: Path, cli: Run) -> None:
+    for name in SIX:
+        path, data_file, csv_file = (tmp_path / f"{name}.{end}" for end in ("toml", "json", "csv"))
+        path.write_text(starter_case(robot_function(name)()), encoding="utf-8")
+        status, out, err = cli("evaluate", str(path), "--json", str(data_file), "--csv", str(csv_file))
+        assert (status, err) == (0, ""), name
+        data = json.loads(data_file.read_text(encoding="utf-8"))
+        nlp = formulate(starter(name))
+        state = evaluate(nlp, closed_start(nlp))
+        assert data["F"] == pytest.approx(state.F, rel=1e-12)
+        assert len(data["jacobian"]) == len(data["limbs"]) == len(nlp.program.model.rows)
+        assert np.sum(np.square(data["rates"])) == pytest.approx(state.F, rel=1e-12)
+        assert data["joints"]["assembly"] == []
+        assert "rank of J  6" in out
+        rows = list(csv.reader(csv_file.read_text(encoding="utf-8").splitlines()))
+        assert len(rows) > 5
+
+
+@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.slow)], ids=["one", "others"])
+def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
+    for name in names:
+        case = narrow(starter(name))
+        quantity, largest = case.model.quantities[0], 3.0
+        (own,) = case.tasks
+        both = replace(
+            case,
+            tasks=[own, replace(own, name="second", sense=Sense.MAX, twist=np.array([0, 0, 0, 0, 0, 1.0]))],
+            further=[Pose(case.position, case.rotation)],
+            over_poses=OverPoses.MEAN,
+            method=Method.AVERAGE,
+            limits=Limits(RateShare(0.95), QuantityLimit(quantity.name, min=-largest, max=largest)),
+            search=Search(starts=2),
+        )
+        solution = solve(both)
+        assert solution.status.is_answer, name
+        for outcome in solution.outcomes:
+            found = outcome.own
+            assert found.status is Status.OPTIMAL, name
+            assert loops_are_closed(found.nlp, found.x)
+            F = np.mean([evaluate(found.nlp, found.x, pose).F for pose in range(2)])
+            assert pytest.approx(F, rel=1e-12) == found.F
+
+
+@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.slow)], ids=["one", "others"])
+def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) -> None:
+    for name in names:
+        case = replace(narrow(starter(name)), search=Search(starts=1))
+        fixed = next(item.name for item in case.model.parameters if not isinstance(case.components(item.name)[0], Free))
+        value = float(case.components(fixed)[0])
+        own = solve(case).outcomes[0].own
+        (found,) = [each for each in sensitivities(own.nlp, own.x) if each.name == fixed]
+        step = 1e-5 * value
+
+        def best(number: float, case: Case = case, fixed: str = fixed) -> float:
+            return solve(replace(case, parameters={**case.parameters, fixed: number})).F
+
+        slope = (best(value + step) - best(value - step)) / (2 * step)
+        assert found.derivative == pytest.approx(slope, rel=1e-4, abs=1e-5 * abs(own.F / value)), name
+
+
+def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: Run) -> None:
+    name = "delta"
+    path, page, folder = tmp_path / "delta.toml", tmp_path / "page.html", tmp_path / "c"
+    path.write_text(starter_case(robot_function(name)()), encoding="utf-8")
+    assert cli("report", str(path), "--out", str(page), "--starts", "2")[0] == 0
+    assert "another way" not in page.read_text(encoding="utf-8")
+    assert cli("codegen", str(path), "--out", str(folder))[0] == 0
+    assert any(folder.iterdir())
+
+
+@pytest.mark.slow
+def test_c_has_the_values_of_the_program(embed: Callable[[Case], Any]) -> None:
+    for name in SIX:
+        case = starter(name)
+        c, nlp = embed(case), formulate(case)
+        p, n, count = np.ascontiguousarray(nlp.arguments), nlp.n, len(nlp.program.constraints)
+        k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+        F, gradient, g, dg = np.zeros(1), np.zeros(n), np.zeros(count), np.zeros((count, n))
+        assert c.call("prepare", p, k, work) == 0
+        rng = np.random.default_rng(3)
+        for _ in range(100):
+            x = nlp.start + 0.2 * nlp.scale * rng.uniform(-1, 1, n)
+            assert c.call("F_gradient", x, k, F, gradient, work) == c.call("limits", x, k, g, dg, work) == 0
+            value, slope, constraint, constraint_slope = nlp.program.kernels.derivatives(x, p)
+            for got, wanted in ((F, value.ravel()), (gradient, slope.ravel()), (g, constraint.ravel())):
+                assert np.max(np.abs(got - wanted)) <= 1e-14 * max(1.0, float(np.max(np.abs(wanted)))), name
+            assert np.max(np.abs(dg - constraint_slope)) <= 1e-14 * max(1.0, float(np.max(np.abs(constraint_slope))))
+
+
+@pytest.mark.slow
+def test_every_starter_of_the_gallery_is_solved_to_rank_six() -> None:
+    for name in gallery_names():
+        solution = solve(starter(name), starts=4)
+        own = solution.outcomes[0].own
+        assert own.status is Status.OPTIMAL, name
+        assert own.state is not None
+        assert own.state.rank == 6, name
+        assert loops_are_closed(own.nlp, own.x)
+
+
+def test_a_case_of_the_gallery_is_written_and_read_again() -> None:
+    for name in SIX:
+        case = starter(name)
+        again = case_from_tables(tomllib.loads(case.to_toml()), name=name, source="again")
+        assert again.model.name == name
+        assert formulate(again).evaluate(formulate(again).start).F == formulate(case).evaluate(formulate(case).start).F
+    assert isinstance(case.tasks[0], Task)
