@@ -38,6 +38,8 @@ class Joint:
         point: (3, 1) its centre or a point of its axis, length.
         axes: its axes, each with one variable, the base side first; those of a spherical joint are along x, y and z.
         actuated: whether an actuator drives it.
+        name: that the user gives it; empty for none.
+        parts: the joints that this one stands for, where it is a universal or spherical joint of several.
     """
 
     place: str
@@ -45,6 +47,8 @@ class Joint:
     point: SX
     axes: tuple[JointAxis, ...]
     actuated: bool
+    name: str = ""
+    parts: tuple[Joint, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +62,7 @@ class Limb:
         stem: joints that all paths share, from the base on.
         branches: joints of each path behind the stem; one empty path for a limb without branches.
         centre: (3, 1) the centre that the user gives, length; None for that of the rule.
+        turn: (3, 3) rotation of a copy from the limb as it is written.
     """
 
     name: str
@@ -66,6 +71,7 @@ class Limb:
     stem: tuple[Joint, ...]
     branches: tuple[tuple[Joint, ...], ...]
     centre: SX | None
+    turn: FloatArray
 
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
@@ -139,7 +145,7 @@ def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
     stem = tuple(_joint(joint, known) for joint in words.stem)
     branches = tuple(tuple(_joint(joint, known) for joint in branch) for branch in words.branches) or ((),)
     centre = None if words.centre is None else _vector(f"{words.place}, centre", words.centre, known)
-    first = Limb("", words.place, group, stem, branches, centre)
+    first = Limb("", words.place, group, stem, branches, centre, np.eye(3))
     turns = [None] if words.repeat is None else _turns(words.repeat)
     return [_turned(first, name, turn) for name, turn in zip(words.names, turns, strict=True)]
 
@@ -175,6 +181,7 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
         stem=tuple(joint(each) for each in limb.stem),
         branches=tuple(tuple(joint(each) for each in branch) for branch in limb.branches),
         centre=None if limb.centre is None else Q @ limb.centre + t,
+        turn=turn.rotation,
     )
 
 
@@ -201,7 +208,7 @@ def _joint(words: JointWords, names: Mapping[str, SX]) -> Joint:
             axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
         case _:
             axes = [axis(AxisKind.ROTATION, each) for each in given]
-    return Joint(words.place, words.type, point, tuple(axes), words.actuated)
+    return Joint(words.place, words.type, point, tuple(axes), words.actuated, words.name)
 
 
 def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:

@@ -42,6 +42,7 @@ class OpenedPath:
         screws: current screws (6, 1) of the axes of each joint; none for a joint of a rod whose axes are not known.
         behind: displacement of the body behind each joint, on the platform's side; none for joints between two sides.
         points: (3, 1) current place of each joint, length.
+        sides: displacements of the bodies at the two sides of the cut, the base's side first.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
         equations: expressions that are zero where the path is closed.
         checks: further expressions that are zero there: signs that the equations leave open.
@@ -52,6 +53,7 @@ class OpenedPath:
     screws: list[list[SX]]
     behind: list[Motion | None]
     points: list[SX]
+    sides: tuple[Motion, Motion] = (Motion.none(), Motion.none())
     rod: SX | None = None
     equations: list[SX] = field(default_factory=list)
     checks: list[SX] = field(default_factory=list)
@@ -115,6 +117,7 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
             axis, value = joints[j].axes[a], variables(joints[j], a)
             path.screws[j].insert(0, axis.screw(value, platform))
             platform = platform.after(axis.motion(value).inverse())
+    path.sides = base, platform
     if cut.far is not None:
         _join_rod(path, base, platform, frame)
     elif cut.type:

@@ -12,6 +12,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..basis import basis_of_member, constraint_rows, rank_of_rows
 from ..instance import Substitution, jacobian
+from ..limbjoints import LimbJoint, LimbLink
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import (
@@ -34,6 +35,8 @@ from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import scene_of
 from .resistance import Ranks, path_ranks, resistance
+from .segments import limb_links, with_shared_places
+from .states import PathJoints
 from .words import Expression, RobotError, RobotWords, VectorExpression, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -93,6 +96,8 @@ class _Builder:
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
     paths: list[tuple[str, OpenedPath]] = field(default_factory=list)
+    joints: list[LimbJoint] = field(default_factory=list)
+    links: list[tuple[OpenedPath, list[LimbLink]]] = field(default_factory=list)
     structures: dict[tuple[int, int], Ranks] = field(default_factory=dict)
 
     def add_limb(self, limb: Limb) -> None:
@@ -102,11 +107,22 @@ class _Builder:
             raise RobotError(limb.place, fault)
         known: dict[tuple[int, int], SX] = {}
         driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
+        labels: dict[int, str] = {}
         for index, joints in enumerate(limb.paths):
+            new = _labels(limb, index, joints, labels)
+            labels |= new
             path = self._path(limb, index, joints, self._variables(limb, known))
             if path is None:
+                fault = "its limb neither resists nor drives the platform"
+                self.joints += [
+                    LimbJoint(new[id(each)], each.name, limb.name, each.type, unknown=fault)
+                    for each in joints
+                    if id(each) in new
+                ]
                 continue
             self.paths.append((limb.name, path))
+            self.joints += PathJoints(limb, path, known, self.frame).states(new)
+            self.links.append((path, limb_links(path, labels, self.frame)))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
@@ -164,6 +180,23 @@ class _Builder:
         return variable
 
 
+def _labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
+    """Return the label of each joint of a path that has none yet, such as ``2:3``, by the joint's identity.
+
+    Args:
+        limb: the limb.
+        index: of the path among those of the limb.
+        joints: of the path.
+        known: labels of joints of other paths, which share the joints of the stem.
+    """
+    found = {}
+    for j, joint in enumerate(joints):
+        branch = f".{index + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
+        if id(joint) not in known:
+            found[id(joint)] = f"{limb.name}{branch}:{j + 1}"
+    return found
+
+
 def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     """Return the model of a robot from its words, and the tables that state them."""
     at_home = home_robot(words)
@@ -201,6 +234,8 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         loops=tuple(everything),
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
+        joints=tuple(builder.joints),
+        links=with_shared_places(builder.links, frame),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

@@ -68,6 +68,7 @@ class JointWords:
     actuated: bool = False
     pitch: Expression = 0.0
     to: VectorExpression | None = None
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -165,16 +166,30 @@ def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
     }
     _check_names(points, "a point", place)
     stem = _joints(place, table.get("joints", ()))
+    _check_joint_names(place, stem)
     branches = [
         _joints(f"{place}, branch {k + 1}", _only_joints(f"{place}, branch {k + 1}", branch))
         for k, branch in enumerate(_list(f"{place}, branch", table.get("branch", ())))
     ]
+    for branch in branches:
+        _check_joint_names(place, [*stem, *branch])
     if not stem and not branches:
         raise RobotError(f"{place}, joints", "is missing: a limb needs at least one joint")
     if len(branches) == 1:
         raise RobotError(f"{place}, branch", "has one branch: write its joints among those of the limb")
     centre = None if table.get("centre") is None else _vector(f"{place}, centre", table["centre"])
     return LimbWords(place, tuple(names), repeat, points, stem, tuple(branches), centre)
+
+
+def _check_joint_names(place: str, joints: Sequence[JointWords]) -> None:
+    """Refuse names of joints of one path that are no words, or are given twice."""
+    names = [joint.name for joint in joints if joint.name]
+    for joint in joints:
+        if joint.name and not _NAME.fullmatch(joint.name):
+            fault = f"is {joint.name!r}; letters, digits and _ are allowed, a letter first"
+            raise RobotError(f"{joint.place}, name", fault)
+        if names.count(joint.name) > 1:
+            raise RobotError(f"{place}, joints", f"has two joints with the name {joint.name!r}")
 
 
 def _only_joints(place: str, branch: object) -> object:
@@ -200,12 +215,12 @@ def _joint(place: str, table: Mapping[str, object]) -> JointWords:
     if not isinstance(kind, str) or kind not in JOINT_KEYS:
         raise RobotError(f"{place}, type", f"is {kind!r}; allowed are {', '.join(JOINT_KEYS)}")
     place = f"{place} ({kind})"
-    allowed = ("type", "at", *JOINT_KEYS[kind])
+    allowed = ("type", "name", "at", *JOINT_KEYS[kind])
     if "actuated" in table and "actuated" not in allowed:
         raise RobotError(f"{place}, actuated", "is not allowed: write its axes as joints R or P of their own")
     _refuse_other_keys(place, table, allowed)
     for key in allowed:
-        if key != "actuated" and key not in table:
+        if key not in ("actuated", "name") and key not in table:
             raise RobotError(f"{place}, {key}", "is missing")
     axes: tuple[VectorExpression, ...] = ()
     if "axis" in allowed:
@@ -226,6 +241,7 @@ def _joint(place: str, table: Mapping[str, object]) -> JointWords:
         actuated=actuated,
         pitch=_expression(f"{place}, pitch", table.get("pitch", 0.0)),
         to=None if "to" not in table else _vector(f"{place}, to", table["to"]),
+        name=_text(f"{place}, name", table.get("name", "")),
     )
 
 

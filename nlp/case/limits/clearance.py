@@ -35,17 +35,24 @@ class LegClearance(LowerLimit):
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return a smooth function of the distance of each pair of legs, with the distance itself."""
-        far = 4 * self.min**2
         for one, other in itertools.combinations(pose.robot.legs, 2):
-            squared = squared_distance(one.base, one.span, other.base, other.span)
-            yield between(
-                f"leg_clearance limbs {one.name} and {other.name}{pose.where}",
-                _near(squared, far),
-                _reading(far),
-                "leg_clearance",
-                lower=self.min,
-                exact=ca.sqrt(squared),
-            )
+            name = f"leg_clearance limbs {one.name} and {other.name}{pose.where}"
+            yield apart(name, (one.base, one.span), (other.base, other.span), self.key, self.min)
+
+
+def apart(name: str, one: tuple[SX, SX], other: tuple[SX, SX], key: str, least: float) -> BoundedConstraint:
+    """Return the constraint on the distance of two segments.
+
+    Args:
+        name: of the constraint.
+        one: start and span (3, 1) of the first segment, length.
+        other: of the second.
+        key: of the limit.
+        least: smallest distance.
+    """
+    far = 4 * least**2
+    squared = squared_distance(*one, *other)
+    return between(name, _near(squared, far), _reading(far), key, lower=least, exact=ca.sqrt(squared))
 
 
 def _near(squared: SX, far: float) -> SX:

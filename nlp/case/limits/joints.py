@@ -52,7 +52,7 @@ def _minus_cosine(angle: SX) -> SX:
 
 
 #: ``-cos(angle)`` read as the angle.
-_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine)
+COSINE_OF_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine)
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
@@ -208,7 +208,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         robot = pose.robot
         for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
             cosine = ca.dot(self._to_world(axis, robot.rotation), leg.span) / ca.norm_2(leg.span)
-            yield between(f"{self.key} limb {leg.name}{pose.where}", -cosine, _ANGLE, self.key, upper=self.max)
+            yield between(f"{self.key} limb {leg.name}{pose.where}", -cosine, COSINE_OF_ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
         """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""

@@ -51,6 +51,7 @@ class JointTable(Table):
     """A joint, at home."""
 
     type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
+    name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
     at: VectorExpression = Field(description="its centre, or a point of its axis")
     axis: VectorExpression | None = Field(default=None, description="direction of its axis")
     axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
