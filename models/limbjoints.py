@@ -45,7 +45,7 @@ class JointCone:
     """The directions between which the cone of a universal or spherical joint is measured.
 
     Attributes:
-        link: (3, 1) current unit direction of a link that ends at the joint, from the base's side to the platform's side.
+        link: (3, 1) current unit direction of a link that ends at the joint, from the base to the platform.
         home: (3, 1) the same at home.
         other: (3, 3) rotation from home of the body on the other side of the joint.
         turn: (3, 3) rotation of the limb from the one that the robot file writes.
