@@ -31,7 +31,7 @@ def public_names() -> dict[str, dict[str, str]]:
     found: dict[str, dict[str, str]] = {}
     for package, file in packages.items():
         tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.level == 1]
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 1]
         names = {alias.asname or alias.name: str(node.module) for node in imports for alias in node.names}
         found[package] = dict(sorted(names.items()))
     return found

@@ -1,5 +1,6 @@
 """Symbolic robots, and the screw algebra in which they are written."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .arrays import FloatArray, frozen_array, frozen_vector
@@ -57,7 +58,8 @@ from .three_upu import three_upu
 from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along
 
 if TYPE_CHECKING:
-    from .joints import RobotError, robot
+    from .joints.forms import RobotError
+    from .joints.robot import robot
 
 __all__ = [
     "Actuator",
@@ -135,6 +137,5 @@ def __getattr__(name: str) -> object:
     """Return a name of :mod:`.joints`, which most runs do not need and which is imported when it is first used."""
     if name not in ("RobotError", "robot"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from . import joints  # noqa: PLC0415 - see above
-
-    return getattr(joints, name)
+    found: object = getattr(import_module(".joints", __name__), name)
+    return found

@@ -53,6 +53,7 @@ class Model(Whole, Shown):
         joint_screws: screws of the joints of its limbs, where they are known.
         joints: the joints of its limbs, as limits read them.
         links: the links of its limbs as segments.
+        remarks: sentences for the user on what may be a mistake in a robot that is given joint by joint.
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
 
     Raises:
@@ -80,6 +81,7 @@ class Model(Whole, Shown):
     joint_screws: tuple[JointScrews, ...] = ()
     joints: tuple[LimbJoint, ...] = ()
     links: tuple[LimbLink, ...] = ()
+    remarks: tuple[str, ...] = ()
     generic: GenericRanks | None = None
 
     def __post_init__(self) -> None:

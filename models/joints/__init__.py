@@ -8,7 +8,7 @@ screws and equations), ``generic`` (ranks at random dimensions), ``resistance`` 
 """
 
 from .expression import ExpressionError
+from .forms import RobotError
 from .robot import robot
-from .words import RobotError
 
 __all__ = ["ExpressionError", "RobotError", "robot"]

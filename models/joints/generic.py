@@ -13,8 +13,8 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from .chain import HomeRobot, Joint
+from .forms import RobotError
 from .motion import AxisKind, Motion
-from .words import RobotError
 
 #: Number of random points at which ranks are measured; the largest rank counts.
 SAMPLES = 6

@@ -16,7 +16,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..rotation import matrix_from_cayley
 from .chain import HomeRobot
-from .words import RobotError
+from .forms import RobotError
 
 #: Closed configurations that are tried; the largest rank among them counts.
 _POINTS = 5

@@ -41,7 +41,7 @@ class OpenedPath:
         cut: where it is opened.
         screws: current screws (6, 1) of the axes of each joint; none for a joint of a rod whose axes are not known.
         behind: displacement of the body behind each joint, on the platform's side; none for joints between two sides.
-        points: (3, 1) current place of each joint, length.
+        points: (3, 1) current place of each joint on the body before it, on the base's side, length.
         sides: displacements of the bodies at the two sides of the cut, the base's side first.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
         equations: expressions that are zero where the path is closed.
@@ -103,20 +103,20 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     path = OpenedPath(joints, cut, [[] for _ in joints], [None] * count, [joint.point for joint in joints])
     base = Motion.none()
     for j in range(cut.first):
+        path.points[j] = base.point(joints[j].point)
         for a, axis in enumerate(joints[j].axes):
             value = variables(joints[j], a)
             path.screws[j].append(axis.screw(value, base))
             base = base.after(axis.motion(value))
         path.behind[j] = base
-        path.points[j] = base.point(joints[j].point)
     platform = frame.platform
     for j in range(count - 1, cut.last, -1):
         path.behind[j] = platform
-        path.points[j] = platform.point(joints[j].point)
         for a in range(len(joints[j].axes) - 1, -1, -1):
             axis, value = joints[j].axes[a], variables(joints[j], a)
             path.screws[j].insert(0, axis.screw(value, platform))
             platform = platform.after(axis.motion(value).inverse())
+        path.points[j] = platform.point(joints[j].point)
     path.sides = base, platform
     if cut.far is not None:
         _join_rod(path, base, platform, frame)

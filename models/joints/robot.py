@@ -29,6 +29,8 @@ from ..parts import (
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
+from .faults import examine_geometry
+from .forms import Expression, RobotError, VectorExpression
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
 from .motion import AxisKind, Motion
@@ -37,7 +39,7 @@ from .pictures import scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
-from .words import Expression, RobotError, RobotWords, VectorExpression, read_words
+from .words import RobotWords, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -98,6 +100,7 @@ class _Builder:
     paths: list[tuple[str, OpenedPath]] = field(default_factory=list)
     joints: list[LimbJoint] = field(default_factory=list)
     links: list[tuple[OpenedPath, list[LimbLink]]] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     structures: dict[tuple[int, int], Ranks] = field(default_factory=dict)
 
     def add_limb(self, limb: Limb) -> None:
@@ -113,6 +116,7 @@ class _Builder:
             labels |= new
             path = self._path(limb, index, joints, self._variables(limb, known))
             if path is None:
+                self._remark_idle(limb)
                 fault = "its limb neither resists nor drives the platform"
                 self.joints += [
                     LimbJoint(new[id(each)], each.name, limb.name, each.type, unknown=fault)
@@ -135,6 +139,12 @@ class _Builder:
             self.actuators.append(Actuator(name, limb.name, path.screws[j][0], dimension))
             way = slide_length(path, self.frame) if j == path.cut.slide else known[id(joint), 0]
             self.positions.append(SX(0) if way is None else way)
+
+    def _remark_idle(self, limb: Limb) -> None:
+        """Add the remark that a limb carries nothing, once for all copies."""
+        remark = f"{limb.place} carries nothing: its passive joints leave the platform free"
+        if remark not in self.remarks:
+            self.remarks.append(remark)
 
     def _path(self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
@@ -201,6 +211,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     """Return the model of a robot from its words, and the tables that state them."""
     at_home = home_robot(words)
     samples = sampled_dimensions(at_home)
+    remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
     platform = Motion(pose.rotation, pose.position - pose.rotation @ at_home.home)
     frame = PathFrame(at_home.size, platform, at_home.symbols, at_home.typical, samples)
@@ -228,7 +239,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=_quantities(builder),
-        scene=scene_of(builder.paths, pose),
+        scene=scene_of(builder.paths, pose, frame),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
@@ -236,6 +247,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         joint_screws=tuple(builder.screws),
         joints=tuple(builder.joints),
         links=with_shared_places(builder.links, frame),
+        remarks=(*remarks, *builder.remarks),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

@@ -35,9 +35,15 @@ def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) ->
     links = []
     for one, other in pairwise(ends):
         names = [labels[id((path.joints[j].parts or (path.joints[j],))[0])] for j in (one, other)]
-        start = path.points[one]
-        links.append(LimbLink(" to ".join(names), frozenset(names), start, path.points[other] - start))
+        start = _place(path, one)
+        links.append(LimbLink(" to ".join(names), frozenset(names), start, _place(path, other) - start))
     return links
+
+
+def _place(path: OpenedPath, j: int) -> SX:
+    """Return the current place (3, 1) of a joint on the body behind it: that of a slide moves."""
+    behind = path.behind[j]
+    return path.points[j] if behind is None else behind.point(path.joints[j].point)
 
 
 def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool:

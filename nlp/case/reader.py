@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ... import cases
-from ...models import Dimension, Model
+from ...models import Dimension
 from ..errors import CaseError, InputError, nearest
 from ..units import Units
 from .case import Case
@@ -21,13 +21,12 @@ from .limits.limits import Limits
 from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 from .overrides import Settings, override_number
 from .pose import Free, OverPoses, Pose, Rotation, Value
-from .robots import build_model
+from .robots import insert_robot_file, model_of_table, names_robot_file
 from .schema import (
     Document,
     ExpectTable,
     PublishedTable,
     Range,
-    RobotTable,
     RotationTable,
     TaskTable,
     parse_document,
@@ -147,12 +146,6 @@ def case_text(name: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def names_robot_file(tables: dict[str, Any]) -> bool:
-    """Return whether a document names a robot file."""
-    robot = tables.get("robot")
-    return isinstance(robot, dict) and "file" in robot
-
-
 def case_from_tables(
     tables: dict[str, Any], *, name: str, source: str, settings: Settings | None = None, folder: Path | None = None
 ) -> Case:
@@ -172,7 +165,7 @@ def case_from_tables(
     origins = TableOrigins()
     try:
         origins = insert_rows(tables, folder or Path())
-        robot_file = _insert_robot(tables, folder or Path()) if names_robot_file(tables) else None
+        robot_file = insert_robot_file(tables, folder or Path())
         written = parse_document(tables)
         if settings:
             for key, value in settings.items():
@@ -181,13 +174,6 @@ def case_from_tables(
         return _case_of(written, name, source, robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
-
-
-def _insert_robot(tables: dict[str, Any], folder: Path) -> str | None:
-    """Put the robot file that a document names in the place of its name, and return this name."""
-    from .robotfile.reader import insert_robot  # noqa: PLC0415 - few cases have a robot of their own
-
-    return insert_robot(tables, folder)
 
 
 def _case_of(written: Document, name: str, source: str, robot_file: str | None = None) -> Case:
@@ -203,7 +189,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         CaseError: the document holds a fault.
     """
     units = Units(written.units.length, written.units.angle)
-    model = _model_of(written, robot_file)
+    model = model_of_table(written.robot, robot_file)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
@@ -245,18 +231,6 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         published=tuple(_published(row) for row in written.published),
         source=source,
     )
-
-
-def _model_of(written: Document, robot_file: str | None) -> Model:
-    """Return the robot of a document, by its name or by its definition."""
-    robot = written.robot
-    if robot.definition is None:
-        return build_model(robot.model or "", robot.options)
-    from .robotfile.reader import model_of_definition  # noqa: PLC0415 - few cases have a robot of their own
-
-    for key in robot.options:
-        raise CaseError(f"robot.{key}", f"no such key; {nearest(key, RobotTable.model_fields)}")
-    return model_of_definition(robot.definition, robot_file)
 
 
 def _pose_keys(written: Document) -> list[str]:

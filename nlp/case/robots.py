@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import typing
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import ConfigDict, PydanticSchemaGenerationError, TypeAdapter, ValidationError
@@ -52,6 +53,51 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
     if model.name != name:
         raise _error(name, function, f"its model calls itself {model.name!r}")
     return model
+
+
+def model_of_table(table: RobotTable, robot_file: str | None = None) -> Model:
+    """Return the robot of a case's table ``robot``, by its name or by its definition.
+
+    Args:
+        table: the table.
+        robot_file: name of the file from which the definition is; None where the case has it.
+
+    Raises:
+        CaseError: there is no such robot or option, or the definition holds a fault.
+    """
+    if table.definition is None:
+        return build_model(table.model or "", table.options)
+    from .robotfile.reader import model_of_definition  # noqa: PLC0415 - few cases have a robot of their own
+
+    for key in table.options:
+        raise CaseError(f"robot.{key}", f"no such key; {nearest(key, RobotTable.model_fields)}")
+    return model_of_definition(table.definition, robot_file)
+
+
+def names_robot_file(tables: Mapping[str, Any]) -> bool:
+    """Return whether a document, as ``tomllib`` returns it, names a robot file."""
+    table = tables.get("robot")
+    return isinstance(table, dict) and "file" in table
+
+
+def insert_robot_file(tables: dict[str, Any], folder: Path) -> str | None:
+    """Put the robot file that a case names in the place of its name.
+
+    Args:
+        tables: the case, as ``tomllib`` returns it; ``file`` of its table ``robot`` becomes ``definition``.
+        folder: folder of the case, beside which the file is.
+
+    Returns:
+        The file's name; None where the case names none.
+
+    Raises:
+        CaseError: the file cannot be read, holds a fault, or stands beside a robot that is given in another way.
+    """
+    if not names_robot_file(tables):
+        return None
+    from .robotfile.reader import insert_robot  # noqa: PLC0415 - few cases have a robot of their own
+
+    return insert_robot(tables, folder)
 
 
 def _error(name: str, function: RobotFunction, fault: str) -> CaseError:

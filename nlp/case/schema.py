@@ -80,7 +80,10 @@ class UnitsTable(Table):
 class RobotTable(Table):
     """The robot: its model, the model's own options, and its dimensions."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={"oneOf": [{"required": [each]} for each in ("model", "file", "definition")]},
+    )
 
     model: str | None = Field(default=None, description="name of the robot; `screwsynth models` lists them")
     file: FileName | None = Field(default=None, description="robot file beside this one, instead of a name")

@@ -16,6 +16,11 @@ _UNITS = Units("cm", "deg")
 
 #: Half range of a starter's free numbers, as a part of their typical values.
 _SPREAD = 0.25
+#: Other rotations, for a robot that can make them: one with fewer than six freedoms keeps to its own.
+_ROTATIONS = (
+    "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
+    "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
+)
 
 
 def starter_case(model: Model) -> str:
@@ -54,8 +59,7 @@ def starter_case(model: Model) -> str:
         "[pose]                        # of the platform in the base's frame, z along the base's normal",
         f"position = [{_free_number(0, reach)}, {_free_number(0, reach)}, {_free_number(z, reach)}]",
         "rotation = { angle = { min = -20, max = 20 } }                        # any axis, at most 20 deg",
-        "# rotation = { axis = [0, 0, 1], angle = { min = -20, max = 20 } }   # about this axis only",
-        "# rotation = { axis = [0, 0, 1], angle = 10 }                        # fixed; left out: no rotation",
+        *(_ROTATIONS if model.generic is None or model.generic.constraints == 0 else ()),
         "",
         "[[task]]                      # the motion that the platform must make",
         'name = "my task"',

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from screwsynth.models import model_names, robot_function
+from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import CaseError, InputError, build_model, formulate, load_case, solve
 
 # A robot with a constraint couple and an option of every plain kind. Its hints are text, as in many packages.
@@ -164,16 +165,10 @@ def check_refused(ended: tuple[int, str, str], *words: str) -> None:
 
 @pytest.mark.usefixtures("tripod")
 def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
-    assert model_names() == ("stewart-gough", "hexapod", "three-upu", "tripod")
+    assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
     code, out, err = cli("models")
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()] == [
-        "robot",
-        "stewart-gough",
-        "hexapod",
-        "three-upu",
-        "tripod",
-    ]
+    assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")] == ["robot", *model_names()]
     assert "legs and a joint" in out
 
 
@@ -303,7 +298,7 @@ def test_a_new_case_for_unusual_typical_values(old: str, new: str, install: Inst
 
 def test_a_shipped_name_cannot_be_taken_over(install: Install, cli: Run) -> None:
     install({"hexapod": "robots:hexapod", "stewart-gough": "robots:hexapod", "tripod": "robots:tripod"})
-    assert model_names() == ("stewart-gough", "hexapod", "three-upu", "tripod")
+    assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
     assert robot_function("hexapod").__module__ == "screwsynth.models.hexapod"
     assert build_model("stewart-gough").parameters[0].name == "x1"
     code, out, err = cli("models")

@@ -292,8 +292,5 @@ def test_the_gallery_is_found_by_name_and_each_robot_has_a_starter() -> None:
         assert model.name == name
         assert model.generic is not None
         assert model.generic.jacobian == 6
-        case = case_from_tables(tomllib.loads(starter_case(model)), name=name, source=name)
-        nlp = formulate(case)
-        x = close_equations(nlp, nlp.start)
-        assert loops_are_closed(nlp, x)
-        assert evaluate(nlp, x).rank == 6
+        # The starter of each is solved in test_tables.py.
+        assert f'model = "{name}"' in starter_case(model)

@@ -16,8 +16,8 @@ from .schema import check_form
 _LARGEST_FILE = 2**20
 
 
-def insert_robot(tables: dict[str, Any], folder: Path) -> str | None:
-    """Put the robot file that a case names in the place of its name, and return this name; None where there is none.
+def insert_robot(tables: dict[str, Any], folder: Path) -> str:
+    """Put the robot file that a case names in the place of its name, and return this name.
 
     Args:
         tables: the case, as ``tomllib`` returns it; ``file`` of its table ``robot`` becomes ``definition``.
@@ -26,9 +26,7 @@ def insert_robot(tables: dict[str, Any], folder: Path) -> str | None:
     Raises:
         CaseError: the file cannot be read, holds a fault, or stands beside a robot that is given in another way.
     """
-    table = tables.get("robot")
-    if not isinstance(table, dict) or "file" not in table:
-        return None
+    table = tables["robot"]
     name = table["file"]
     if not isinstance(name, str) or not name:
         raise CaseError("robot.file", "must be the name of a robot file")

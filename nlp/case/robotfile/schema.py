@@ -90,6 +90,19 @@ class RobotFile(Table):
     limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
 
 
+#: Words for one entry of a list.
+_ONE = {"limb": "limb", "joints": "joint", "branch": "branch", "angles": "angle", "axes": "axis"}
+#: Values that a key must have, for messages where it is missing.
+_NEEDED = {
+    "type": "one of R, P, H, C, U, S and Pa",
+    "at": "a point, as an expression in quotes or a list of 3",
+    "name": "a text in quotes",
+    "limb": "one or more tables [[limb]]",
+    "joints": "a list of one or more joints",
+    "typical": "a number, degrees for an angle",
+}
+
+
 def check_form(tables: dict[str, Any]) -> None:
     """Refuse a robot file whose keys or types are not those of the schema.
 
@@ -113,15 +126,22 @@ def _error(fault: ErrorDetails) -> CaseError:
         return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
     if fault["type"] == "float_type" and location[-1] == "<number>":
         return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
-    return CaseError(_place(location), written.fault, written.value)
+    needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
+    sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
+    return CaseError(_place(location), sentence, written.value)
 
 
 def _place(location: Sequence[int | str]) -> str:
-    """Return a path into the document in words; parts that stand for branches of a union are left out."""
+    """Return a path into the document in words; parts that stand for branches of a union are left out.
+
+    An entry of a list of tables, or of axes, is counted by the word for one of them; others are entries of a vector.
+    """
     parts: list[str] = []
     for part in location:
-        if isinstance(part, int):
-            parts[-1] = f"{parts[-1].removesuffix('s')} {part + 1}"
+        if isinstance(part, int) and parts[-1] in _ONE:
+            parts[-1] = f"{_ONE[parts[-1]]} {part + 1}"
+        elif isinstance(part, int):
+            parts.append(f"entry {part + 1}")
         elif not part.startswith("<"):
             parts.append(part)
     return ", ".join(parts) or "the file"
