@@ -17,7 +17,8 @@ from .wrench import WrenchKind
 
 #: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
 _ZERO = 1e-9
-#: Singular values below this part of the largest are zero: a closed loop is known to the root of rounding at worst.
+#: Singular values of unit wrenches below this are zero, or below this part of the largest: a closed loop is known to
+#: the root of rounding at worst.
 _RANK = 1e-7
 
 
@@ -93,7 +94,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
         return 0
     scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
     values = np.linalg.svd(scaled, compute_uv=False)
-    return int(np.count_nonzero(values > _RANK * values[0])) if values[0] > 0 else 0
+    return int(np.count_nonzero(values > _RANK * max(1.0, float(values[0]))))
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:

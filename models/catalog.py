@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .hexapod import hexapod
 from .model import Model
@@ -55,6 +55,18 @@ def gallery_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _GALLERY.glob("*.toml")))
 
 
+def gallery_description(name: str) -> str | None:
+    """Return what a robot of the gallery is, without building it; None where no robot of the gallery has the name."""
+    return _gallery_tables(name)["description"] if name in gallery_names() else None
+
+
+def _gallery_tables(name: str) -> dict[str, Any]:
+    """Return the tables of a robot of the gallery."""
+    import tomllib  # noqa: PLC0415 - most runs do not need it
+
+    return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
+
+
 @cache
 def gallery_robot(name: str) -> Model:
     """Return a shipped robot that is given joint by joint.
@@ -65,14 +77,11 @@ def gallery_robot(name: str) -> Model:
     Raises:
         UnknownModelError: there is no such robot.
     """
-    import tomllib  # noqa: PLC0415 - most runs need neither
-
-    from .joints import robot  # noqa: PLC0415
+    from .joints import robot  # noqa: PLC0415 - most runs do not need it
 
     if name not in gallery_names():
         raise UnknownModelError(name)
-    tables = tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
-    return replace(robot(**tables), options={})
+    return replace(robot(**_gallery_tables(name)), options={})
 
 
 def robot_function(name: str) -> RobotFunction:

@@ -170,17 +170,49 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     if joints[far].type == "S":
         path.screws[far] = _rotations_about(path.points[far])
     square = ca.sumsqr(home)
+    is_straight = True
+    if slide is not None:
+        offset = square - ca.dot(home, joints[slide].axes[0].axis) ** 2
+        is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
+    if joints[far].type == "U" and is_straight:
+        path.screws[far] = _universal_screws(path, sides[0], home, frame)
     if slide is None:
         path.equations.append((ca.sumsqr(path.rod) - square) / (2 * square))
         return
     # The slide's own direction is not known where it is not along the rod: only its part along the rod does work.
-    axis = joints[slide].axes[0].axis
     current = ca.sumsqr(path.rod)
-    offset = square - ca.dot(home, axis) ** 2
-    is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
     part = 1 / ca.sqrt(current) if is_straight else ca.sqrt(current - offset) / current
     path.screws[slide] = [ca.vertcat(SX.zeros(3), path.rod * part * _slide_sign(path, frame))]
     path.points[slide] = (path.points[j] + path.points[far]) / 2
+
+
+def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame) -> list[SX]:
+    """Return the current screws of the universal joint at the far end of a rod, whose direction it follows.
+
+    One axis moves with the known body. The other keeps its angles against the first axis and against the rod. With the
+    first axis ``u`` and the rod's direction ``d`` it is ``a u + b d + g u x d``, where ``g`` has the sign of home. The
+    expressions have no value where the rod is along the first axis, or would have to be bent beyond its reach.
+
+    Args:
+        path: the path, with its rod.
+        side: displacement of the body that the first axis moves with.
+        home: (3, 1) the rod at home, length.
+        frame: values that all paths of the robot share.
+    """
+    far = path.cut.far
+    if far is None or path.rod is None:
+        return []
+    axes = path.joints[far].axes if far < path.cut.joint else path.joints[far].axes[::-1]
+    first, second = (axis.axis for axis in axes)
+    u, d, d_home = side.rotation @ first, path.rod / ca.norm_2(path.rod), home / ca.norm_2(home)
+    across, along, w = ca.dot(first, second), ca.dot(second, d_home), ca.dot(u, d)
+    a, b = (across - along * w) / (1 - w**2), (along - across * w) / (1 - w**2)
+    within = a * u + b * d
+    sign = -1.0 if frame.typical_value(ca.dot(second, ca.cross(first, d_home))).item() < 0 else 1.0
+    g = sign * ca.sqrt((1 - ca.sumsqr(within)) / (1 - w**2))
+    directions = [u, within + g * ca.cross(u, d)]
+    place = path.points[far]
+    return [ca.vertcat(each, ca.cross(place, each)) for each in directions]
 
 
 def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:

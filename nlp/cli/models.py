@@ -59,10 +59,11 @@ def _description(model: str) -> str:
 
     The fault of one package's robot must not hide the other robots.
     """
+    from ...models.catalog import gallery_description
     from ..case.robots import build_model
     from ..errors import CaseError
 
     try:
-        return build_model(model).description
+        return gallery_description(model) or build_model(model).description
     except CaseError as error:
         return error.fault

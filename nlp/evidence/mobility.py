@@ -132,7 +132,7 @@ def _limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -
     matrices = [np.array(each) for each in values]
     found: list[Singularity] = []
     for each, passive, every in zip(model.joint_screws, matrices[::2], matrices[1::2], strict=True):
-        if _rank(passive, state.position) < each.passive_rank:
+        if not np.isfinite(passive).all() or _rank(passive, state.position) < each.passive_rank:
             found.append(Singularity(SingularityKind.PASSIVE, each.limb))
         elif _rank(every, state.position) < each.all_rank:
             found.append(Singularity(SingularityKind.SERIAL, each.limb))

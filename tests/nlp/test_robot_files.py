@@ -284,6 +284,47 @@ def test_kinds_of_singularity_are_told_apart() -> None:
     assert kinds(Case(snu, {}, (0, 0, 0.7), turn)) == [SingularityKind.CONSTRAINT]
 
 
+def test_singularities_of_limbs_with_rods_are_found() -> None:
+    def limb(first: str) -> list[SingularityKind]:
+        """A platform on six legs, of which the first may be at a singularity at home."""
+        joints = [
+            {"type": "U", "at": "B", "axes": ["x", "y"]},
+            {"type": "P", "at": "B", "axis": "A - B", "actuated": True},
+            {"type": "S", "at": "A"},
+        ]
+        legs = [
+            {
+                "repeat": {"angles": angles},
+                "points": {"B": [1, 0, 0], "A": [0.5, offset, 1]},
+                "joints": joints,
+            }
+            for angles, offset in (([120, 240], 0.4), ([20, 140, 260], -0.4))
+        ]
+        model = robot(name="six", home=[0, 0, 1], limb=[tomllib.loads(first), *legs])
+        nlp = formulate(Case(model, {}, (0, 0, 1), [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]))
+        found = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
+        assert found is not None
+        assert all(each.limb == "1" for each in found.singularities)
+        return [each.kind for each in found.singularities]
+
+    leg = """
+        points = { B = [1, 0, 0], A = [0.6, 0, 1] }
+        joints = [{ type = "U", at = "B", axes = ["FIRST", "y"] },
+                  { type = "P", at = "B", axis = "A - B", actuated = true }, { type = "S", at = "A" }]
+    """
+    assert limb(leg.replace("FIRST", "x")) == []
+    # The leg along the first axis of its universal joint.
+    assert limb(leg.replace("FIRST", "A - B")) == [SingularityKind.PASSIVE]
+    rod = """
+        points = { B = [1, 0, 0], A = [0.6, 0, 1], E = "B + PART*(A - B) + OFF*x" }
+        joints = [{ type = "R", at = "B", axis = "y", actuated = true },
+                  { type = "U", at = "E", axes = ["y", "x"] }, { type = "S", at = "A" }]
+    """
+    assert limb(rod.replace("PART", "0.4").replace("OFF", "0.2")) == []
+    # Crank and rod in line.
+    assert limb(rod.replace("PART", "0.4").replace("OFF", "0")) == [SingularityKind.SERIAL]
+
+
 def test_the_gallery_is_found_by_name_and_each_robot_has_a_starter() -> None:
     assert len(gallery_names()) >= 14
     assert set(gallery_names()) < set(model_names())
