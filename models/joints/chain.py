@@ -248,8 +248,14 @@ def _evaluated(place: str, written: str | float, names: Mapping[str, SX], later:
         return evaluate(written, names)
     except UnknownNameError as error:
         if error.name not in later:
-            raise RobotError(place, f"is {written!r}, which {error}") from None
-        fault = f"is {written!r}, which needs {error.name!r} before it is given; allowed are names that are given above"
+            raise RobotError(place, f"is {_shown(written)}, which {error}") from None
+        fault = f"is {_shown(written)}, which needs {error.name!r} before it is given; allowed are names given above"
         raise RobotError(place, fault) from None
     except ExpressionError as error:
-        raise RobotError(place, f"is {written!r}, which {error}") from None
+        raise RobotError(place, f"is {_shown(written)}, which {error}") from None
+
+
+def _shown(written: str | float) -> str:
+    """Return an expression for a message, cut to a length that is read."""
+    text = repr(written)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."

@@ -49,8 +49,7 @@ def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
         samples: (s, d) dimensions.
 
     Raises:
-        RobotError: the axes of a universal joint are parallel, a parallelogram is flat, a rod has no length, or no
-            joint is actuated.
+        RobotError: the axes of a universal joint are parallel, a parallelogram is flat, or a rod has no length.
     """
     groups: dict[int, Limb] = {}
     for limb in robot.limbs:
@@ -68,9 +67,6 @@ def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
                 raise RobotError(pair.place, pair.fault)
             if pair.remark and INCIDENT <= largest < _ALMOST:
                 remarks.append(f"{pair.place}: {pair.remark.format(f'{largest:.1g}')}")
-    if not any(joint.actuated for limb in groups.values() for path in limb.paths for joint in path):
-        fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
-        raise RobotError("actuated", fault)
     return list(dict.fromkeys(remarks))
 
 

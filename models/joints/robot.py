@@ -220,6 +220,9 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         builder.add_limb(limb)
     if not (builder.wrenches or builder.members):
         raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
+    if not builder.actuators:
+        fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
+        raise RobotError("actuated", fault)
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
     loops = examine_loops(

@@ -402,7 +402,7 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
         with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
             replace(legs, limits=Limits(limit))
-    rods = robot(name="rods", limb=[{"joints": [joint("S", B), joint("S", A)]}])
+    rods = robot(name="rods", limb=[{"joints": [joint("S", B), joint("S", A)]}, {"joints": LIMBS["hinge"]}])
     with pytest.raises(CaseError, match="joint 1:1 is of type S"):
         Case(rods, {}, (0.0, 0.0, 0.0), legs.tasks, limits=Limits(JointMotion("1:1", max=1.0)))
 

@@ -39,10 +39,10 @@ LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
     LinkClearance,
     ConditionNumber,
     SmallestSingularValue,
-    RateShare,
     ActuatorRate,
     JointMotion,
     JointCone,
+    RateShare,
     Relations,
     QuantityLimit,
 )
