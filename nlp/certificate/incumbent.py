@@ -9,6 +9,7 @@ import numpy as np
 from ...models import FloatArray
 from ..errors import InputError
 from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
+from ..evidence.state import loops_are_closed
 from ..program.sampling import starting_points
 from .standardform import StandardForm
 
@@ -101,8 +102,13 @@ class Incumbent:
         return np.append(point, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
 
     def _violation(self, point: FloatArray, value: float) -> float:
-        """Return the largest violation of the program's limits, in half ranges."""
-        return linearise(self._form.nlp, self._with_level(point, value)).violation
+        """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
+
+        The program has independent loop equations only, which other ways to assemble the joints fulfil too.
+        """
+        nlp, whole = self._form.nlp, self._with_level(point, value)
+        violation = linearise(nlp, whole).violation
+        return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf
 
     def _keep_if_better(self, point: FloatArray) -> None:
         value = self._form.value_at(point)

@@ -61,7 +61,7 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
 
 
 def check_outputs(cases: Iterable[str], outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that cannot be written, that are a case file, or that are each other, before the work begins.
+    """Refuse outputs that cannot be written, that a case is read from, or that are each other, before the work begins.
 
     Args:
         cases: names of the cases that are read.
@@ -70,10 +70,10 @@ def check_outputs(cases: Iterable[str], outputs: Mapping[str, str | None]) -> No
     Raises:
         InputError: an output is refused.
     """
-    from ..case.reader import find_case
+    from ..case.inputs import input_files
     from ..output.files import check_outputs as check
 
-    check([find_case(each) for each in cases], outputs)
+    check([path for each in cases for path in input_files(each)], outputs)
 
 
 def check_picture(target: str | None) -> None:

@@ -128,7 +128,9 @@ def check_outputs(inputs: Iterable[str | Path], outputs: Mapping[str, str | None
     read = [Path(each) for each in inputs]
     for option, path in chosen.items():
         if any(_is_same_file(path, each) for each in read):
-            raise InputError(f"{option} {path}: is the case file, which would be lost; choose another name")
+            raise InputError(
+                f"{option} {path}: is the case file or a file that it names, which would be lost; choose another name"
+            )
     for (option, path), (other, second) in combinations(chosen.items(), 2):
         if _is_same_file(path, second):
             raise InputError(f"{option} {path}: is the file of {other} too; choose another name")

@@ -129,6 +129,14 @@ def test_a_robot_file_beside_a_case_is_solved(
     assert again.model.options["definition"] == case.model.options["definition"]
 
 
+def test_an_output_never_takes_the_place_of_the_robot_file(tmp_path: Path, cli: Run) -> None:
+    name = put(tmp_path, RPS, RPS_CASE)
+    status, out, err = cli("solve", name, "--starts", "1", "--json", str(tmp_path / "robot.toml"))
+    assert (status, out) == (2, "")
+    assert "is the case file or a file that it names" in err
+    assert (tmp_path / "robot.toml").read_text(encoding="utf-8") == RPS
+
+
 def test_a_solution_closes_all_loops_and_survives_pickling(tmp_path: Path) -> None:
     case = load_case(put(tmp_path, DELTA, DELTA_CASE))
     solution = solve(replace(case, search=Search(starts=4)))
