@@ -3,9 +3,10 @@
 The modules in order, each of which imports only those before it: ``expression`` (the small language of a robot's
 numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is written),
 ``words`` (a robot as it is written), ``chain`` (joints and limbs with their symbols), ``generic`` (ranks at random
-dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at which a limb's
-loop is opened), ``opened`` (the opened limb: current screws and equations), ``resistance`` (rows and members of a limb),
-``angles`` and ``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations),
+dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at which a
+limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``resistance`` (rows and members of
+a limb), ``angles`` and ``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop
+equations),
 ``pictures`` (the drawing), ``robot`` (the model).
 """
 

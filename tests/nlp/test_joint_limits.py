@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -250,6 +251,8 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
     x = close_equations(nlp, nlp.start)
     rows = {(row.key, row.name.rpartition(" joint ")[2]): row.value for row in margins_of(nlp, x, optimal=False)}
     others = {row.name: row.value for row in margins_of(nlp, x, optimal=False)}
+    again = pickle.loads(pickle.dumps(nlp))  # noqa: S301 - its own pickle
+    assert margins_of(again, x, optimal=False) == margins_of(nlp, x, optimal=False)
     angle, p = float(np.linalg.norm(TURN)), np.array([0.05, -0.03, -0.05])
     way = [(turn_about(TURN, s * angle), s * p) for s in (0.5, 1)]
     R, _ = way[-1]
