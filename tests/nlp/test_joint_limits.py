@@ -437,3 +437,24 @@ def test_a_proof_treats_ranges_and_cones_and_names_a_limit_that_it_cannot() -> N
     assert certify(case).certificate.status is CertificateStatus.PROVED
     with pytest.raises(UncoveredError, match=r"the limit limits\.link_clearance\.min hold the operation 'fmin'"):
         certify(replace(case, limits=Limits(LinkClearance(2.0))))
+
+
+def test_links_begin_on_the_body_that_moves_with_a_slide() -> None:
+    """A link behind a slide begins where the slide is; a slide along its link makes the link longer."""
+    for slide, limb in (
+        (0, [P(B, [0, 0.2, 1], **DRIVEN), R(B, [0, 1, 0]), S(A)]),
+        (1, [R(B, [0, 1, 0]), P(B, [-0.4, 0.1, 1.1], **DRIVEN), S(A)]),
+        (1, [U1, P([0.8, 0.15, 0.55], [-0.4, 0.1, 1.1], **DRIVEN), S(A)]),
+        (1, [R(B, [0, 1, 0]), P(B, [0, 0.2, 1], **DRIVEN), S(A)]),
+    ):
+        model = robot(name="limb", limb=[{"joints": limb}])
+        (link,) = model.links
+        given = coordinates_of(limb, 1)
+        places = forward(limb, given)
+        outputs = [link.start, link.start + link.span]
+        function = ca.Function("link", Substitution.identity(model).all, [ca.densify(each) for each in outputs])
+        values = function.call([np.zeros(0), unknowns_at(model, places[-1]), *places[-1]])
+        start, end = (np.array(each).ravel() for each in values)
+        R1, t1 = places[1 if slide == 0 else 0]
+        assert start == pytest.approx(R1 @ np.array(B) + t1, abs=1e-8)
+        assert end == pytest.approx(places[-1][0] @ np.array(A) + places[-1][1], abs=1e-8)
