@@ -42,6 +42,8 @@ _MOST_LIMBS = 24
 #: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
 _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
+#: Most joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
+_MOST_IN_ALL = 120
 #: Copies of a limb nearer than this coincide, degrees.
 _SAME_ANGLE = 1e-6
 
@@ -135,6 +137,9 @@ def read_words(tables: Mapping[str, object]) -> RobotWords:
     names = [limb for each in read for limb in each.names]
     if len(names) > _MOST_LIMBS:
         raise RobotError("limb", f"has {len(names)} limbs with all copies; at most {_MOST_LIMBS} are allowed")
+    joints = sum(len(each.names) * (len(each.stem) + sum(map(len, each.branches))) for each in read)
+    if joints > _MOST_IN_ALL:
+        raise RobotError("limb", f"has {joints} joints with all copies; at most {_MOST_IN_ALL} are allowed")
     for limb in names:
         if names.count(limb) > 1:
             raise RobotError("limb", f"has two limbs with the name {limb!r}")

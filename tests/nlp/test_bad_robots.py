@@ -88,6 +88,8 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("count = 1", "count = 2, axis = [0, 0, 0]", "limb 1, repeat, axis: is zero: it needs a direction"),
     ("count = 1", 'count = 2, axis = "z"', 'limb 1, repeat, axis = "z": must be a list of 3 numbers'),
     (LIMB, f"{LIMB}{LIMB}".replace("count = 1", "count = 20"), "limb: has 40 limbs with all copies; at most 24 are allowed"),
+    (LIMB, LIMB.replace("count = 1", "count = 24").replace(JOINTS, f"joints = [{', '.join([DRIVEN] * 6)}]"), "limb: has 144 joints with all copies; at most 120 are allowed"),
+    ("home =", f"{'x' * 5000} = 1\nhome =", f"{'x' * 57}...: no such key; allowed: name"),
     # Names.
     (AXIS, '"A - D"', "which has the name 'D', which is unknown; known are A, B, h, half, pi, rb, rp, x, y, z"),
     (LAST, 'at = "AA" }', "limb 1, joint 3 (S), at: is 'AA', which has the name 'AA', which is unknown; did you mean 'A'?"),

@@ -90,6 +90,8 @@ class RobotFile(Table):
     limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
 
 
+#: Keys longer than this are cut in messages.
+_LONGEST_KEY = 60
 #: Words for one entry of a list.
 _ONE = {"limb": "limb", "joints": "joint", "branch": "branch", "angles": "angle", "axes": "axis"}
 #: Values that a key must have, for messages where it is missing.
@@ -143,5 +145,5 @@ def _place(location: Sequence[int | str]) -> str:
         elif isinstance(part, int):
             parts.append(f"entry {part + 1}")
         elif not part.startswith("<"):
-            parts.append(part)
+            parts.append(part if len(part) <= _LONGEST_KEY else f"{part[: _LONGEST_KEY - 3]}...")
     return ", ".join(parts) or "the file"
