@@ -59,8 +59,8 @@ from .three_upu import three_upu
 from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along
 
 if TYPE_CHECKING:
+    from .joints.forms import RobotError
     from .joints.robot import robot
-    from .joints.words import RobotError
 
 __all__ = [
     "Actuator",

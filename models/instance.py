@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TypeVar
 
 import casadi as ca
-import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
+from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member, resisted_parts, scaled_twists
 from .model import Model
 from .wrench import Wrench, WrenchKind
@@ -99,6 +100,8 @@ class RobotInstance:
             characteristic length, twists.
         loops: (k, 1) left sides of all loop equations, those beyond the closure included.
         actuators: (6, a) current unit screw of each of the model's actuators.
+        joints: the joints of the model's limbs.
+        links: their links.
     """
 
     parameters: SX
@@ -116,6 +119,8 @@ class RobotInstance:
     inputs: SX
     loops: SX
     actuators: SX
+    joints: tuple[LimbJoint, ...]
+    links: tuple[LimbLink, ...]
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -137,11 +142,14 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
         *[part for member in model.members for part in (member.centre, member.screws)],
+        *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
     force, moment, square, closure, loops, actuators, *others = function.call(substitution.all)
-    ends = np.cumsum([len(model.quantities), 2 * len(model.legs)])
-    quantities, joints, parts = others[: ends[0]], others[ends[0] : ends[1]], others[ends[1] :]
+    following = iter(others)
+    quantities = list(islice(following, len(model.quantities)))
+    joints = list(islice(following, 2 * len(model.legs)))
+    parts = list(islice(following, 2 * len(model.members)))
     members = [
         replace(member, centre=centre, screws=screws)
         for member, centre, screws in zip(model.members, parts[::2], parts[1::2], strict=True)
@@ -166,6 +174,8 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         inputs=ca.veccat(*substitution.all, length, *twists),
         loops=loops,
         actuators=actuators,
+        joints=tuple(each.replaced(following) for each in model.joints),
+        links=tuple(each.replaced(following) for each in model.links),
     )
 
 

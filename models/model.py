@@ -16,6 +16,7 @@ import casadi as ca
 from casadi import SX
 
 from .drawing import Scene
+from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member
 from .parts import (
     Actuator,
@@ -61,6 +62,9 @@ class Model(Whole, Shown):
         loops: all equations of closed loops, which hold where the robot is put together; empty for the closure alone.
         actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
         joint_screws: screws of the joints of its limbs, where they are known.
+        joints: the joints of its limbs, as limits read them.
+        links: the links of its limbs as segments.
+        remarks: sentences for the user on what may be a mistake in a robot that is given joint by joint.
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
         structure: the structure of each path of joints; empty for a robot given by its rows.
 
@@ -87,6 +91,9 @@ class Model(Whole, Shown):
     loops: tuple[Closure, ...] = ()
     actuators: tuple[Actuator, ...] = ()
     joint_screws: tuple[JointScrews, ...] = ()
+    joints: tuple[LimbJoint, ...] = ()
+    links: tuple[LimbLink, ...] = ()
+    remarks: tuple[str, ...] = ()
     generic: GenericRanks | None = None
     structure: tuple[PathStructure, ...] = ()
 
@@ -203,6 +210,7 @@ def _check_symbols(model: Model) -> None:
         *(quantity.values for quantity in model.quantities),
         *(expression for _, expression in model.scene.expressions),
         *(joint for leg in model.legs for joint in (leg.base, leg.platform)),
+        *expressions_of((*model.joints, *model.links)),
     ]
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
     errors = ca.veccat(SX(0), *[error for leg in model.legs for error in (leg.base_error, leg.platform_error)])

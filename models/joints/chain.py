@@ -7,7 +7,7 @@ that is repeated are its rotations about the axis of repetition.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -17,9 +17,10 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..parts import Dimension
 from ..screws import Displacement, Screw, screw_displacement, unit_vector
-from .expression import ExpressionError, evaluate
+from .expression import ExpressionError, UnknownNameError, evaluate
+from .forms import RobotError, VectorExpression
 from .motion import AxisKind, JointAxis
-from .words import JointWords, LimbWords, RepeatWords, RobotError, RobotWords, VectorExpression
+from .words import JointWords, LimbWords, RepeatWords, RobotWords
 
 #: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
 #: leaves no entries of rounding error in the expressions.
@@ -38,6 +39,7 @@ class Joint:
         point: (3, 1) its centre or a point of its axis, length.
         axes: its axes, each with one variable, the base side first; those of a spherical joint are along x, y and z.
         actuated: whether an actuator drives it.
+        name: that the user gives it; empty for none.
         parts: the joints as they are written that this one stands for; empty for a joint as it is written.
     """
 
@@ -46,6 +48,7 @@ class Joint:
     point: SX
     axes: tuple[JointAxis, ...]
     actuated: bool
+    name: str = ""
     parts: tuple[Joint, ...] = ()
 
 
@@ -60,6 +63,7 @@ class Limb:
         stem: joints that all paths share, from the base on.
         branches: joints of each path behind the stem; one empty path for a limb without branches.
         centre: (3, 1) the centre that the user gives, length; None for that of the rule.
+        turn: (3, 3) rotation of a copy from the limb as it is written.
     """
 
     name: str
@@ -68,6 +72,7 @@ class Limb:
     stem: tuple[Joint, ...]
     branches: tuple[tuple[Joint, ...], ...]
     centre: SX | None
+    turn: FloatArray
 
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
@@ -109,7 +114,8 @@ def home_robot(words: RobotWords) -> HomeRobot:
     ]
     names: dict[str, SX] = dict(symbols)
     for name, text in words.derived.items():
-        names[name] = _scalar(f"derived.{name}", text, names)
+        later = [each for each in words.derived if each not in names]
+        names[name] = _scalar(f"derived, {name}", text, names, later)
     home = _vector("home", words.home, names)
     limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, names)]
     stacked = ca.vertcat(SX(0, 1), *symbols.values())
@@ -137,11 +143,12 @@ def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
     for name, written in words.points.items():
         if name in known:
             raise RobotError(f"{words.place}, point {name}", "has the name of a dimension")
-        known[name] = _vector(f"{words.place}, point {name}", written, known)
+        later = [each for each in words.points if each not in known]
+        known[name] = _vector(f"{words.place}, point {name}", written, known, later)
     stem = tuple(_joint(joint, known) for joint in words.stem)
     branches = tuple(tuple(_joint(joint, known) for joint in branch) for branch in words.branches) or ((),)
     centre = None if words.centre is None else _vector(f"{words.place}, centre", words.centre, known)
-    first = Limb("", words.place, group, stem, branches, centre)
+    first = Limb("", words.place, group, stem, branches, centre, np.eye(3))
     turns = [None] if words.repeat is None else _turns(words.repeat)
     return [_turned(first, name, turn) for name, turn in zip(words.names, turns, strict=True)]
 
@@ -177,6 +184,7 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
         stem=tuple(joint(each) for each in limb.stem),
         branches=tuple(tuple(joint(each) for each in branch) for branch in limb.branches),
         centre=None if limb.centre is None else Q @ limb.centre + t,
+        turn=turn.rotation,
     )
 
 
@@ -203,7 +211,7 @@ def _joint(words: JointWords, names: Mapping[str, SX]) -> Joint:
             axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
         case _:
             axes = [axis(AxisKind.ROTATION, each) for each in given]
-    return Joint(words.place, words.type, point, tuple(axes), words.actuated)
+    return Joint(words.place, words.type, point, tuple(axes), words.actuated, words.name)
 
 
 def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:
@@ -217,27 +225,32 @@ def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -
     return vector / ca.norm_2(vector)
 
 
-def _vector(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:
-    """Return the value of a vector expression, (3, 1)."""
+def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
+    """Return the value of a vector expression, (3, 1); the last argument are names that are not given yet."""
     if not isinstance(written, str):
-        return ca.vertcat(*[_scalar(place, each, names) for each in written])
-    value = _evaluated(place, written, names)
+        return ca.vertcat(*[_scalar(place, each, names, later) for each in written])
+    value = _evaluated(place, written, names, later)
     if value.shape != (3, 1):
         raise RobotError(place, f"is {written!r}, which is a number; a vector is needed")
     return value
 
 
-def _scalar(place: str, written: str | float, names: Mapping[str, SX]) -> SX:
-    """Return the value of a scalar expression, (1, 1)."""
-    value = _evaluated(place, written, names)
+def _scalar(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
+    """Return the value of a scalar expression, (1, 1); the last argument are names that are not given yet."""
+    value = _evaluated(place, written, names, later)
     if not value.is_scalar():
         raise RobotError(place, f"is {written!r}, which is a vector; a number is needed")
     return value
 
 
-def _evaluated(place: str, written: str | float, names: Mapping[str, SX]) -> SX:
+def _evaluated(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str]) -> SX:
     try:
         return evaluate(written, names)
+    except UnknownNameError as error:
+        if error.name not in later:
+            raise RobotError(place, f"is {_shown(written)}, which {error}") from None
+        fault = f"is {_shown(written)}, which needs {error.name!r} before it is given; allowed are names given above"
+        raise RobotError(place, fault) from None
     except ExpressionError as error:
         raise RobotError(place, f"is {_shown(written)}, which {error}") from None
 

@@ -84,7 +84,8 @@ def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
         axes = tuple(
             JointAxis(AxisKind.ROTATION, each, point, actuated=False, pitch=SX(0), rod=SX.zeros(3)) for each in basis
         )
-    return Joint(joints[0].place, kind, point, axes, actuated=False, parts=tuple(joints))
+    parts = tuple(part for joint in joints for part in joint.parts or (joint,))
+    return Joint(joints[0].place, kind, point, axes, actuated=False, parts=parts)
 
 
 def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:

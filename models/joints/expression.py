@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import difflib
 import math
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -23,10 +24,26 @@ _LONGEST = 2000
 #: Deepest nesting of an expression: far below the depth at which Python's own recursion ends.
 _DEEPEST = 60
 _LARGEST_POWER = 100.0
+#: Characters of expressions. Python would take a text behind # for a comment, and other letters for those of names.
+_CHARACTERS = re.compile(r"[A-Za-z0-9_+\-*/^(),. ]*")
+#: Numbers of Python that are none here: 0x10, 1_000, 1j.
+_OTHER_NUMBERS = re.compile(r"\b[0-9]+(_|[xXbBoOjJ])")
 
 
 class ExpressionError(ValueError):
     """Error of a text that is no expression; the message is a clause about the text."""
+
+
+class UnknownNameError(ExpressionError):
+    """Error of a name that is not known.
+
+    Attributes:
+        name: the name.
+    """
+
+    def __init__(self, name: str, hint: str) -> None:
+        super().__init__(f"has the name {name!r}, which is unknown; {hint}")
+        self.name = name
 
 
 def _scalar(function: Callable[[SX], SX]) -> Callable[..., SX]:
@@ -100,6 +117,8 @@ def _tree(text: str) -> ast.expr:
         raise ExpressionError(f"is longer than {_LONGEST} letters")
     if "**" in text:
         raise ExpressionError("has '**': a power is written '^'")
+    if not _CHARACTERS.fullmatch(text) or _OTHER_NUMBERS.search(text):
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's advice on texts such as 1if: they are refused below
@@ -120,7 +139,7 @@ def _value(node: ast.expr, names: Mapping[str, SX], depth: int) -> SX:  # noqa: 
         case ast.Name(id=name) if name in CONSTANTS:
             return CONSTANTS[name]
         case ast.Name(id=name):
-            raise ExpressionError(f"has the name {name!r}, which is unknown; {_hint(name, [*names, *CONSTANTS])}")
+            raise UnknownNameError(name, _hint(name, [*names, *CONSTANTS]))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
             return _value(operand, names, depth + 1)
         case ast.UnaryOp(op=ast.USub(), operand=operand):

@@ -13,8 +13,8 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from .chain import HomeRobot, Joint
+from .forms import RobotError
 from .motion import AxisKind, Motion
-from .words import RobotError
 
 #: Number of random points at which ranks are measured; the largest rank counts.
 SAMPLES = 6
@@ -25,7 +25,7 @@ _HALVINGS = 8
 #: limb that is this near to a lower rank at every one of several random points has it.
 RANK_TOLERANCE = 1e-7
 #: Axes are parallel or meet where their cross product, or their distance in parts of the robot's size, is below this.
-_INCIDENT = 1e-9
+INCIDENT = 1e-9
 
 
 def sampled_dimensions(robot: HomeRobot) -> FloatArray:
@@ -124,7 +124,7 @@ def generic_rank(robot: HomeRobot, joints: Sequence[Joint], columns: SX, values:
 def are_parallel(robot: HomeRobot, one: SX, other: SX, samples: FloatArray) -> bool:
     """Return whether two unit vectors (3, 1) are parallel for all dimensions."""
     function = ca.Function("parallel", [robot.symbols], [ca.norm_2(ca.cross(one, other))])
-    return all(float(function(sample)) < _INCIDENT for sample in samples)
+    return all(float(function(sample)) < INCIDENT for sample in samples)
 
 
 def meeting_point(robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: FloatArray) -> SX | None:
@@ -141,6 +141,6 @@ def meeting_point(robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: Flo
     for candidate in (p1, p2, met):
         off = ca.vertcat(*[ca.cross(candidate - point, direction) for point, direction in lines]) / robot.size
         function = ca.Function("meeting", [robot.symbols], [ca.densify(off)])
-        if all(np.abs(function(sample).full()).max() < _INCIDENT for sample in samples):
+        if all(np.abs(function(sample).full()).max() < INCIDENT for sample in samples):
             return candidate
     return None

@@ -17,7 +17,7 @@ from ..arrays import FloatArray
 from ..rotation import matrix_from_cayley
 from ..rows import DEPENDENT, independent_rows
 from .chain import HomeRobot
-from .words import RobotError
+from .forms import RobotError
 
 #: Closed configurations that are tried; the largest rank among them counts.
 _POINTS = 5

@@ -12,6 +12,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..basis import basis_of_member, constraint_rows, rank_of_rows
 from ..instance import Substitution, jacobian
+from ..limbjoints import LimbJoint, LimbLink
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import (
@@ -29,14 +30,18 @@ from ..parts import (
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
+from .faults import examine_geometry
+from .forms import Expression, RobotError, VectorExpression
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
 from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
+from .segments import limb_links, with_shared_places
+from .states import PathJoints
 from .structure import structure_of, with_kept
-from .words import Expression, RobotError, RobotWords, VectorExpression, read_words
+from .words import RobotWords, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -95,6 +100,9 @@ class _Builder:
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
     paths: list[DrawnPath] = field(default_factory=list)
+    joints: list[LimbJoint] = field(default_factory=list)
+    links: list[tuple[OpenedPath, list[LimbLink]]] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
     structure: list[PathStructure] = field(default_factory=list)
 
@@ -105,10 +113,22 @@ class _Builder:
             raise RobotError(limb.place, fault)
         known: dict[tuple[int, int], SX] = {}
         driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
+        labels: dict[int, str] = {}
         for index, joints in enumerate(limb.paths):
+            new = _labels(limb, index, joints, labels)
+            labels |= new
             path = self._path(limb, index, joints, self._variables(limb, known))
             if path is None:
+                self._remark_idle(limb)
+                fault = "its limb neither resists nor drives the platform"
+                self.joints += [
+                    LimbJoint(new[id(each)], each.name, limb.name, each.type, unknown=fault)
+                    for each in joints
+                    if id(each) in new
+                ]
                 continue
+            self.joints += PathJoints(limb, path, known, self.frame).states(new)
+            self.links.append((path, limb_links(path, labels, self.frame)))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
@@ -126,6 +146,12 @@ class _Builder:
     def carrying(self) -> set[str]:
         """Names of the limbs that resist the platform."""
         return {row.limb for row in self.wrenches} | {member.limb for member in self.members}
+
+    def _remark_idle(self, limb: Limb) -> None:
+        """Add the remark that a limb carries nothing, once for all copies."""
+        remark = f"{limb.place} carries nothing: its passive joints leave the platform free"
+        if remark not in self.remarks:
+            self.remarks.append(remark)
 
     def _path(self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
@@ -176,10 +202,28 @@ class _Builder:
         return variable
 
 
+def _labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
+    """Return the label of each joint of a path that has none yet, such as ``2:3``, by the joint's identity.
+
+    Args:
+        limb: the limb.
+        index: of the path among those of the limb.
+        joints: of the path.
+        known: labels of joints of other paths, which share the joints of the stem.
+    """
+    found = {}
+    for j, joint in enumerate(joints):
+        branch = f".{index + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
+        if id(joint) not in known:
+            found[id(joint)] = f"{limb.name}{branch}:{j + 1}"
+    return found
+
+
 def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     """Return the model of a robot from its words, and the tables that state them."""
     at_home = home_robot(words)
     samples = sampled_dimensions(at_home)
+    remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
     platform = Motion(pose.rotation, at_home.home, pose.position)
     frame = PathFrame(at_home.size, platform, at_home.symbols, at_home.typical, samples)
@@ -188,6 +232,9 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         builder.add_limb(limb)
     if not (builder.wrenches or builder.members):
         raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
+    if not builder.actuators:
+        fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
+        raise RobotError("actuated", fault)
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
     loops = examine_loops(
@@ -214,6 +261,9 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
         structure=with_kept(builder.structure, independent),
+        joints=tuple(builder.joints),
+        links=with_shared_places(builder.links, frame),
+        remarks=(*remarks, *builder.remarks),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

@@ -57,6 +57,7 @@ _FORMS = {
     "twist": "must be a list of 6 numbers",
     "position": "must be a list of 3, each a number or { min, max }",
     "task": "must be a list of tables: write [[task]], with two brackets",
+    "limb": "must be a list of tables: write [[limb]], with two brackets",
     "published": "must be a list of tables: write [[published]], with two brackets",
 }
 #: Keys that name a file, and those of the tables that its rows become.
@@ -88,6 +89,10 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
             limit = context["min_length"] if kind == "too_short" else context["max_length"]
             few = "at least " if kind == "too_short" and limit == 1 else ""
             sentence = f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
+        case "greater_than_equal":
+            sentence = f"must be at least {context['ge']}"
+        case "less_than_equal":
+            sentence = f"must be at most {context['le']}"
         case kind:
             sentence = _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
     return sentence

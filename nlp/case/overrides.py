@@ -17,6 +17,8 @@ Settings: TypeAlias = Mapping[str, float | list[float]]
 _LIMITS = "limits."
 #: What a free number has.
 _ENDS = ("min", "max", "start")
+#: Tables within that of a joint in ``limits.joint``.
+_PARTS_OF_JOINTS = ("first", "second", "angle", "stroke")
 
 
 def override_number(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
@@ -92,6 +94,9 @@ def _override_limit(tables: dict[str, Any], name: str, value: float | list[float
     """Replace or add a number of the limits; arguments and errors are those of :func:`override_number`."""
     first, *others = name.removeprefix(_LIMITS).split(".")
     limits = tables.setdefault("limits", {})
+    if first == "joint" and len(others) > 1 and all(others) and isinstance(limits, dict):
+        _override_joint(limits, others, value)
+        return
     if not first or len(others) > 1 or not all(others) or not isinstance(limits, dict):
         raise CaseError(name, "cannot be set; write a limit and its number, such as limits.leg_length.max")
     written = limits.get(first)
@@ -102,3 +107,19 @@ def _override_limit(tables: dict[str, Any], name: str, value: float | list[float
         limits[first] = {others[0]: value}
     else:
         limits[first] = value
+
+
+def _override_joint(limits: dict[str, Any], parts: list[str], value: float | list[float]) -> None:
+    """Replace or add a number of the limits on a joint, whose name may hold dots.
+
+    Args:
+        limits: the table of the limits; changed in place.
+        parts: of the dotted key behind ``limits.joint``.
+        value: the number, or the axis of a cone.
+    """
+    *joint, end = parts
+    part = joint.pop() if len(joint) > 1 and joint[-1] in _PARTS_OF_JOINTS else None
+    table = limits.setdefault("joint", {}).setdefault(".".join(joint), {})
+    if part is not None:
+        table = table.setdefault(part, {})
+    table[end] = value

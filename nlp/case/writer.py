@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import casadi as ca
 import numpy as np
@@ -182,11 +182,28 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
     """
     found: dict[str, TomlValue | None] = {}
     for limit in case.limits:
-        for key, value in limit.to_keys(case.model, case.units).items():
-            if found.setdefault(key, value) != value:
-                fault = "cannot be written to a case file, which has one value of it, while the limits have two"
-                raise CaseError(f"limits.{key}", fault)
+        _merge(found, limit.to_keys(case.model, case.units), "limits")
     return found
+
+
+def _merge(found: dict[str, TomlValue | None], other: Mapping[str, TomlValue | None], place: str) -> None:
+    """Add the keys of a table to another one, those of tables of joints within it too.
+
+    Args:
+        found: the table that is added to.
+        other: the keys.
+        place: dotted key of the table, for messages.
+
+    Raises:
+        CaseError: both have a key with different values.
+    """
+    for key, value in other.items():
+        have = found.setdefault(key, value)
+        if isinstance(have, dict) and isinstance(value, Mapping) and "joint" in (key, place.rpartition(".")[2]):
+            _merge(have, value, f"{place}.{key}")
+        elif have != value:
+            fault = "cannot be written to a case file, which has one value of it, while the limits have two"
+            raise CaseError(f"{place}.{key}", fault)
 
 
 def _are_same(one: Model, other: Model) -> bool:

@@ -53,6 +53,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from starts_lines(result.starts, result.robot)
     if result.robot is not None and result.reached is None:
         yield from singularity_lines(result.robot, case.units)
+    yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
 
 
@@ -79,6 +80,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     yield from certificate_lines(combined.certificate)
     for notice in combined.notices:
         yield Line(notice, label="note")
+    yield from _remark_lines(case)
     if robot is not None:
         yield from singularity_lines(robot, case.units)
 
@@ -114,3 +116,10 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     yield Line(listed(values), label="singular values")
     yield principal_table(result.principal_motions, case.units, robot_size(robot))
     yield from singularity_lines(robot, case.units)
+    yield from _remark_lines(case)
+
+
+def _remark_lines(case: Case) -> Summary:
+    """Yield remarks on what may be a mistake in the robot."""
+    for remark in case.model.remarks:
+        yield Line(remark, label="note")

@@ -40,27 +40,34 @@ class LegClearance(LowerLimit):
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return a smooth function of the distance of each pair of legs, with the distance itself."""
-        far = 4 * self.min**2
         for one, other in itertools.combinations(pose.robot.legs, 2):
-            ends = ca.vertcat(one.base, one.span, other.base, other.span)
-            yield between(
-                f"leg_clearance limbs {one.name} and {other.name}{pose.where}",
-                Call(Form(_near_of_legs, (far,)), ends),
-                _reading(far),
-                "leg_clearance",
-                lower=self.min,
-                exact=ca.sqrt(_squared_of_legs(ends)),
-            )
+            name = f"leg_clearance limbs {one.name} and {other.name}{pose.where}"
+            yield apart(name, (one.base, one.span), (other.base, other.span), self.key, self.min)
 
 
-def _squared_of_legs(ends: SX) -> SX:
-    """Return the squared distance (1, 1) of two legs from the base and the span of each, (12, 1)."""
+def apart(name: str, one: tuple[SX, SX], other: tuple[SX, SX], key: str, least: float) -> BoundedConstraint:
+    """Return the constraint on the distance of two segments.
+
+    Args:
+        name: of the constraint.
+        one: start and span (3, 1) of the first segment, length.
+        other: of the second.
+        key: of the limit.
+        least: smallest distance.
+    """
+    far, ends = 4 * least**2, ca.vertcat(*one, *other)
+    near = Call(Form(_near_of_segments, (far,)), ends)
+    return between(name, near, _reading(far), key, lower=least, exact=ca.sqrt(_squared_of_segments(ends)))
+
+
+def _squared_of_segments(ends: SX) -> SX:
+    """Return the squared distance (1, 1) of two segments from the start and the span of each, (12, 1)."""
     return squared_distance(ends[:3], ends[3:6], ends[6:9], ends[9:])
 
 
-def _near_of_legs(ends: SX, far: float) -> SX:
-    """Return :func:`_near` of the distance of two legs from the base and the span of each, (12, 1)."""
-    return _near(_squared_of_legs(ends), far)
+def _near_of_segments(ends: SX, far: float) -> SX:
+    """Return :func:`_near` of the distance of two segments from the start and the span of each, (12, 1)."""
+    return _near(_squared_of_segments(ends), far)
 
 
 def _near(squared: SX, far: float) -> SX:

@@ -75,7 +75,9 @@ def _minus_cosine_from_home(inputs: SX, to_world: Turn, from_home: Turn) -> SX:
 
 
 #: ``-cos(angle)`` read as the angle.
-_ANGLE = Reading(Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine, above=0.0, most=math.pi)
+COSINE_OF_ANGLE = Reading(
+    Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine, above=0.0, most=math.pi
+)
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
@@ -236,7 +238,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 cosine = Call(form, ca.veccat(R, p, leg.platform, leg.base, robot.rotation, leg.span))
             else:
                 cosine = Call(Form(_minus_cosine_of_leg), ca.vertcat(self._to_world(axis, robot.rotation), leg.span))
-            yield between(f"{self.key} limb {leg.name}{pose.where}", cosine, _ANGLE, self.key, upper=self.max)
+            yield between(f"{self.key} limb {leg.name}{pose.where}", cosine, COSINE_OF_ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
         """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""

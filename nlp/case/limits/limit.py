@@ -176,6 +176,7 @@ class Limit(abc.ABC, Generic[TableT]):
         table: type of the value at the key.
         description: a few words for the JSON Schema of case files.
         needs_legs: whether only a robot with legs between joint centres can have it.
+        needs_joints: whether only a robot given joint by joint can have it.
         order: place of its constraints among those of other limits on the same plate, design or pose: lower first, and
             in the registry's order where equal.
     """
@@ -184,6 +185,7 @@ class Limit(abc.ABC, Generic[TableT]):
     table: ClassVar[Any]
     description: ClassVar[str]
     needs_legs: ClassVar[bool] = False
+    needs_joints: ClassVar[bool] = False
     order: ClassVar[int] = 0
 
     @classmethod
@@ -236,9 +238,14 @@ class Limit(abc.ABC, Generic[TableT]):
         """Key of this limit in ``[limits]``."""
         return self.key
 
+    @classmethod
+    def is_for(cls, model: Model) -> bool:
+        """Return whether a robot has the parts that limits of this type need."""
+        return (bool(model.legs) or not cls.needs_legs) and (bool(model.joints) or not cls.needs_joints)
+
     def exists_for(self, model: Model) -> bool:
         """Return whether a robot has the measure that is limited."""
-        return bool(model.legs) or not self.needs_legs
+        return self.is_for(model)
 
     @abc.abstractmethod
     def check(self, case: LimitedCase) -> None:

@@ -96,5 +96,5 @@ def _measures(model: Model) -> list[str]:
 
     of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs] if model.legs else []
     own = [quantity.name for quantity in model.quantities]
-    always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.key]
+    always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.fields() and kind.is_for(model)]
     return list(dict.fromkeys([*of_legs, *own, *always]))

@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from pydantic import ConfigDict, create_model
 
 from ..table import Table
+from .actuator_rate import ActuatorRate
 from .clearance import LegClearance
 from .interval import IntervalTable
+from .joint_cone import JointCone
 from .joints import BaseJointAngle, PlatformJointAngle
 from .legs import Actuator, LegLength
 from .limit import Limit
+from .link_clearance import LinkClearance
+from .motions import JointMotion
 from .plates import Footprint, JointSpacing, RadiusRatio
 from .quantity import QuantityLimit
 from .rate_share import RateShare
@@ -32,8 +36,12 @@ LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
     Footprint,
     RadiusRatio,
     LegClearance,
+    LinkClearance,
     ConditionNumber,
     SmallestSingularValue,
+    ActuatorRate,
+    JointMotion,
+    JointCone,
     RateShare,
     Relations,
     QuantityLimit,

@@ -51,6 +51,7 @@ class JointTable(Table):
     """A joint, at home."""
 
     type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
+    name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
     at: VectorExpression = Field(description="its centre, or a point of its axis")
     axis: VectorExpression | None = Field(default=None, description="direction of its axis")
     axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
@@ -89,6 +90,21 @@ class RobotFile(Table):
     limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
 
 
+#: Keys longer than this are cut in messages.
+_LONGEST_KEY = 60
+#: Words for one entry of a list.
+_ONE = {"limb": "limb", "joints": "joint", "branch": "branch", "angles": "angle", "axes": "axis"}
+#: Values that a key must have, for messages where it is missing.
+_NEEDED = {
+    "type": "one of R, P, H, C, U, S and Pa",
+    "at": "a point, as an expression in quotes or a list of 3",
+    "name": "a text in quotes",
+    "limb": "one or more tables [[limb]]",
+    "joints": "a list of one or more joints",
+    "typical": "a number, degrees for an angle",
+}
+
+
 def check_form(tables: dict[str, Any]) -> None:
     """Refuse a robot file whose keys or types are not those of the schema.
 
@@ -112,15 +128,22 @@ def _error(fault: ErrorDetails) -> CaseError:
         return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
     if fault["type"] == "float_type" and location[-1] == "<number>":
         return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
-    return CaseError(_place(location), written.fault, written.value)
+    needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
+    sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
+    return CaseError(_place(location), sentence, written.value)
 
 
 def _place(location: Sequence[int | str]) -> str:
-    """Return a path into the document in words; parts that stand for branches of a union are left out."""
+    """Return a path into the document in words; parts that stand for branches of a union are left out.
+
+    An entry of a list of tables, or of axes, is counted by the word for one of them; others are entries of a vector.
+    """
     parts: list[str] = []
     for part in location:
-        if isinstance(part, int):
-            parts[-1] = f"{parts[-1].removesuffix('s')} {part + 1}"
+        if isinstance(part, int) and parts[-1] in _ONE:
+            parts[-1] = f"{_ONE[parts[-1]]} {part + 1}"
+        elif isinstance(part, int):
+            parts.append(f"entry {part + 1}")
         elif not part.startswith("<"):
-            parts.append(part)
+            parts.append(part if len(part) <= _LONGEST_KEY else f"{part[: _LONGEST_KEY - 3]}...")
     return ", ".join(parts) or "the file"

@@ -1,0 +1,131 @@
+"""Faults and doubtful places of a robot's geometry: coinciding axes and joints, and axes that are almost parallel.
+
+What a limb carries depends on which of its axes are exactly parallel or meet. Typed decimals such as 0.866 break this,
+and almost parallel axes get a remark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from .chain import HomeRobot, Joint, Limb
+from .forms import RobotError
+from .generic import INCIDENT
+from .motion import AxisKind
+
+#: Axes are almost parallel, or almost meet, where the sine of their angle, or their distance in parts of the robot's
+#: size, is below this: decimals that are typed with three digits or more are nearer.
+_ALMOST = 1e-3
+
+
+class _Pair(NamedTuple):
+    """A measure (1, 1) of two axes or joints that is zero where they coincide.
+
+    Attributes:
+        place: limb and joint.
+        measure: sine or length in parts of the robot's size.
+        fault: clause where the measure is zero for all dimensions; empty where this is no fault.
+        remark: clause where the measure is almost zero; empty where this is no matter.
+    """
+
+    place: str
+    measure: SX
+    fault: str = ""
+    remark: str = ""
+
+
+def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
+    """Return remarks on axes that are almost parallel or almost meet; refuse joints that contradict themselves.
+
+    Args:
+        robot: the robot at home.
+        samples: (s, d) dimensions.
+
+    Raises:
+        RobotError: the axes of a universal joint are parallel, a parallelogram is flat, or a rod has no length.
+    """
+    groups: dict[int, Limb] = {}
+    for limb in robot.limbs:
+        groups.setdefault(limb.group, limb)
+    pairs: list[_Pair] = []
+    for limb in groups.values():
+        for path in limb.paths:
+            pairs += [*_joint_faults(robot, path), *_rods(robot, path), *_axes(robot, path)]
+    remarks: list[str] = []
+    if pairs:
+        function = ca.Function("pairs", [robot.symbols], [ca.densify(ca.vertcat(*[each.measure for each in pairs]))])
+        values = np.abs([function(sample).full().ravel() for sample in (robot.typical, *samples)])
+        for pair, largest in zip(pairs, values.max(axis=0), strict=True):
+            if pair.fault and largest < INCIDENT:
+                raise RobotError(pair.place, pair.fault)
+            if pair.remark and INCIDENT <= largest < _ALMOST:
+                remarks.append(f"{pair.place}: {pair.remark.format(f'{largest:.1g}')}")
+    return list(dict.fromkeys(remarks))
+
+
+def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
+    """Return the measures within single joints of a path."""
+    found = []
+    for joint in path:
+        if joint.type == "U":
+            first, second = (each.axis for each in joint.axes)
+            sine = ca.norm_2(ca.cross(first, second))
+            fault = "are parallel; two different directions are needed"
+            remark = "are parallel but for {}; were they meant to be perpendicular?"
+            found.append(_Pair(f"{joint.place}, axes", sine, fault, remark))
+        if joint.type == "Pa":
+            (axis,) = joint.axes
+            rod = axis.rod / robot.size
+            found.append(_Pair(f"{joint.place}, to", ca.norm_2(rod), "is the same place as at; a rod needs a length"))
+            across = ca.norm_2(ca.cross(rod, axis.axis))
+            fault = "is parallel to the rod from at to to; the axis of its hinges is needed, across the rod"
+            found.append(_Pair(f"{joint.place}, axis", across, fault))
+    return found
+
+
+def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
+    """Return the lengths of a path's rods between spherical, or spherical and universal joints."""
+    found = []
+    for one, other in pairwise(path):
+        if {one.type, other.type} in ({"S"}, {"S", "U"}):
+            length = ca.norm_2(one.point - other.point) / robot.size
+            fault = f"is the same place as that of the joint {one.type} before it; a rod between them needs a length"
+            found.append(_Pair(f"{other.place}, at", length, fault))
+    return found
+
+
+def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
+    """Return the angles of all pairs of a path's axes of rotation, and the distances of those of joints that follow."""
+    axes = [
+        (joint, axis) for joint in path for axis in joint.axes if joint.type != "S" and axis.kind is AxisKind.ROTATION
+    ]
+    found = []
+    for k, (one, a) in enumerate(axes):
+        for m, (other, b) in enumerate(axes[k + 1 :], k + 1):
+            if one is other:
+                continue
+            normal = ca.cross(a.axis, b.axis)
+            whose = f"and the axis of {_short(one)} are"
+            words = f"{whose} parallel but for {{}}; write both from the same numbers where they are to be parallel"
+            found.append(_Pair(f"{other.place}, axis", ca.norm_2(normal), remark=words))
+            if m == k + 1:
+                # Where the axes are parallel the distance has no meaning, and is of the order of 1.
+                apart = ca.dot(b.point - a.point, normal) / (robot.size * ca.norm_2(normal))
+                meeting = ca.if_else(ca.norm_2(normal) < _ALMOST, 1, apart)
+                words = (
+                    f"{whose} {{}} of the robot's size apart; write both from the same numbers where they are to meet"
+                )
+                found.append(_Pair(f"{other.place}, axis", meeting, remark=words))
+    return found
+
+
+def _short(joint: Joint) -> str:
+    """Return a joint without its limb, for messages."""
+    return joint.place.rpartition(", ")[2]

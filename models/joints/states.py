@@ -1,0 +1,201 @@
+"""The joints of a path as limits read them: coordinates from home, and directions of universal and spherical joints.
+
+A joint whose variables are unknowns has these as coordinates. A joint at which the path is opened, and rotations that
+are taken as one spherical joint, have coordinates from the displacements of the bodies on both sides. A universal joint
+at the end of a rod has them from the rod's direction. A rod between two spherical joints turns freely about itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..limbjoints import JointCone, JointCoordinate, LimbJoint
+from ..parts import Dimension
+from .angles import Angle, angle_about, rotation_angle, two_angles
+from .chain import Limb
+from .generic import INCIDENT
+from .motion import AxisKind, JointAxis, Motion
+from .opened import OpenedPath, PathFrame, slide_length
+
+#: Names of the coordinates of a joint that has two.
+_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
+#: The solution of an angle that is 0 at home differs from the other one where ``a1 . (a2 x d)`` is above this at home:
+#: rounding leaves 1e-16.
+_DISTINCT = 1e-6
+_ROD = "it ends a rod between two spherical joints, which turns freely about itself"
+_PLANE = "its axes are in one plane at home, where the angles of three rotations are not determined"
+
+
+class _Coordinates(NamedTuple):
+    """Coordinates of all axes of a joint in order; none where the reason says why they are not known."""
+
+    values: Sequence[JointCoordinate]
+    unknown: str = ""
+
+
+class PathJoints:
+    """The joints of an opened path.
+
+    Args:
+        limb: the limb.
+        path: the path.
+        known: variables that are unknowns, by joint's identity and number of the axis.
+        frame: values that all paths of the robot share.
+    """
+
+    def __init__(self, limb: Limb, path: OpenedPath, known: Mapping[tuple[int, int], SX], frame: PathFrame) -> None:
+        self._limb, self._path, self._known, self._frame = limb, path, known, frame
+
+    def states(self, labels: Mapping[int, str]) -> list[LimbJoint]:
+        """Return the path's joints as the robot file writes them, by the label of each one's identity."""
+        found = []
+        for j, joint in enumerate(self._path.joints):
+            coordinates = self._coordinates(j)
+            written = joint.parts or (joint,)
+            start = 0
+            for each in written:
+                if id(each) not in labels:
+                    continue
+                own = [] if each.type == "S" else coordinates.values[start : start + len(each.axes)]
+                start += len(each.axes)
+                names = _PARTS.get(each.type, ("",))
+                named = [
+                    JointCoordinate(name, one.dimension, one.value, one.cosine)
+                    for name, one in zip(names, own, strict=False)
+                ]
+                cone = self._cone(j) if each.type in ("U", "S") and len(written) == 1 else None
+                unknown = coordinates.unknown if each.type != "S" else ""
+                if each.type in ("U", "S") and cone is None:
+                    unknown = unknown or "it has no link that is longer than zero"
+                label = labels[id(each)]
+                found.append(LimbJoint(label, each.name, self._limb.name, each.type, tuple(named), cone, unknown))
+        return found
+
+    def _coordinates(self, j: int) -> _Coordinates:
+        """Return the coordinates of a joint's axes."""
+        path, joint = self._path, self._path.joints[j]
+        axes = [axis for part in joint.parts or (joint,) for axis in part.axes]
+        if j == path.cut.slide:
+            way = slide_length(path, self._frame)
+            return _Coordinates([] if way is None else [JointCoordinate("", Dimension.LENGTH, way)])
+        if joint.type == "S" and not joint.parts:
+            return _Coordinates([])
+        if joint.type != "S" and (id(joint), 0) in self._known:
+            return _Coordinates(
+                [JointCoordinate("", _dimension(axis), self._known[id(joint), a]) for a, axis in enumerate(joint.axes)]
+            )
+        if path.cut.far is not None and j in (path.cut.joint, path.cut.far):
+            return self._at_rod(j)
+        return self._between(axes, self._before(j).rotation.T @ self._behind(j).rotation)
+
+    def _between(self, axes: Sequence[JointAxis], turn: SX) -> _Coordinates:
+        """Return the angles of one, two or three rotations from the rotation (3, 3) of the body behind them."""
+        a = [axis.axis for axis in axes]
+        if len(a) == 1:
+            return _Coordinates([_angle(rotation_angle(a[0], turn))])
+        if len(a) == 2:
+            first, second = angle_about(a[0], a[1], turn @ a[1]), angle_about(a[1], turn.T @ a[0], a[0])
+            return _Coordinates([_angle(first), _angle(second)])
+        sign = self._sign(a[0], a[1], a[2])
+        if sign == 0:
+            return _Coordinates([], _PLANE)
+        first, second = two_angles((a[0], a[1]), a[2], turn @ a[2], sign)
+        size = ca.sqrt(second.sine**2 + second.cosine**2)
+        sine, cosine = second.sine / size, second.cosine / size
+        back = a[0] - sine * ca.cross(a[1], a[0]) + (1 - cosine) * (a[1] * ca.dot(a[1], a[0]) - a[0])
+        return _Coordinates([_angle(first), _angle(second), _angle(angle_about(a[2], turn.T @ a[0], back))])
+
+    def _at_rod(self, j: int) -> _Coordinates:
+        """Return the angles of a universal joint at an end of the path's rod."""
+        path, joint = self._path, self._path.joints[j]
+        rod, end = path.rod, path.cut.joint if j == path.cut.far else path.cut.far
+        if joint.type != "U" or rod is None or end is None:
+            return _Coordinates([], _ROD)
+        home = path.joints[end].point - joint.point
+        now = rod if j == path.cut.far else -rod
+        is_base_side = j < end
+        if path.cut.slide is not None:
+            way = slide_length(path, self._frame)
+            axis = path.joints[path.cut.slide].axes[0].axis
+            home = home if way is None else home + axis * (way if is_base_side else -way)
+        body = self._before(j) if is_base_side else self._behind(j)
+        a1, a2 = (axis.axis for axis in (joint.axes if is_base_side else joint.axes[::-1]))
+        sign = self._sign(a1, a2, path.joints[end].point - joint.point)
+        if sign == 0:
+            return _Coordinates([], "its first axis, its second axis and the rod are in one plane at home")
+        found = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
+        if is_base_side:
+            return _Coordinates([_angle(found.first), _angle(found.second)])
+        # From the platform, the rotations come in the other order and have the other sign.
+        return _Coordinates([_angle(found.second.reversed), _angle(found.first.reversed)])
+
+    def _sign(self, a1: SX, a2: SX, vector: SX) -> float:
+        """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 where it is not distinct."""
+        unit = vector / ca.norm_2(vector)
+        value = self._frame.typical_value(ca.dot(a1, ca.cross(a2, unit))).item()
+        return 0.0 if abs(value) < _DISTINCT else float(np.sign(value))
+
+    def _cone(self, j: int) -> JointCone | None:
+        """Return the directions of the cone of a universal or spherical joint; those of links point to the platform."""
+        path, place = self._path, self._path.joints[j].point
+        turn = self._limb.turn
+        if path.cut.far is not None and path.rod is not None and j in (path.cut.joint, path.cut.far):
+            end = path.cut.joint if j == path.cut.far else path.cut.far
+            rod, home = path.rod, path.joints[path.cut.joint].point - path.joints[path.cut.far].point
+            sign = 1 if path.cut.far < path.cut.joint else -1
+            other = self._before(j) if j < end else self._behind(j)
+            return _cone(sign * rod, sign * home, other, turn)
+        for others, sign, link, opposite in (
+            (range(j + 1, len(path.joints)), 1, self._behind, self._before),
+            (range(j - 1, -1, -1), -1, self._before, self._behind),
+        ):
+            for k in others:
+                home = sign * (path.joints[k].point - place)
+                if not is_zero(home, self._frame):
+                    return _cone(link(j).rotation @ home, home, opposite(j), turn)
+        # All joints have one centre at home: a slide next to the joint has the direction of its link.
+        for k, link, opposite in ((j + 1, self._behind, self._before), (j - 1, self._before, self._behind)):
+            if 0 <= k < len(path.joints) and path.joints[k].type == "P":
+                axis = path.joints[k].axes[0].axis
+                return _cone(link(j).rotation @ axis, axis, opposite(j), turn)
+        return None
+
+    def _before(self, j: int) -> Motion:
+        """Return the displacement of the body on the base's side of a joint, which is no rod."""
+        path = self._path
+        if j == path.cut.first and path.cut.last >= path.cut.first:
+            return path.sides[0]
+        if j == path.cut.last + 1:
+            return path.sides[1]
+        behind = path.behind[j - 1] if j > 0 else None
+        return behind or Motion.none()
+
+    def _behind(self, j: int) -> Motion:
+        """Return the displacement of the body on the platform's side of a joint, which is no rod."""
+        return self._path.behind[j] or self._path.sides[1]
+
+
+def is_zero(vector: SX, frame: PathFrame) -> bool:
+    """Return whether a vector (3, 1) at home, length, is zero for all dimensions."""
+    return all(value < INCIDENT for value in frame.sampled(ca.norm_2(vector) / frame.size))
+
+
+def _cone(link: SX, home: SX, other: Motion, turn: FloatArray) -> JointCone:
+    """Return the directions of a cone from vectors along a link, now and at home."""
+    return JointCone(link / ca.norm_2(link), home / ca.norm_2(home), other.rotation, turn)
+
+
+def _angle(angle: Angle) -> JointCoordinate:
+    """Return an angle as a coordinate."""
+    return JointCoordinate("", Dimension.ANGLE, angle.sine, angle.cosine)
+
+
+def _dimension(axis: JointAxis) -> Dimension:
+    """Return the dimension of an axis's variable: a parallelogram's is the angle of its rods."""
+    return Dimension.LENGTH if axis.kind is AxisKind.TRANSLATION else Dimension.ANGLE

@@ -1,0 +1,256 @@
+"""Broken robot files: each is refused, or remarked on, in one sentence with file, place, value and what is allowed."""
+
+# ruff: noqa: E501 - each fault is a row of a table
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import CaseError, load_case
+
+Run = Callable[..., tuple[int, str, str]]
+
+ROBOT = """name = "rps"
+home = [0, 0, "h"]
+[dimensions]
+rb = { typical = 1.0 }
+rp = { typical = 0.6 }
+h = { typical = 1.1 }
+[derived]
+half = "rb/2"
+[[limb]]
+repeat = { count = 1 }
+points = { B = ["rb", 0, 0], A = ["rp", 0, "h"] }
+joints = [ { type = "R", at = "B", axis = "y" },
+           { type = "P", at = "B", axis = "A - B", actuated = true },
+           { type = "S", at = "A" } ]
+"""
+CASE = """[robot]
+file = "robot.toml"
+[robot.parameters]
+rb = 1
+rp = 0.6
+h = 1.1
+[pose]
+position = [0, 0, { min = 0.9, max = 1.3 }]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+point = [0, 0, 0]
+pitch = 0
+"""
+LIMB = ROBOT[ROBOT.index("[[limb]]") :]
+JOINTS = ROBOT[ROBOT.index("joints = ") :]
+AXIS, SECOND, LAST = '"A - B"', "limb 1, joint 2 (P), axis: is", 'at = "A" }'
+GRAMMAR = "which may have only numbers, names, + - * / ^, brackets and functions"
+NOT_A_NAME = "is no name for a dimension: letters, digits and _ are allowed, a letter first"
+DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
+
+#: Text that is replaced, its replacement, and the sentence behind the name of the file.
+FAULTS: list[tuple[str, str | bytes, str]] = [
+    # A robot that contradicts itself.
+    (LAST, 'at = "A", actuated = true }', "limb 1, joint 3 (S), actuated: is not allowed: write its axes as joints R or P"),
+    ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "y"], actuated = true', "joint 1 (U), actuated: is not allowed"),
+    ('"R"', '"C", actuated = true', "limb 1, joint 1 (C), actuated: is not allowed"),
+    (", actuated = true", "", "actuated: is given at no joint of the robot; write actuated = true at each joint that"),
+    ('axis = "y"', "axis = [0, 0, 0]", "limb 1, joint 1 (R), axis: is [0, 0, 0], which is zero; a direction is needed"),
+    (AXIS, '"B - B"', f"{SECOND} 'B - B', which is zero; a direction is needed"),
+    (AXIS, '"(rb - 1)*x"', "limb 1, joint 2 (P): has no finite place or axis at the typical dimensions"),
+    ('axis = "y"', 'axis = "cross(A, 2*A)"', "limb 1, joint 1 (R): has no finite place or axis at the typical dimensions"),
+    ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "-2*x"]', "limb 1, joint 1 (U), axes: are parallel; two different"),
+    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same place as at; a rod needs a length"),
+    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; the axis of its hinges"),
+    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the same place as that of the joint S before it"),
+    (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists the platform: each has six or more independent passive joints"),
+    ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
+    # A limb that ends nowhere, or has too much.
+    (JOINTS, "", "limb 1, joints: is missing: a limb needs at least one joint"),
+    (JOINTS, "joints = []", "limb 1, joints: is missing: a limb needs at least one joint"),
+    (JOINTS, f"joints = [{', '.join([DRIVEN] * 13)}]", "limb 1, joints: has 13 joints; at most 12 are allowed"),
+    (JOINTS, f'joints = [{DRIVEN}]\nbranch = [{{ joints = [{{ type = "S", at = "A" }}] }}]', "limb 1, branch: has one branch: write its joints"),
+    (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{{ joints = [] }}]", "limb 1, branch 1, joints: must have at least 1 entry, got 0"),
+    (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{', '.join(['{ joints = [' + DRIVEN + '] }'] * 7)}]", "limb 1, branch: has 7 branches; at most 6"),
+    (JOINTS, 'joints = [{ type = "R", at = "B", axis = "y" }]\nbranch = [{ joints = [{ type = "S", at = "A" }] }, { joints = [{ type = "S", at = "B" }] }]', "limb 1: has a passive joint before its branches; only actuated joints may stand there"),
+    (LIMB, "", "limb: is missing; it must be one or more tables [[limb]]"),
+    (LIMB, "[limb]\njoints = []", "limb: must be a list of tables: write [[limb]], with two brackets"),
+    ("", "limb = []\n", "the file: is not valid TOML"),
+    ("count = 1", "count = 0", "limb 1, repeat, count = 0: must be at least 1"),
+    ("count = 1", "count = -2", "limb 1, repeat, count = -2: must be at least 1"),
+    ("count = 1", "count = 1_000_000_000", "limb 1, repeat, count = 1000000000: must be at most 24"),
+    ("count = 1", "count = 3.0", "limb 1, repeat, count = 3.0: must be a whole number"),
+    ("count = 1", "count = true", "limb 1, repeat, count = true: must be a whole number"),
+    ("count = 1", "count = 3, angles = [0]", "limb 1, repeat: needs either count or angles"),
+    ("count = 1", "angles = []", "limb 1, repeat, angles: must have at least 1 entry, got 0"),
+    ("count = 1", "angles = [0, nan]", "limb 1, repeat, angle 2 = nan: must be finite"),
+    ("count = 1", "count = 2, axis = [0, 0, 0]", "limb 1, repeat, axis: is zero: it needs a direction"),
+    ("count = 1", 'count = 2, axis = "z"', 'limb 1, repeat, axis = "z": must be a list of 3 numbers'),
+    (LIMB, f"{LIMB}{LIMB}".replace("count = 1", "count = 20"), "limb: has 40 limbs with all copies; at most 24 are allowed"),
+    (LIMB, LIMB.replace("count = 1", "count = 24").replace(JOINTS, f"joints = [{', '.join([DRIVEN] * 6)}]"), "limb: has 144 joints with all copies; at most 120 are allowed"),
+    ("home =", f"{'x' * 5000} = 1\nhome =", f"{'x' * 57}...: no such key; allowed: name"),
+    # Names.
+    (AXIS, '"A - D"', "which has the name 'D', which is unknown; known are A, B, h, half, pi, rb, rp, x, y, z"),
+    (LAST, 'at = "AA" }', "limb 1, joint 3 (S), at: is 'AA', which has the name 'AA', which is unknown; did you mean 'A'?"),
+    (AXIS, '"unti(A - B)"', "which has the function 'unti', which is unknown; did you mean 'unit'?"),
+    ('name = "rps"', 'name = "r\\u0007s"', "name: has the character '\\x07'; allowed are letters, digits, signs and spaces"),
+    ("repeat =", 'name = "a\\u001b[31m"\nrepeat =', "limb 1, name: has the character '\\x1b'"),
+    (LAST, 'at = "A", name = "b\\u0000" }', "limb 1, joint 3 (S), name: is 'b\\x00'; letters, digits and _ are allowed, a letter"),
+    (LAST, 'at = "A", name = "2:1" }', "limb 1, joint 3 (S), name: is '2:1'; letters, digits and _ are allowed, a letter first"),
+    ("[derived]", '"d\\u0001" = { typical = 1 }\n[derived]', f"d\\x01: {NOT_A_NAME}"),
+    ("[derived]", '"a-b" = { typical = 1 }\n[derived]', f"a-b: {NOT_A_NAME}"),
+    ("[derived]", '"\u03b1" = { typical = 1 }\n[derived]', f"\u03b1: {NOT_A_NAME}"),
+    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is no name for a dimension: expressions use it for something else"),
+    ('name = "rps"', "name = 3", "name = 3: must be text in quotes"),
+    ('name = "rps"', 'name = "  "', 'name = "  ": must not be empty'),
+    ("rp = {", "rb = {", "the file: is not valid TOML: Cannot overwrite a value (at line 5, column 23)"),
+    ("half =", "rb =", "rb: is given twice"),
+    ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
+    ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
+    ("B = [", "x = [", "limb 1, x: is no name for a point: expressions use it for something else"),
+    ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which needs 'b' before it is given; allowed are names given above"),
+    ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
+    ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
+    # Keys.
+    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, home, dimensions, derived, limb"),
+    (LAST, 'at = "A", friction = 1 }', "limb 1, joint 3, friction: no such key; allowed: type, name, at, axis"),
+    ("typical = 1.0", "typical = 1.0, min = 0", "dimensions, rb, min: no such key; allowed: typical, kind, description"),
+    ("repeat =", "mirror = true\nrepeat =", "limb 1, mirror: no such key; allowed: name, repeat, points, joints, branch"),
+    ("count = 1", "count = 1, step = 2", "limb 1, repeat, step: no such key; allowed: count, angles, axis, through"),
+    (LAST, 'at = "A", axis = "z" }', "limb 1, joint 3 (S), axis: no such key; allowed are type, name, at"),
+    ('"R"', '"R", pitch = 1', "limb 1, joint 1 (R), pitch: no such key; allowed are type, name, at, axis, actuated"),
+    ('"R"', '"H"', "limb 1, joint 1 (H), pitch: is missing"),
+    ('"R"', '"Pa"', "limb 1, joint 1 (Pa), to: is missing"),
+    ('type = "S", ', "", "limb 1, joint 3, type: is missing; it must be one of R, P, H, C, U, S and Pa"),
+    (', at = "A" }', " }", "limb 1, joint 3, at: is missing; it must be a point, as an expression in quotes or a list of 3"),
+    ("typical = 1.0", 'kind = "length"', "dimensions, rb, typical: is missing; it must be a number, degrees for an angle"),
+    # Types and numbers.
+    ('"S"', '"s"', "limb 1, joint 3, type = \"s\": must be one of 'R', 'P', 'H', 'C', 'U', 'S' or 'Pa'"),
+    ("actuated = true", "actuated = 1", "limb 1, joint 2, actuated = 1: must be true or false"),
+    ("typical = 1.0", "typical = nan", "dimensions, rb, typical = nan: must be finite"),
+    ("typical = 1.0", "typical = -inf", "dimensions, rb, typical = -inf: must be finite"),
+    ("typical = 1.0", "typical = true", "dimensions, rb, typical = true: must be a number"),
+    ("typical = 1.0", 'typical = "1"', 'dimensions, rb, typical = "1": must be a number'),
+    ("typical = 1.0", "typical = 2020-01-01", "dimensions, rb, typical: must be a number"),
+    ("typical = 1.0", 'typical = 1, kind = "mass"', "dimensions, rb, kind = \"mass\": must be one of 'length', 'angle' or"),
+    ("{ typical = 1.0 }", "1.0", "dimensions, rb = 1.0: must be a table"),
+    ('home = [0, 0, "h"]', "home = [0, nan, 0]", "home, entry 2 = nan: must be finite"),
+    ('home = [0, 0, "h"]', "home = [0, 0]", "home: must have 3 entries, got 2"),
+    ('home = [0, 0, "h"]', 'home = "h"', "home: is 'h', which is a number; a vector is needed"),
+    ('["rb", 0, 0]', '["rb", inf, 0]', "limb 1, points, B, entry 2 = inf: must be finite"),
+    ('half = "rb/2"', 'a = "x"', "derived, a: is 'x', which is a vector; a number is needed"),
+    ('half = "rb/2"', 'a = "0/0"', "derived, a: is '0/0', which has no finite value"),
+    (JOINTS, 'joints = "RPS"', 'limb 1, joints = "RPS": must be a list'),
+    (JOINTS, 'joints = ["R"]', 'limb 1, joint 1 = "R": must be a table'),
+    ("repeat =", "centre = 3\nrepeat =", "limb 1, centre = 3: must be an expression in quotes or a list of 3"),
+    # Expressions.
+    (AXIS, '"().__class__"', f"{SECOND} '().__class__', {GRAMMAR}"),
+    (AXIS, '"().__class__.__base__.__subclasses__()"', GRAMMAR),
+    (AXIS, '"[x for x in A]"', GRAMMAR),
+    (AXIS, '"(lambda: A)()"', GRAMMAR),
+    (AXIS, "\"__import__('os')\"", GRAMMAR),
+    (AXIS, '"A.x"', GRAMMAR),
+    (AXIS, '"(A := B)"', GRAMMAR),
+    (AXIS, "\"f'{A}'\"", GRAMMAR),
+    (AXIS, '"A[0]"', GRAMMAR),
+    (AXIS, '"A if 1 else B"', GRAMMAR),
+    (AXIS, '"cross(*A)"', GRAMMAR),
+    (AXIS, '"1j*A"', GRAMMAR),
+    (AXIS, '"True"', GRAMMAR),
+    (AXIS, '"A # - B"', GRAMMAR),
+    (AXIS, '"A -\\n B"', GRAMMAR),
+    (AXIS, '"A -\\u0007 B"', GRAMMAR),
+    (AXIS, '"0x10*A"', GRAMMAR),
+    (AXIS, '"1_0*A"', GRAMMAR),
+    (AXIS, '"A*\u0663"', GRAMMAR),
+    (AXIS, '"\uff21 - B"', GRAMMAR),
+    (AXIS, '"A**2"', "which has '**': a power is written '^'"),
+    (AXIS, '"A -"', "which is no expression of numbers, names, + - * / ^ and functions"),
+    (AXIS, f'"{"(" * 500}A{")" * 500}"', "which is no expression of numbers, names"),
+    (AXIS, f'"{"-" * 500}A"', "which has more than 60 operations in each other"),
+    (AXIS, f'"A{" + A" * 2000}"', "which is longer than 2000 letters"),
+    (AXIS, '""', 'limb 1, joint 2, axis = "": must not be empty'),
+    (AXIS, '"A*B"', "which multiplies two vectors: use dot or cross"),
+    (AXIS, '"A - rb"', "which adds or subtracts a number and a vector"),
+    (AXIS, '"cross(A)"', "which gives cross 1 arguments instead of 2"),
+    ('["rp", 0, "h"]', '["rp^1e9", 0, "h"]', "limb 1, point A: is 'rp^1e9', which has a power larger than 100"),
+    ('["rp", 0, "h"]', '["9^9^9^9", 0, "h"]', "limb 1, point A: is '9^9^9^9', which has a power larger than 100"),
+    ('["rp", 0, "h"]', f'["1{"0" * 400}", 0, "h"]', "which has a number that is not finite"),
+    ('["rp", 0, "h"]', '["1e308*10", 0, "h"]', "limb 1, point A: is '1e308*10', which has no finite value"),
+    ('["rp", 0, "h"]', '["sqrt(-rp)", 0, "h"]', "limb 1, joint 2 (P): has no finite place or axis at the typical dimensions"),
+    # Files.
+    (ROBOT, "", "name: is missing; it must be a text in quotes"),
+    (ROBOT, "\ufeff", "name: is missing; it must be a text in quotes"),
+    (ROBOT, f"{ROBOT}[[limb", "the file: is not valid TOML"),
+    (ROBOT, f"{ROBOT}# \x01\n", "the file: is not valid TOML: Found invalid character '\\x01'"),
+    (ROBOT, f"{ROBOT}a = {'[' * 3000}{']' * 3000}", "the file: is not valid TOML"),
+    (ROBOT, ROBOT.encode() + b"\0", "the file: is not valid TOML"),
+    (ROBOT, ROBOT.encode() + b"# \xff", "the file: is not valid TOML: 'utf-8' codec can't decode byte 0xff"),
+    (ROBOT, ROBOT.encode("utf-16"), "the file: is not valid TOML: 'utf-8' codec can't decode byte 0xff"),
+]  # fmt: skip
+
+
+def put(folder: Path, content: str | bytes, case: str = CASE) -> str:
+    (folder / "robot.toml").write_bytes(content if isinstance(content, bytes) else content.encode())
+    path = folder / "case.toml"
+    path.write_text(case, encoding="utf-8")
+    return str(path)
+
+
+def test_every_broken_robot_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    assert len(FAULTS) >= 60
+    for old, new, fault in FAULTS:
+        assert old in ROBOT
+        content = new if isinstance(new, bytes) else ROBOT.replace(old, new, 1)
+        with pytest.raises(CaseError) as error:
+            load_case(put(tmp_path, content))
+        sentence = str(error.value)
+        assert sentence.startswith("robot.toml: "), sentence
+        assert fault in sentence
+        assert sentence.isprintable()
+        assert len(sentence) < 300
+
+
+def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Path, cli: Run) -> None:
+    """The command line has no traceback, and one line, for faults of every stage: file, form, words and geometry."""
+    (tmp_path / "folder.toml").mkdir()
+    big = f"{ROBOT}# {'x' * (4 * 2**20)}"
+    for content, case, fault in (
+        (big, CASE, 'case.toml: robot.file = "robot.toml": cannot be read: it is larger than 1 MB'),
+        (
+            ROBOT,
+            CASE.replace("robot.toml", "folder.toml"),
+            'robot.file = "folder.toml": cannot be read: Is a directory',
+        ),
+        (ROBOT, CASE.replace("robot.toml", "none.toml"), 'robot.file = "none.toml": cannot be read: No such file'),
+        (ROBOT, CASE.replace("robot.toml", "a\\u0000"), "robot.file"),
+        (ROBOT.replace("count = 1", "count = 0"), CASE, "robot.toml: limb 1, repeat, count = 0: must be at least 1"),
+        (ROBOT.replace(AXIS, '"().__class__"'), CASE, "robot.toml: limb 1, joint 2 (P), axis: is"),
+        (ROBOT.replace(", actuated = true", ""), CASE, "robot.toml: actuated: is given at no joint"),
+    ):
+        status, out, err = cli("solve", put(tmp_path, content, case), "--json", str(tmp_path / "result.json"))
+        assert (status, out) == (2, "")
+        assert fault in err
+        assert err.count("\n") == 1
+        assert not (tmp_path / "result.json").exists()
+
+
+#: Robots that may be a mistake: text that is replaced, its replacement, and the remark.
+REMARKS = [
+    ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "x + 0.0003*y"]', "limb 1, joint 1 (U), axes: are parallel but for 0.0003;"),
+    (JOINTS, 'joints = [{ type = "R", at = "B", axis = [0.0003, 1, 0], actuated = true }, { type = "R", at = "A", axis = "y" }]', "limb 1, joint 2 (R), axis: and the axis of joint 1 (R) are parallel but for 0.0003; write both from the same numbers"),
+    ('axis = "y" }', 'axis = "y" }, { type = "R", at = "B + 0.0003*z", axis = "x" }', "limb 1, joint 2 (R), axis: and the axis of joint 1 (R) are 0.0002 of the robot's size apart"),
+    ("[[limb]]", '[[limb]]\njoints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "z", axis = "z" }, { type = "S", at = "z" }]\n[[limb]]', "limb 1 carries nothing: its passive joints leave the platform free"),
+]  # fmt: skip
+
+
+def test_axes_that_are_almost_parallel_and_idle_limbs_are_remarked_on(tmp_path: Path, cli: Run) -> None:
+    assert load_case(put(tmp_path, ROBOT)).model.remarks == ()
+    for old, new, remark in REMARKS:
+        name = put(tmp_path, ROBOT.replace(old, new, 1))
+        (found,) = load_case(name).model.remarks
+        assert found.startswith(remark)
+    status, out, _ = cli("evaluate", name, "--set", "p_z=1.1")
+    assert status == 0
+    assert "note  limb 1 carries nothing" in out
