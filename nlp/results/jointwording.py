@@ -10,7 +10,8 @@ from .rounding import number
 from .text import Line, Tone
 
 if TYPE_CHECKING:
-    from .parts import JointsData, RobotData
+    from .jointdata import JointsData
+    from .parts import RobotData
 
 
 def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[Line]:

@@ -21,13 +21,12 @@ from ..evidence.mobility import mobility_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
+from .jointdata import ActuatorData, JointsData
 from .jsondata import Vector, finite_or_none, matrix, vector
 from .parts import (
     SCHEMA,
-    ActuatorData,
     ByOwner,
     HeadData,
-    JointsData,
     MotionData,
     PoseData,
     PosesData,
