@@ -227,12 +227,30 @@ def test_the_case_file_of_the_documentation_is_valid() -> None:
 
 def test_the_limits_of_the_documentation_are_valid() -> None:
     text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
-    limits, poses = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    limits, joints, poses = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
     starter = tomllib.loads(starter_case(screwsynth.models.stewart_gough()))
     several = screwsynth.nlp.case_from_tables(starter | tomllib.loads(poses), name="shown", source="limits.md")
     assert several.pose_count == 2 + 5 + 6
-    case = screwsynth.nlp.case_from_tables(starter | tomllib.loads(limits), name="shown", source="limits.md")
-    assert {type(limit) for limit in case.limits} == {kind for kind in LIMIT_TYPES if kind.key}
+    written = tomllib.loads(limits)
+    of_joints = {key for kind in LIMIT_TYPES if kind.needs_joints for key in kind.fields()}
+    for key in of_joints:
+        del written["limits"][key]
+    case = screwsynth.nlp.case_from_tables(starter | written, name="shown", source="limits.md")
+    assert {type(limit) for limit in case.limits} == {
+        kind for kind in LIMIT_TYPES if kind.key and not kind.needs_joints
+    }
+    # The joints that the page speaks of, in two limbs with a ball and one with a tube.
+    limb = [
+        {"type": "R", "name": "crank", "at": "x", "axis": "y", "actuated": True},
+        {"type": "U", "name": "cardan", "at": "x + z", "axes": ["x", "y"]},
+        {"type": "P", "at": "x + z", "axis": "z", "actuated": True},
+        {"type": "S", "name": "ball", "at": "x + 2*z"},
+    ]
+    tube = [{"type": "C", "name": "tube", "at": "0*x", "axis": "z"}]
+    robot = {"name": "shown", "limb": [{"repeat": {"count": 2}, "joints": limb}, {"joints": tube}]}
+    tables = {"robot": {"definition": robot}, "pose": {"position": [0, 0, 0]}, "task": starter["task"]}
+    shown = screwsynth.nlp.case_from_tables(tables | tomllib.loads(joints), name="shown", source="limits.md")
+    assert len(shown.limits) == 8
 
 
 def test_the_limits_shown_in_the_documentation_are_what_the_command_prints() -> None:

@@ -89,10 +89,6 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
             limit = context["min_length"] if kind == "too_short" else context["max_length"]
             few = "at least " if kind == "too_short" and limit == 1 else ""
             sentence = f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
-        case "greater_than_equal":
-            sentence = f"must be at least {context['ge']}"
-        case "less_than_equal":
-            sentence = f"must be at most {context['le']}"
         case kind:
             sentence = _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
     return sentence

@@ -26,6 +26,10 @@ VectorExpression = Annotated[
 ]
 
 
+#: Most copies of a limb.
+_MOST_COPIES = 24
+
+
 class DimensionTable(Table):
     """A dimension that a case fixes or frees."""
 
@@ -37,7 +41,7 @@ class DimensionTable(Table):
 class RepeatTable(Table):
     """Copies of a limb by rotation about an axis."""
 
-    count: Annotated[int, Field(ge=1, le=24)] | None = Field(
+    count: Annotated[int, Field(ge=1, le=_MOST_COPIES)] | None = Field(
         default=None, description="number of copies, evenly spread"
     )
     angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=24)] | None = Field(
@@ -128,6 +132,8 @@ def _error(fault: ErrorDetails) -> CaseError:
         return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
     if fault["type"] == "float_type" and location[-1] == "<number>":
         return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
+    if fault["type"] in ("greater_than_equal", "less_than_equal") and location[-1] == "count":
+        return CaseError(_place(location), f"must be a whole number from 1 to {_MOST_COPIES}", written.value)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
     sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
     return CaseError(_place(location), sentence, written.value)
