@@ -36,6 +36,19 @@ class InnerCall(NamedTuple):
     call: Call
     values: SX
 
+    @property
+    def computed(self) -> dict[int, int]:
+        """Places of the values by their hash, without constants and without values that are inputs of the call.
+
+        A joint's position may be an unknown of the program itself.
+        """
+        given = {each.element_hash() for each in ca.vertsplit(self.call.inputs)}
+        found: dict[int, int] = {}
+        for place, each in enumerate(ca.vertsplit(self.values)):
+            if not each.is_constant() and each.element_hash() not in given:
+                found.setdefault(each.element_hash(), place)
+        return found
+
 
 class FinalCall(NamedTuple):
     """A call, and the index of the constraint that is its value; the number of constraints for the objective."""
@@ -103,7 +116,7 @@ def find_calls(program: Program) -> Calls:
     is_spectral = any(each.spectral is not None for each in program.constraints)
     matrices = tuple(_central_rows(robot) for robot in program.robots) if is_spectral else ()
     inner = _inner_calls(program, matrices)
-    values = {each.element_hash() for item in inner for each in ca.vertsplit(item.values) if not each.is_constant()}
+    values = {key for item in inner for key in item.computed}
     final = []
     for place, constraint in enumerate(program.constraints):
         if several and constraint.spectral is None and constraint.expression.element_hash() in values:

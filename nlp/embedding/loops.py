@@ -119,9 +119,8 @@ class _Tables:
         self._program, self._calls = program, calls
         self._values: dict[int, _Value] = {}
         for k, item in enumerate(calls.inner):
-            for i, each in enumerate(ca.vertsplit(item.values)):
-                if not each.is_constant():
-                    self._values.setdefault(each.element_hash(), _Value(k, i))
+            for key, place in item.computed.items():
+                self._values.setdefault(key, _Value(k, place))
         self._spectral = [
             (place, each.spectral, calls.matrices[each.pose])
             for place, each in enumerate(program.constraints)
