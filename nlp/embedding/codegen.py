@@ -43,8 +43,12 @@ _PARTS = {
     ".h": "api.h",
     ".c": "api.c",
     "-solver.c": "solver.c",
+    "-scaled.h": "scaled.h",
+    "-scaled.c": "scaled.c",
     "-sqp.h": "sqp.h",
+    "-search.h": "search.h",
     "-sqp.c": "sqp.c",
+    "-step.c": "step.c",
     "-restore.c": "restore.c",
     "-qp.c": "qp.c",
     "-limits.c": "limits.c",
@@ -97,7 +101,9 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     if staged.loops.spectra:
         parts["-spectrum.c"] = "spectrum.c"
     sources = [f"{prefix}{ending}" for ending in (*parts, "-casadi.c") if ending.endswith(".c")]
+    headers = [f"{prefix}{ending}" for ending in (*parts, "-casadi.h") if ending.endswith(".h")]
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
+    names["headers"] = " ".join(headers)
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
@@ -159,8 +165,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     rows = len(program.model.frame_rows)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
-    # Workspace of sqp.c, and multipliers. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 18 * n + 13 * c + 2 * c * n + 1
+    # Workspace of sqp.c, multipliers, and numbers at a point. A test in solver.c keeps it from compiling with too little.
+    solver_work = work + 5 * n**2 + 19 * n + 14 * c + 3 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,

@@ -28,7 +28,7 @@ _CHUNK = 32
 
 
 class CompiledSolutions(NamedTuple):
-    """Answers of the solver in C to n problems, one row for each.
+    """Answers of the solver in C to n problems, one row for each; a row is 0 where the status is ``BAD_INPUT``.
 
     Attributes:
         F: (n,) objective.
@@ -37,8 +37,8 @@ class CompiledSolutions(NamedTuple):
         R: (n, 3, 3) rotation of the platform.
         axis: (n, 3) unit axis of the rotation.
         angle: (n,) its angle in ``[0, pi]``.
-        violation: (n,) largest violation of a constraint.
-        residual: (n,) KKT residual.
+        violation: (n,) largest violation of a constraint, in half ranges of the case's variables.
+        residual: (n,) KKT residual; infinite where the point is no end of a search.
         runs: (n,) number of searches.
         converged: (n,) number of searches that ended at an optimum.
         iterations: (n,) number of iterations of all searches.

@@ -63,6 +63,10 @@ def test_answers_are_those_of_the_c(compiled: CompiledCase, embedded: Callable[[
         one = c.solve(x0=x0[k], p=p[k], seeds=1)
         statuses.add(one.status)
         assert found.status[k] == one.status
+        if one.status == BAD_INPUT:
+            # The solver leaves a result as it was; a row of the batch has no earlier one.
+            assert all((np.array(each[k]) == 0).all() for each in found._replace(status=found.F))
+            continue
         for name in ("F", "angle", "violation", "residual", "runs", "converged", "iterations"):
             assert getattr(found, name)[k] == getattr(one, name), name
         assert (found.x[k] == one.x).all()
@@ -70,7 +74,7 @@ def test_answers_are_those_of_the_c(compiled: CompiledCase, embedded: Callable[[
         assert (found.axis[k] == one.axis).all()
     assert {OK, BAD_INPUT} <= statuses
     assert (found.ok == (found.status == OK)).all()
-    assert compiled.statuses[:4] == ("OK", "NOT_CONVERGED", "INFEASIBLE", "BAD_INPUT")
+    assert compiled.statuses == ("OK", "NOT_CONVERGED", "INFEASIBLE", "BAD_INPUT", "BUDGET")
 
 
 def test_rows_do_not_depend_on_threads_or_company(compiled: CompiledCase) -> None:
