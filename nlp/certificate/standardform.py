@@ -19,8 +19,10 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, frozen_array
+from ..evidence.state import CLOSED
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
+from ..program.program import Program
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
             if constraint in epigraph.constraints
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
+    constraints += _further_loop_equations(program, x, nlp.arguments)
     return StandardForm(
         nlp=nlp,
         x=x[:count],
@@ -137,6 +140,31 @@ def standard_form(nlp: Nlp) -> StandardForm:
         sign=-nlp.sign,
         has_epigraph=epigraph is not None,
     )
+
+
+def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
+    """Return the loop equations of the robot that the program leaves out, with the bounds of a closed loop.
+
+    They follow from those of the program near its answer, but not in the whole box: there joints that are assembled in
+    no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
+    that an exact equation could hold nowhere.
+    """
+    names = {constraint.name for constraint in program.constraints}
+    further: dict[str, SX] = {}
+    for k, robot in enumerate(program.robots):
+        where = f" pose {k + 1}" if len(program.robots) > 1 else ""
+        for equation, expression in zip(program.model.closure, ca.vertsplit(robot.closure), strict=True):
+            if f"{equation.name}{where}" not in names:
+                further[f"{equation.name}{where}"] = expression
+    if not further:
+        return []
+    function = ca.Function("loops", [program.x, program.p], list(further.values()))
+    values = function.call([x, SX(ca.DM(arguments))])
+    return [
+        _BoundedExpression(name, each, -CLOSED, CLOSED)
+        for name, each in zip(further, values, strict=True)
+        if any(ca.which_depends(each, x, 1, True))
+    ]
 
 
 def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:

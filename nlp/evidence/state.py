@@ -29,7 +29,7 @@ ZERO_F = 1e-12
 #: the square root of the rounding unit of double precision: a point known to rounding error gives no better accuracy.
 ZERO_SINGULAR_VALUE = 1.5e-8
 #: Largest residual of a loop equation, of order 1, of a closed loop: in another assembly it is of order 0.1.
-_CLOSED = 1e-6
+CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
     if not nlp.program.model.loops:
         return True
     states = (kernel(x, nlp.arguments) for kernel in nlp.program.kernels.robot_states)
-    return all(float(np.abs(each.loops).max(initial=0.0)) <= _CLOSED for each in states)
+    return all(float(np.abs(each.loops).max(initial=0.0)) <= CLOSED for each in states)
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
