@@ -149,7 +149,7 @@ class Embedded:
     def compare(self, nlp: Nlp, count: int, close: float = 1e-14) -> None:
         """Compare every function with the program's own, at random points."""
         p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n
-        m, limits = len(nlp.program.model.wrenches), len(nlp.program.constraints)
+        m, limits = len(nlp.program.model.frame_rows), len(nlp.program.constraints)
         tasks, legs, poses = self.macro("TASKS"), self.macro("LEGS"), self.macro("POSES")
         k, work = np.zeros(self.macro("K") + 1), np.zeros(self.macro("WORK"))
         F, gradient, hessian = np.zeros(1), np.zeros(n), np.zeros((n, n))
