@@ -83,12 +83,12 @@ def test_displacements_and_screws_of_joints_are_those_of_numbers() -> None:
         expected = displacement(screw_from_axis(axis, point, pitch), value)
         found = joint.motion(SX(value))
         assert np.array(ca.DM(found.rotation)) == pytest.approx(expected.rotation, abs=1e-14)
-        assert np.array(ca.DM(found.translation)).ravel() == pytest.approx(expected.translation, abs=1e-14)
+        assert np.array(ca.DM(found.point(SX.zeros(3)))).ravel() == pytest.approx(expected.translation, abs=1e-14)
         assert np.array(ca.DM(found.after(found.inverse()).rotation)) == pytest.approx(np.eye(3), abs=1e-14)
     # A parallelogram's unit screw is its displacement's derivative, in parts of the rod's length.
     rod, q = SX([0.3, 0.1, -0.8]), SX.sym("q")
     joint = JointAxis(AxisKind.PARALLELOGRAM, SX([0, 1, 0]), SX.zeros(3), False, SX(0), rod)
-    slope = ca.Function("slope", [q], [ca.jacobian(joint.motion(q).translation, q) / ca.norm_2(rod)])
+    slope = ca.Function("slope", [q], [ca.jacobian(joint.motion(q).point(SX.zeros(3)), q) / ca.norm_2(rod)])
     screw = ca.Function("screw", [q], [joint.screw(q, Motion.none())[3:]])
     assert screw(0.4).full() == pytest.approx(slope(0.4).full(), abs=1e-15)
 
