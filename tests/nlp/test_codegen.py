@@ -152,7 +152,7 @@ def run(where: Path, flags: str, *runner: str) -> subprocess.CompletedProcess[st
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-max", "paper-4.4-snu"])
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-snu", "camera-mount"])
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     probe = tmp_path / "probe.c"
     probe.write_text("int main(void) { return 0; }", encoding="utf-8")
