@@ -1,7 +1,8 @@
 """Measure generated C: machine code, workspace, stack and compile time of shipped cases, as a table in Markdown.
 
 The stack is bounded from the compiler's own call graph (``gcc -fcallgraph-info=su``): the deepest sum of frames from
-``..._solve``, with both functions of the search behind its two pointers. ``stack.c`` of the folder measures it too.
+``..._solve``, with the functions of the program behind the pointers of a search. ``stack.c`` of the folder measures it
+too.
 
     python bench/memory.py CASE ...
 """
@@ -40,12 +41,18 @@ def stack_bound(folder: Path, prefix: str) -> int:
             frames[name(title)] = int(size)
         for source, target in re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text):
             calls.setdefault(name(source), set()).add(name(target))
-    behind = {each for each in frames if re.search(r":(values|hessian)(\.|$)", each)}
+    program = {each for each in frames if re.search(r"_SCALED_(values|hessian|visit)$", each)}
+    inner = {each for each in frames if each.startswith(f"{prefix}-restore:")}
+    restoration = {each for each in inner if re.search(r":(values|hessian|visit)(\.|$)", each)}
 
     @cache
     def depth(function: str) -> int:
         targets = calls.get(function, set())
-        below = targets | behind if "__indirect_call" in targets else targets
+        below = set(targets)
+        # A search calls its program by pointers: the scaled one, or that of the search for a feasible point, which
+        # itself calls the scaled one. The scaled one calls the caller's deadline, which is not counted.
+        if "__indirect_call" in targets and function not in program:
+            below |= program if function in inner else program | restoration
         return frames.get(function, 0) + 8 + max((depth(each) for each in below), default=0)
 
     return depth(f"{prefix}_solve")

@@ -1,11 +1,15 @@
 """What the tests of the command line, and those of generated C, share."""
 
+import contextlib
 import ctypes
+import hashlib
+import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -93,21 +97,41 @@ Deadline = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 MULTIPLIERS = ("lower_multipliers", "upper_multipliers", "g_lower_multipliers", "g_upper_multipliers")
 
 
+#: Flags by which generated C compiles without a warning.
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror"
+#: The first compiler there is; empty without one.
+COMPILER = next((name for name in ("gcc", "clang", "cc") if shutil.which(name)), "")
+
+
+def built(files: Mapping[str, str], root: Path, level: str) -> Path:
+    """Return a folder of C with its objects and its shared library, compiled once for all processes of the tests."""
+    folder = root / hashlib.sha256(repr((level, sorted(files.items()))).encode()).hexdigest()[:32]
+    if folder.exists():
+        return folder
+    making = Path(tempfile.mkdtemp(dir=root))
+    for name, text in files.items():
+        (making / name).write_text(text, encoding="utf-8")
+    command = ["make", "-C", str(making), f"CC={COMPILER}", f"CFLAGS={STRICT} {level} -fPIC", "library"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    objects = [str(path) for path in sorted(making.glob("*.o"))]
+    subprocess.run([COMPILER, "-shared", *objects, "-lm", "-o", str(making / "all.so")], check=True)
+    # Another process may have been faster: then its folder is taken.
+    with contextlib.suppress(OSError):
+        making.rename(folder)
+    return folder
+
+
 class Embedded:
     """The C of a case, compiled and loaded."""
 
-    def __init__(self, case: Case, folder: Path, level: str = "-O2") -> None:
+    def __init__(self, case: Case, root: Path, level: str = "-O2") -> None:
         files = generate_c(case, "")
-        for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
-        sources = [str(folder / name) for name in files if name.startswith(self.prefix) and name.endswith(".c")]
-        library = str(folder / "all.so")
-        compiler = next(name for name in ("gcc", "clang", "cc") if shutil.which(name))
-        flags = ["-std=c99", level, "-shared", "-fPIC"]
-        subprocess.run([compiler, *flags, *sources, "-lm", "-o", library], check=True)
-        self._library = ctypes.CDLL(library)
+        #: Folder with the files, the objects of the library and the library, which tests may share: not to be changed.
+        self.folder = built(files, root, level)
+        self._library = ctypes.CDLL(str(self.folder / "all.so"))
         self.n, self.c, self.p = self.macro("N"), self.macro("C"), self.macro("P")
         pointer, number, integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
 
@@ -249,9 +273,13 @@ def _address(array: np.ndarray) -> ctypes.c_void_p:
 @pytest.fixture(scope="session")
 def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Embedded]:
     """The C of any case."""
-    if not any(shutil.which(name) for name in ("gcc", "clang", "cc")):
-        pytest.skip("no C compiler is installed")
-    return lambda case, level="-O2": Embedded(case, tmp_path_factory.mktemp("c"), level)
+    if not COMPILER or not shutil.which("make"):
+        pytest.skip("no C compiler or no make is installed")
+    # Processes of pytest-xdist have folders of their own in a common one.
+    base = tmp_path_factory.getbasetemp()
+    root = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"
+    root.mkdir(exist_ok=True)
+    return lambda case, level="-O2": Embedded(case, root, level)
 
 
 @pytest.fixture(scope="session")

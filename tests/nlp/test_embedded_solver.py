@@ -23,7 +23,7 @@ FEASIBLE, STATIONARY = 1e-9, 1e-7
 ROBOTS = int(os.environ.get("SCREWSYNTH_ROBOTS", "40"))
 
 Embedded = Any
-Embed = Callable[[Case], Embedded]
+Embed = Callable[..., Embedded]
 EmbeddedCase = Callable[[str], Embedded]
 
 
@@ -253,7 +253,7 @@ def test_a_search_that_is_cut_off_is_no_answer(
     monkeypatch.setattr(codegen, "_ITERATIONS", 4)
     unfinished = 0
     for name in ("paper-4.3", "paper-4.4-max", "paper-4.1-rotation"):
-        c, nlp = embed(load_case(name)), formulate(load_case(name))
+        c, nlp = embed(load_case(name), "-O0"), formulate(load_case(name))
         best = embedded(name).solve().F
         for x in starting_points(nlp, 101, 8)[1:]:
             solved = c.solve(x0=x, seeds=0)
@@ -274,7 +274,7 @@ def test_a_search_that_ends_at_a_saddle_is_no_answer(
     # From Park's own axes the search runs into a saddle, and is cut off before it has left it.
     monkeypatch.setattr(codegen, "_ITERATIONS", iterations)
     case = load_case("paper-4.4-max")
-    solved = embed(case).solve(x0=formulate(case).start, seeds=0)
+    solved = embed(case, "-O0").solve(x0=formulate(case).start, seeds=0)
     assert solved.status != OK
 
 

@@ -17,10 +17,14 @@ from screwsynth.models import screw_from_axis
 from screwsynth.nlp import Case, CaseError, __version__, case_from_tables, formulate, generate_c, solve
 from screwsynth.nlp.embedding.ctext import c_names
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
+from screwsynth.nlp.evidence.kkt import linearise, multipliers
+from screwsynth.nlp.program.formulation import formulate_weighted
 from screwsynth.nlp.program.layout import lay_out
+from screwsynth.nlp.program.pairs import with_all_pairs
+from screwsynth.nlp.solver.compromise import scale_weights
 
 Embedded = Any
-Embed = Callable[[Case], Embedded]
+Embed = Callable[..., Embedded]
 
 ROBOT = """
 [units]
@@ -223,6 +227,35 @@ def test_the_solver_keeps_limits_that_were_set(limited: Embedded) -> None:
     assert solved.status == 0
     assert abs(solved.F - wanted.F) <= 1e-6 * wanted.F
     assert abs(limited.solve().F - wanted.F) > 1e-3 * wanted.F
+
+
+def test_limits_hold_at_every_pose_and_for_every_task(embed: Embed) -> None:
+    tables = few(tomllib.loads(ROBOT))
+    free = tables["pose"]
+    tables["pose"] = [free, {"position": [2, 1, 24], "rotation": {"axis": [1, 0, 0], "angle": 0.1}}]
+    tables["task"].append({"sense": "max", "axis": [0, 0, 1], "point": [1, 0, 0], "pitch": 3.0, "weight": 0.4})
+    tables |= {"combine": {"method": "weighted-sum", "over_poses": "mean"}, "solve": {"starts": 1}}
+    tables["limits"] |= {"actuator": {"stroke_max": 9.0, "dead_length": 10.0}, "rate_share": {"max": 0.9}}
+    c = embed(case_of(tables), "-O0")
+    names, bounds, before = numbers(c), Bounds(c), c.solve()
+    new = {"leg_length.max": 33.0, "actuator.stroke_max": 5.0, "actuator.dead_length": 12.0, "rate_share.max": 0.7}
+    for key, value in new.items():
+        tables = changed(tables, key, value)
+        assert bounds.set(names[key.upper().replace(".", "_")], value) == 0
+    case = case_of(tables)
+    nlp = with_all_pairs(formulate_weighted(case, scale_weights(case).values))
+    found = [each.name for each in nlp.program.constraints]
+    assert sum("poses 2 and 1" in name for name in found) == 12
+    assert sum("rate_share" in name for name in found) == 24
+    np.testing.assert_allclose(bounds.part(3), np.maximum(nlp.g_lower, -1e300), rtol=1e-12)
+    np.testing.assert_allclose(bounds.part(4), np.minimum(nlp.g_upper, 1e300), rtol=1e-12)
+    solved = bounds.solve()
+    assert before.status == solved.status == 0
+    # The program of Python has no better point near the answer, and that keeps the limits.
+    at = linearise(nlp, solved.x)
+    assert at.violation <= 1e-8
+    assert multipliers(at, at.active(1e-6))[1] <= 1e-7
+    assert solved.F < (1 - 1e-3) * before.F
 
 
 def test_a_limit_that_is_refused_changes_nothing(limited: Embedded) -> None:
