@@ -140,6 +140,6 @@ def test_the_self_test_passes_and_solves_are_counted(
     # Counts are whole ticks. A search from the optimum only confirms it.
     assert all(count > 0 and count % 40 == 0 for count in instructions.values())
     assert 2 * instructions["warm"] < instructions["cold"] < instructions["all seeds"]
-    # For docs/embedding.md: `--junit-xml` shows them.
+    # For docs/embedding.md: `--junit-xml FILE -o junit_family=xunit1` shows them.
     for name, count in instructions.items():
         record_property(name, count)

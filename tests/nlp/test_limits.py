@@ -129,18 +129,19 @@ def degrees_between(u: Array, v: Array) -> float:
 
 
 def segment_distance(p: Array, q: Array, r: Array, s: Array, rounds: int = 12) -> float:
-    """Distance between segments pq and rs by brute force: a grid over both, refined about its best point."""
-    low, high = np.zeros(2), np.ones(2)
-    best = math.inf
+    """Distance between segments pq and rs: a grid over pq, refined about the point that is nearest to rs.
+
+    The distance from rs is convex along pq, so that the nearest point lies within a step of the grid's best one.
+    """
+    low, high, best, along = 0.0, 1.0, math.inf, s - r
     for _ in range(rounds):
-        u, v = (np.linspace(low[i], high[i], 21) for i in range(2))
-        apart = (p + u[:, None] * (q - p))[:, None] - (r + v[:, None] * (s - r))[None]
-        distances = np.linalg.norm(apart, axis=2)
-        i, j = np.unravel_index(np.argmin(distances), distances.shape)
-        best = min(best, float(distances[i, j]))
-        width = (high - low) / 8
-        centre = np.array([u[i], v[j]])
-        low, high = np.maximum(centre - width, 0), np.minimum(centre + width, 1)
+        u = np.linspace(low, high, 21)
+        points = p + u[:, None] * (q - p)
+        v = np.clip((points - r) @ along / (along @ along), 0, 1)
+        distances = np.linalg.norm(points - r - v[:, None] * along, axis=1)
+        nearest = int(np.argmin(distances))
+        best = min(best, float(distances[nearest]))
+        low, high = u[max(nearest - 1, 0)], u[min(nearest + 1, 20)]
     return best
 
 
