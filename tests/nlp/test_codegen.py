@@ -248,6 +248,18 @@ def spectral(target: Path) -> tuple[Path, Nlp]:
 
 
 @needs_compiler
+def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_path: Path) -> None:
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
+        "limits": {"condition_number": {"max": 300, "length": 10}}
+    }
+    for file, text in generate_c(case_from_tables(tables, name="alone"), "").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    for compiler in COMPILERS:
+        command = [compiler, *STRICT.split(), "-fsyntax-only", *map(str, tmp_path.glob("screwsynth_alone-*.c"))]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
+
+
+@needs_compiler
 def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
     where, nlp = spectral(tmp_path)
     assert sum(path.stat().st_size for path in where.glob("screwsynth_spectra*")) <= 400_000
