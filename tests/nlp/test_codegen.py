@@ -252,7 +252,7 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
     tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
         "limits": {"condition_number": {"max": 300, "length": 10}}
     }
-    for file, text in generate_c(case_from_tables(tables, name="alone"), "").items():
+    for file, text in generate_c(case_from_tables(tables, name="alone", source="alone"), "").items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     for compiler in COMPILERS:
         command = [compiler, *STRICT.split(), "-fsyntax-only", *map(str, tmp_path.glob("screwsynth_alone-*.c"))]
