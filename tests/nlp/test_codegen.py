@@ -255,7 +255,7 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
     for file, text in generate_c(case_from_tables(tables, name="alone", source="alone"), "").items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     for compiler in COMPILERS:
-        command = [compiler, *STRICT.split(), "-fsyntax-only", *map(str, tmp_path.glob("screwsynth_alone-*.c"))]
+        command = [compiler, *STRICT.split(), "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
 
 
