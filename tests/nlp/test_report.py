@@ -220,7 +220,7 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
 def test_rounding_is_no_rate(page: Callable[..., Page]) -> None:
     found = page("paper-4.4-snu")
     assert 0 < found.data["result"]["F"] < 1e-20
-    assert "F = 0 " in found.words
+    assert "F = 0 (mm/rad)² with" in found.words
     assert [(number(row[3]), row[5]) for row in found.tables["rates"][1:]] == [(0, "none")] * 6
 
 
@@ -712,7 +712,8 @@ def test_page_has_every_pose_and_marks_the_worst(sense: str, three_poses: Callab
         frame = view["frames"][view["zero"]]
         np.testing.assert_allclose(frame["position"], at, atol=1e-12)
         assert frame["F"] == pytest.approx(value, rel=1e-9)
-    assert f"The worst: pose {worst + 1} of 3, F = {values[worst]:.7g}." in found.words
+    unit = f"({found.data['result']['units']['length']}/rad)²"
+    assert f"The worst: pose {worst + 1} of 3, F = {values[worst]:.7g} {unit}." in found.words
     (slider,) = [a for tag, a in found.elements if tag == "input" and a.get("id") == "pose"]
     assert (slider["min"], slider["max"], slider["value"]) == ("1", "3", "1")
 

@@ -10,7 +10,7 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ...evidence.state import ZERO_F
 from ...results.rounding import settled
-from ...units import Units, rate_unit
+from ...units import Units, objective_unit, rate_unit
 from ..pictures.drawing import Drawing, Motion
 from ..pictures.posture import Posture
 from ..pictures.style import RATE_COLOURS, signed_text
@@ -93,6 +93,7 @@ class ViewData(TypedDict):
     is_answer: bool
     measure: MeasureData
     rate_unit: str
+    objective_unit: str
     unit: str
     size: float
     points: list[PointData]
@@ -156,18 +157,20 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
     F = settled(float(rates @ rates), shown.size, ZERO_F)
+    unit_of_F = "" if motion is None else objective_unit([motion.twist], units)
     postures, zero = _postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
     return {
         "name": "" if motion is None else motion.name,
         "task": shown.task,
         "pose": shown.pose,
-        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {F:.7g}",
+        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {F:.7g} {unit_of_F}".rstrip(),
         "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
         "measure": measure_data(drawing, units),
         "unit": units.length,
         "rate_unit": "" if motion is None else rate_unit(motion.twist, units),
+        "objective_unit": unit_of_F,
         "size": drawing.size,
         "points": [{"name": point.name, "body": point.body.value} for point in model.scene.points],
         "links": link_data(drawing),

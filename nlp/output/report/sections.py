@@ -221,7 +221,7 @@ def _rates(view: ViewData) -> Markup:
     caption = tag(
         "caption",
         "F = ",
-        tag("span", f"{frame['F'] if total > 0 else 0:.7g}", id="F-there"),
+        tag("span", f"{frame['F'] if total > 0 else 0:.7g} {view['objective_unit']}".rstrip(), id="F-there"),
         " with the platform ",
         tag("span", frame["words"], id="where"),
     )

@@ -204,7 +204,7 @@
     byId("travelled").textContent = frame.words;
     byId("travel").setAttribute("aria-valuetext", frame.words);
     byId("where").textContent = frame.words;
-    byId("F-there").textContent = shown(frame.F, 7);
+    byId("F-there").textContent = `${shown(frame.F, 7)} ${view.objective_unit}`.trim();
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
       const rate = frame.rates[k];
       row.querySelector(".length").textContent = frame.lengths[k] === null ? "" : shown(frame.lengths[k], 5);
