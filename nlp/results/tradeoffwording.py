@@ -88,15 +88,20 @@ def _status_words(result: TradeoffResult, status: Status) -> str:
     return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
 
 
-def objective_label(case: Case, task: int | None = None) -> str:
-    """Return F with its unit, for an axis.
+def unit_of_objective(case: Case, task: int | None = None) -> str:
+    """Return the unit of F.
 
     Args:
         case: the case.
         task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
     """
     tasks = case.tasks if task is None else [case.tasks[task]]
-    unit = objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
+    return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
+
+
+def objective_label(case: Case, task: int | None = None) -> str:
+    """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
+    unit = unit_of_objective(case, task)
     return f"F, {unit}" if unit else "F"
 
 

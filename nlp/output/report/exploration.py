@@ -12,7 +12,7 @@ from ...results.data import SolveResult
 from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
-from ...results.tradeoffwording import objective_label
+from ...results.tradeoffwording import objective_label, unit_of_objective
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
@@ -35,21 +35,25 @@ def optima(report: Report) -> Markup:
     parts: list[Markup] = []
     result = report.result
     results = [result] if isinstance(result, SolveResult) else result.tasks
-    solutions: list[tuple[str, str, ProgramSolution, RobotData | None]] = [
-        (part.name, part.label, part.solution, own.robot) for part, own in zip(report.parts, results, strict=True)
+    solutions: list[tuple[str, str, str, ProgramSolution, RobotData | None]] = [
+        (part.name, part.label, part.unit, part.solution, own.robot)
+        for part, own in zip(report.parts, results, strict=True)
     ]
     if report.combined is not None:
-        solutions.append(("the combined program", objective_label(report.case), report.combined, None))
-    for name, label, solution, robot in solutions:
+        case = report.case
+        solutions.append(
+            ("the combined program", objective_label(case), unit_of_objective(case), report.combined, None)
+        )
+    for name, label, unit, solution, robot in solutions:
         if not solution.starts:
             continue
         if len(solutions) > 1:
             parts.append(tag("h3", name))
-        parts += _optima_of(solution, robot, label)
+        parts += _optima_of(solution, robot, label, unit)
     return join_markup(parts)
 
 
-def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str) -> Iterator[Markup]:
+def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, unit: str) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
     yield tag("p", f"{converged} of {counted(len(solution.starts), 'start')} ended in an optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
@@ -57,7 +61,7 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str) -
     if not solution.optima:
         return
     best = solution.optima[0]
-    F = number(task_F(robot, best.F))
+    F = f"{number(task_F(robot, best.F))} {unit}".rstrip()
     times = "once" if best.count == 1 else f"{best.count} times"
     words = f"{len(solution.optima)} distinct optima; the best, F = {F}, was found {times}."
     if len(solution.optima) == 1:
@@ -145,12 +149,12 @@ def _slice(part: Part, each: Slice) -> Markup:
                 words += f"; within every limit on {100 * np.mean(kept):.0f} % of it"
         else:
             words += "; no point of it keeps every limit"
-        words += f". Here: F = {here:.6g} at {at:.5g} {unit}".rstrip() + "."
+        words += f". Here: F = {here:.6g} {part.unit}".rstrip() + f" at {at:.5g} {unit}".rstrip() + "."
     else:
         words = f"{variable.name}: it cannot move while the others are held."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
-        [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g}")],
+        [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip())],
         words=words,
         labels=(f"{variable.name}, {unit}" if unit else variable.name, part.label),
         bounds=(values[0], values[-1]),

@@ -19,7 +19,7 @@ from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
 from ...results.rounding import number
 from ...results.tradeoff import TradeoffResult
-from ...results.tradeoffwording import objective_label
+from ...results.tradeoffwording import objective_label, unit_of_objective
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ..pictures.drawing import Drawing, drawing_of
@@ -38,6 +38,7 @@ class Part:
     Attributes:
         name: of the task.
         label: F with its unit, for an axis.
+        unit: of F.
         nlp: its program.
         x: (n,) the point.
         solution: of the task by itself.
@@ -50,6 +51,7 @@ class Part:
 
     name: str
     label: str
+    unit: str
     nlp: Nlp
     x: FloatArray
     solution: ProgramSolution
@@ -141,6 +143,7 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     return Part(
         name=nlp.case.tasks[task].name,
         label=objective_label(nlp.case, task),
+        unit=unit_of_objective(nlp.case, task),
         nlp=nlp,
         x=x,
         solution=own,
