@@ -17,12 +17,14 @@ from itertools import islice
 from typing import TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member, resisted_parts, scaled_twists
 from .model import Model
+from .parts import Closure, Unknown
 from .wrench import Wrench, WrenchKind
 
 #: A matrix or vector of symbols or of numbers.
@@ -38,12 +40,15 @@ class Substitution:
         unknowns: (u, 1) internal unknowns, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
+        reference: (n,) values of the parameters at which the sizes of loop equations are taken; empty for the
+            expressions in place of the parameters.
     """
 
     parameters: SX
     unknowns: SX
     rotation: SX
     position: SX
+    reference: tuple[float, ...] = ()
 
     @classmethod
     def identity(cls, model: Model) -> Substitution:
@@ -57,7 +62,7 @@ class Substitution:
 
     @property
     def all(self) -> list[SX]:
-        """The four expressions, in the order of the fields."""
+        """The four expressions, in the order of the first four fields."""
         return [self.parameters, self.unknowns, self.rotation, self.position]
 
 
@@ -102,6 +107,7 @@ class RobotInstance:
         actuators: (6, a) current unit screw of each of the model's actuators.
         joints: the joints of the model's limbs.
         links: their links.
+        reference: values of the parameters at which the sizes of the loop equations are taken; empty for none.
     """
 
     parameters: SX
@@ -121,6 +127,7 @@ class RobotInstance:
     actuators: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
+    reference: tuple[float, ...] = ()
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -138,6 +145,7 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         ca.vertcat(SX(0, 1), *[row.square for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
+        ca.vertcat(SX(0, 1), *[equation.size for equation in (*model.closure, *model.loops)]),
         ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
@@ -145,7 +153,8 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, actuators, *others = function.call(substitution.all)
+    force, moment, square, closure, loops, sizes, actuators, *others = function.call(substitution.all)
+    sizes = sizes_at(model, [*model.closure, *model.loops], substitution.reference, sizes)
     following = iter(others)
     quantities = list(islice(following, len(model.quantities)))
     joints = list(islice(following, 2 * len(model.legs)))
@@ -169,14 +178,35 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
-        closure=closure,
+        closure=closure / sizes[: closure.numel()],
         rows=tuple(rows),
         inputs=ca.veccat(*substitution.all, length, *twists),
-        loops=loops,
+        loops=loops / sizes[closure.numel() :],
         actuators=actuators,
         joints=tuple(each.replaced(following) for each in model.joints),
         links=tuple(each.replaced(following) for each in model.links),
+        reference=substitution.reference,
     )
+
+
+def sizes_at(model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...], otherwise: SX) -> SX:
+    """Return the sizes (k, 1) of loop equations or unknowns at values of the parameters.
+
+    Args:
+        model: the model.
+        parts: the k equations or unknowns.
+        reference: (n,) values of the parameters; empty for none.
+        otherwise: (k, 1) the sizes where there is no reference, or where a size has no positive value there.
+    """
+    if not (reference and parts):
+        return otherwise
+    own = Substitution.identity(model).parameters
+    function = ca.Function("sizes", [own], [ca.densify(ca.vertcat(*[each.size for each in parts]))])
+    values = function(np.array(reference)).full().ravel()
+    each = (
+        SX(float(value)) if 0 < value < np.inf else otherwise[k] for k, value in enumerate(values)
+    )
+    return ca.vertcat(*each)
 
 
 def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ()) -> SX:

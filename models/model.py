@@ -182,6 +182,7 @@ def _check_shapes(model: Model) -> None:
     expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(each.name, each.expression, (1, 1)) for each in (*model.closure, *model.loops)]
+    expected += [(f"size of {each.name}", each.size, (1, 1)) for each in (*model.closure, *model.unknowns)]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
     expected += [(name, expression, (3, 1)) for name, expression in model.scene.expressions]
     for leg in model.legs:
@@ -206,7 +207,8 @@ def _check_symbols(model: Model) -> None:
         *(part for member in model.members for part in (member.centre, member.screws)),
         *(each.screw for each in model.actuators),
         *(part for each in model.joint_screws for part in (each.passive, each.all)),
-        *(equation.expression for equation in (*model.closure, *model.loops)),
+        *(part for equation in (*model.closure, *model.loops) for part in (equation.expression, equation.size)),
+        *(unknown.size for unknown in model.unknowns),
         *(quantity.values for quantity in model.quantities),
         *(expression for _, expression in model.scene.expressions),
         *(joint for leg in model.legs for joint in (leg.base, leg.platform)),

@@ -173,7 +173,7 @@ class _Builder:
         self.wrenches += rows
         self.members += [] if member is None else [member]
         name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
-        self.closure += [Closure(f"loop {name} ({k + 1})", each) for k, each in enumerate(path.equations)]
+        self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
@@ -192,11 +192,11 @@ class _Builder:
                 name = f"q{limb.name}_{len(known) + 1}"
                 symbol = SX.sym(name)
                 slides = joint.axes[axis].kind is AxisKind.TRANSLATION
-                reach = _WAY if slides else _TURN
-                dimension = Dimension.NUMBER if slides else Dimension.ANGLE
-                words = "way of a slide in parts of the robot's size" if slides else "angle of a joint"
-                self.unknowns.append(Unknown(name, symbol, dimension, f"{words}, from home", -reach, reach))
-                known[key] = symbol * self.robot.size if slides else symbol
+                reach, size = (_WAY, self.robot.size) if slides else (_TURN, SX(1))
+                dimension = Dimension.LENGTH if slides else Dimension.ANGLE
+                words = "way of a slide" if slides else "angle of a joint"
+                self.unknowns.append(Unknown(name, symbol, dimension, f"{words}, from home", -reach, reach, size))
+                known[key] = symbol
             return known[key]
 
         return variable
@@ -237,13 +237,11 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         raise RobotError("actuated", fault)
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
-    loops = examine_loops(
-        at_home, [each.expression for each in closure], PoseOf(pose.rotation, pose.position), unknowns, samples
-    )
+    loops = examine_loops(at_home, closure, PoseOf(pose.rotation, pose.position), builder.unknowns, samples)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     members = [_with_kinds(member, builder, numbers, loops.points[0]) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
-    everything = [Closure(f"{each.name} in full", each.expression) for each in (*closure, *builder.checks)]
+    everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
     model = Model(
         name=words.name,
         description=words.description,

@@ -78,6 +78,7 @@ class RobotValues:
     """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form."""
 
     model: Model
+    reference: tuple[float, ...]
 
     def __call__(self, inputs: SX) -> SX:
         """Return :func:`robot_values` of a robot from its inputs (k, 1)."""
@@ -90,7 +91,7 @@ class RobotValues:
             parts.append(ca.reshape(inputs[at : at + each.numel()], each.shape))
             at += each.numel()
         twists = [inputs[j : j + 6] for j in range(at + 1, inputs.numel(), 6)]
-        return instantiate(self.model, Substitution(*parts), inputs[at], twists)
+        return instantiate(self.model, Substitution(*parts, self.reference), inputs[at], twists)
 
 
 def robot_values(robot: RobotInstance) -> SX:
@@ -162,7 +163,7 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
             values = robot_values(robot)
             if matrices:
                 values[values.numel() - matrices[k].numel() :] = matrices[k]
-            calls.append(InnerCall(Call(Form(RobotValues(program.model)), robot.inputs), values))
+            calls.append(InnerCall(Call(Form(RobotValues(program.model, robot.reference)), robot.inputs), values))
     return tuple(calls)
 
 
