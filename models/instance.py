@@ -105,6 +105,7 @@ class RobotInstance:
             characteristic length, twists.
         loops: (k, 1) left sides of all loop equations, those beyond the closure included.
         actuators: (6, a) current unit screw of each of the model's actuators.
+        signs: (s, 1) numbers that are positive in home's assembly.
         joints: the joints of the model's limbs.
         links: their links.
         reference: values of the parameters at which the sizes of the loop equations are taken; empty for none.
@@ -125,6 +126,7 @@ class RobotInstance:
     inputs: SX
     loops: SX
     actuators: SX
+    signs: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
     reference: tuple[float, ...] = ()
@@ -147,13 +149,14 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
         ca.vertcat(SX(0, 1), *[equation.size for equation in (*model.closure, *model.loops)]),
         ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
+        ca.vertcat(SX(0, 1), *[each.value for each in model.signs]),
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, sizes, actuators, *others = function.call(substitution.all)
+    force, moment, square, closure, loops, sizes, actuators, signs, *others = function.call(substitution.all)
     sizes = sizes_at(model, [*model.closure, *model.loops], substitution.reference, sizes)
     following = iter(others)
     quantities = list(islice(following, len(model.quantities)))
@@ -183,6 +186,7 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         inputs=ca.veccat(*substitution.all, length, *twists),
         loops=loops / sizes[closure.numel() :],
         actuators=actuators,
+        signs=signs,
         joints=tuple(each.replaced(following) for each in model.joints),
         links=tuple(each.replaced(following) for each in model.links),
         reference=substitution.reference,

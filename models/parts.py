@@ -107,6 +107,21 @@ class Closure:
 
 
 @dataclass(frozen=True, eq=False)
+class AssemblySign:
+    """A number that is positive in home's assembly of a robot's joints, where the loops are closed.
+
+    Attributes:
+        name: of the limb or path, and of the sign.
+        value: (1, 1) expression; its size has no meaning.
+        is_mode: whether the joints hold together where it is negative too, in another working mode than home's.
+    """
+
+    name: str
+    value: SX
+    is_mode: bool
+
+
+@dataclass(frozen=True, eq=False)
 class PoseSymbols:
     """Pose of the platform in the world frame (equation 8).
 

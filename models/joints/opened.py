@@ -92,6 +92,12 @@ class PathFrame:
         x, y, z = (float(value) for value in self.typical_value(vector).ravel())
         return x, y, z
 
+    def value_at_home(self, expression: SX, unknowns: SX) -> float:
+        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
+        place = self.platform
+        function = ca.Function("home", [self._symbols, unknowns, place.rotation, place.image], [ca.densify(expression)])
+        return float(function(self._typical, 0, np.eye(3), self.typical_value(place.origin)))
+
     def sampled(self, expression: SX) -> list[float]:
         """Return the values of a scalar expression of the dimensions at all samples."""
         function = ca.Function("sampled", [self._symbols], [ca.densify(expression)])

@@ -17,6 +17,7 @@ from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import (
     Actuator,
+    AssemblySign,
     Closure,
     Dimension,
     GenericRanks,
@@ -34,6 +35,7 @@ from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
+from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
@@ -96,6 +98,7 @@ class _Builder:
     unknowns: list[Unknown] = field(default_factory=list)
     closure: list[Closure] = field(default_factory=list)
     checks: list[Closure] = field(default_factory=list)
+    signs: list[AssemblySign] = field(default_factory=list)
     actuators: list[Actuator] = field(default_factory=list)
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
@@ -114,6 +117,7 @@ class _Builder:
         known: dict[tuple[int, int], SX] = {}
         driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
         labels: dict[int, str] = {}
+        count, opened = len(self.unknowns), []
         for index, joints in enumerate(limb.paths):
             new = _labels(limb, index, joints, labels)
             labels |= new
@@ -127,11 +131,13 @@ class _Builder:
                     if id(each) in new
                 ]
                 continue
+            opened.append(path)
             self.joints += PathJoints(limb, path, known, self.frame).states(new)
             self.links.append((path, limb_links(path, labels, self.frame)))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
+        self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
         several = len(driven) > 1
         for k, (joint, path, j) in enumerate(driven.values()):
             name = f"{limb.name}.{k + 1}" if several else limb.name
@@ -175,6 +181,7 @@ class _Builder:
         name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
         self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
+        self.signs += joint_signs(name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
             every = [screw for own in path.screws for screw in own]
@@ -256,6 +263,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
+        signs=tuple(builder.signs),
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
         structure=with_kept(builder.structure, independent),

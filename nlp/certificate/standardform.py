@@ -43,8 +43,9 @@ class StandardForm:
         x: (n,) symbols.
         lower, upper: (n,) ends of the box.
         functions: ``phi_j``, the least of which is maximised.
-        conditions: ``h_k``; numbered after the functions where both are counted.
+        conditions: ``h_k``, with ``signs`` at the end; numbered after the functions where both are counted.
         sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
+        signs: conditions of a robot's assembly, which are no constraints of the program.
         has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
     """
 
@@ -54,6 +55,7 @@ class StandardForm:
     upper: FloatArray
     functions: tuple[SX, ...]
     conditions: tuple[Condition, ...]
+    signs: tuple[Condition, ...]
     sign: float
     has_epigraph: bool
 
@@ -91,6 +93,14 @@ class StandardForm:
     def value_at(self, x: FloatArray) -> float:
         """Return the value that is maximised at a point (n,), as computed in doubles."""
         return float(np.min(np.array(self._functions_at(x))))
+
+    def keeps_signs(self, x: FloatArray) -> bool:
+        """Return whether the conditions of the assembly hold at a point (n,), as computed in doubles."""
+        return not self.signs or bool(np.all(np.array(self._signs_at(x)) <= 0))
+
+    @cached_property
+    def _signs_at(self) -> ca.Function:
+        return ca.Function("signs", [self.x], [ca.densify(ca.vertcat(*[each.expression for each in self.signs]))])
 
     @cached_property
     def _functions_at(self) -> ca.Function:
@@ -130,13 +140,15 @@ def standard_form(nlp: Nlp) -> StandardForm:
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
     constraints += _further_loop_equations(program, x, nlp.arguments)
+    signs = _signs(nlp, x)
     return StandardForm(
         nlp=nlp,
         x=x[:count],
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        conditions=tuple(_conditions(constraints)),
+        conditions=(*_conditions(constraints), *signs),
+        signs=tuple(signs),
         sign=-nlp.sign,
         has_epigraph=epigraph is not None,
     )
@@ -163,6 +175,29 @@ def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> l
     return [
         _BoundedExpression(name, each, -CLOSED, CLOSED)
         for name, each in zip(further, values, strict=True)
+        if any(ca.which_depends(each, x, 1, True))
+    ]
+
+
+def _signs(nlp: Nlp, x: SX) -> list[Condition]:
+    """Return the conditions of a robot's assembly: where its joints do not hold together it is no robot.
+
+    Those of home's working mode count where the program says so.
+    """
+    program = nlp.program
+    found: dict[str, SX] = {}
+    for k, robot in enumerate(program.robots):
+        where = f" pose {k + 1}" if len(program.robots) > 1 else ""
+        for each, value in zip(program.model.signs, ca.vertsplit(robot.signs), strict=True):
+            if nlp.in_home_mode or not each.is_mode:
+                found[f"{each.name}{where}"] = -value
+    if not found:
+        return []
+    function = ca.Function("signs", [program.x, program.p], list(found.values()))
+    values = function.call([x, SX(ca.DM(nlp.arguments))])
+    return [
+        Condition(name, each, is_equation=False)
+        for name, each in zip(found, values, strict=True)
         if any(ca.which_depends(each, x, 1, True))
     ]
 
