@@ -207,9 +207,7 @@ def sizes_at(model: Model, parts: Sequence[Closure | Unknown], reference: tuple[
     own = Substitution.identity(model).parameters
     function = ca.Function("sizes", [own], [ca.densify(ca.vertcat(*[each.size for each in parts]))])
     values = function(np.array(reference)).full().ravel()
-    each = (
-        SX(float(value)) if 0 < value < np.inf else otherwise[k] for k, value in enumerate(values)
-    )
+    each = (SX(float(value)) if 0 < value < np.inf else otherwise[k] for k, value in enumerate(values))
     return ca.vertcat(*each)
 
 

@@ -111,12 +111,14 @@ class AssemblySign:
     """A number that is positive in home's assembly of a robot's joints, where the loops are closed.
 
     Attributes:
-        name: of the limb or path, and of the sign.
+        name: unique within the model.
+        limb: name of the limb.
         value: (1, 1) expression; its size has no meaning.
         is_mode: whether the joints hold together where it is negative too, in another working mode than home's.
     """
 
     name: str
+    limb: str
     value: SX
     is_mode: bool
 

@@ -28,9 +28,9 @@ from .opened import OpenedPath, PathFrame
 _SINGULAR = 1e-6
 
 
-def joint_signs(name: str, path: OpenedPath) -> list[AssemblySign]:
+def joint_signs(limb: str, name: str, path: OpenedPath) -> list[AssemblySign]:
     """Return the signs of a path's joints that its equations leave open, each 1 where the joints hold together."""
-    return [AssemblySign(f"sign {name} ({k + 1})", 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
+    return [AssemblySign(f"sign {name} ({k + 1})", limb, 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
 
 
 def mode_signs(
@@ -65,7 +65,7 @@ def mode_signs(
     at_home, most = (frame.value_at_home(each, symbols) for each in (value, largest))
     if not abs(at_home) > _SINGULAR * most:
         return []
-    return [AssemblySign(f"working mode {limb}", value / at_home, is_mode=True)]
+    return [AssemblySign(f"working mode {limb}", limb, value / at_home, is_mode=True)]
 
 
 def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:

@@ -111,9 +111,10 @@ class _Builder:
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
-        if len(limb.branches) > 1 and not all(joint.actuated for joint in limb.stem):
-            fault = "has a passive joint before its branches; only actuated joints may stand there"
-            raise RobotError(limb.place, fault)
+        passive = [joint for joint in limb.stem if not joint.actuated]
+        if len(limb.branches) > 1 and passive:
+            fault = "is passive and before the branches of its limb; only actuated joints may stand there"
+            raise RobotError(passive[0].place, fault)
         known: dict[tuple[int, int], SX] = {}
         driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
         labels: dict[int, str] = {}
@@ -181,7 +182,7 @@ class _Builder:
         name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
         self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
-        self.signs += joint_signs(name, path)
+        self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
             every = [screw for own in path.screws for screw in own]

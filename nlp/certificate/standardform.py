@@ -10,7 +10,7 @@ variable. The program's arguments are put in as doubles, and a proof is about th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -177,6 +177,14 @@ def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> l
         for name, each in zip(further, values, strict=True)
         if any(ca.which_depends(each, x, 1, True))
     ]
+
+
+def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
+    """Return whether a robot is in home's working mode at a point (n,); None where it has no sign of a mode."""
+    if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
+        return None
+    form = standard_form(replace(nlp, in_home_mode=True))
+    return form.keeps_signs(x[: form.n])
 
 
 def _signs(nlp: Nlp, x: SX) -> list[Condition]:

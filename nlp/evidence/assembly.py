@@ -162,7 +162,9 @@ class _Path:
         rotation = matrix_from_axis_angle(z[:3] / angle, angle)
         equations = ca.vertcat(*[each.scaled for each in model.closure])
         sizes = ca.vertcat(*[item.size for item in model.unknowns])
-        (residual,) = ca.Function("closure", own.all, [equations]).call([own.parameters, z[6:] * sizes, rotation, z[3:6]])
+        (residual,) = ca.Function("closure", own.all, [equations]).call(
+            [own.parameters, z[6:] * sizes, rotation, z[3:6]]
+        )
         # About home, lengths of the robot's own size make the singular values those of equations of order 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
         self._function = ca.Function("path", [z, own.parameters], outputs)

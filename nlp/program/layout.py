@@ -133,10 +133,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
     reference = _reference(case)
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
-        [
-            table.add(f"{at}{item.name}", item.dimension, own)
-            for item, own in zip(model.unknowns, ranges, strict=True)
-        ]
+        [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
         for at in _unknown_prefixes(case)
     ]
     length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
