@@ -186,7 +186,8 @@ def _check_shapes(model: Model) -> None:
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(each.name, each.expression, (1, 1)) for each in (*model.closure, *model.loops)]
     expected += [(each.name, each.value, (1, 1)) for each in model.signs]
-    expected += [(f"size of {each.name}", each.size, (1, 1)) for each in (*model.closure, *model.unknowns)]
+    expected += [(f"size of {each.name}", each.size, (1, 1)) for each in model.closure]
+    expected += [(f"size of {unknown.name}", unknown.size, (1, 1)) for unknown in model.unknowns]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
     expected += [(name, expression, (3, 1)) for name, expression in model.scene.expressions]
     for leg in model.legs:

@@ -75,7 +75,12 @@ class Calls:
 
 @dataclass(frozen=True)
 class RobotValues:
-    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form."""
+    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form.
+
+    Attributes:
+        model: the robot.
+        reference: as for :class:`~screwsynth.models.instance.Substitution`.
+    """
 
     model: Model
     reference: tuple[float, ...]
@@ -90,8 +95,10 @@ class RobotValues:
         for each in Substitution.identity(self.model).all:
             parts.append(ca.reshape(inputs[at : at + each.numel()], each.shape))
             at += each.numel()
+        parameters, unknowns, rotation, position = parts
+        own = Substitution(parameters, unknowns, rotation, position, self.reference)
         twists = [inputs[j : j + 6] for j in range(at + 1, inputs.numel(), 6)]
-        return instantiate(self.model, Substitution(*parts, self.reference), inputs[at], twists)
+        return instantiate(self.model, own, inputs[at], twists)
 
 
 def robot_values(robot: RobotInstance) -> SX:
