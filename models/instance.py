@@ -106,6 +106,7 @@ class RobotInstance:
         loops: (k, 1) left sides of all loop equations, those beyond the closure included.
         actuators: (6, a) current unit screw of each of the model's actuators.
         signs: (s, 1) numbers that are positive in home's assembly.
+        distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
         links: their links.
         reference: values of the parameters at which the sizes of the loop equations are taken; empty for none.
@@ -127,6 +128,7 @@ class RobotInstance:
     loops: SX
     actuators: SX
     signs: SX
+    distances: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
     reference: tuple[float, ...] = ()
@@ -141,13 +143,15 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         length: (1, 1) characteristic length, by which couple rows are multiplied.
         twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
     """
+    every = (*model.closure, *model.loops, *model.distances)
     outputs = [
         ca.horzcat(SX(3, 0), *[row.force for row in model.wrenches]),
         ca.horzcat(SX(3, 0), *[row.moment for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[row.square for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
-        ca.vertcat(SX(0, 1), *[equation.size for equation in (*model.closure, *model.loops)]),
+        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.distances]),
+        ca.vertcat(SX(0, 1), *[equation.size for equation in every]),
         ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
         ca.vertcat(SX(0, 1), *[each.value for each in model.signs]),
         *[quantity.values for quantity in model.quantities],
@@ -156,8 +160,9 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, sizes, actuators, signs, *others = function.call(substitution.all)
-    sizes = sizes_at(model, [*model.closure, *model.loops], substitution.reference, sizes)
+    force, moment, square, closure, loops, distances, sizes, actuators, signs, *others = function.call(substitution.all)
+    sizes = sizes_at(model, every, substitution.reference, sizes)
+    ends = closure.numel(), closure.numel() + loops.numel()
     following = iter(others)
     quantities = list(islice(following, len(model.quantities)))
     joints = list(islice(following, 2 * len(model.legs)))
@@ -181,10 +186,11 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
-        closure=closure / sizes[: closure.numel()],
+        closure=closure / sizes[: ends[0]],
         rows=tuple(rows),
         inputs=ca.veccat(*substitution.all, length, *twists),
-        loops=loops / sizes[closure.numel() :],
+        loops=loops / sizes[ends[0] : ends[1]],
+        distances=distances / sizes[ends[1] :],
         actuators=actuators,
         signs=signs,
         joints=tuple(each.replaced(following) for each in model.joints),

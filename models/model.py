@@ -62,6 +62,7 @@ class Model(Whole, Shown):
         closure: the independent equations that determine the unknowns.
         loops: all equations of closed loops, which hold where the robot is put together; empty for the closure alone.
         signs: of home's assembly of its joints, where these are known.
+        distances: equations that follow from those of the loops, and help a search of a whole box.
         actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
         joint_screws: screws of the joints of its limbs, where they are known.
         joints: the joints of its limbs, as limits read them.
@@ -92,6 +93,7 @@ class Model(Whole, Shown):
     members: tuple[Member, ...] = ()
     loops: tuple[Closure, ...] = ()
     signs: tuple[AssemblySign, ...] = ()
+    distances: tuple[Closure, ...] = ()
     actuators: tuple[Actuator, ...] = ()
     joint_screws: tuple[JointScrews, ...] = ()
     joints: tuple[LimbJoint, ...] = ()
@@ -212,7 +214,7 @@ def _check_symbols(model: Model) -> None:
         *(part for member in model.members for part in (member.centre, member.screws)),
         *(each.screw for each in model.actuators),
         *(part for each in model.joint_screws for part in (each.passive, each.all)),
-        *(part for equation in (*model.closure, *model.loops) for part in (equation.expression, equation.size)),
+        *(part for equation in (*model.closure, *model.loops, *model.distances) for part in (equation.expression, equation.size)),
         *(unknown.size for unknown in model.unknowns),
         *(each.value for each in model.signs),
         *(quantity.values for quantity in model.quantities),

@@ -31,6 +31,7 @@ from ..parts import (
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
+from .distances import distance_equations
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression
 from .generic import sampled_dimensions
@@ -99,6 +100,7 @@ class _Builder:
     closure: list[Closure] = field(default_factory=list)
     checks: list[Closure] = field(default_factory=list)
     signs: list[AssemblySign] = field(default_factory=list)
+    distances: list[Closure] = field(default_factory=list)
     actuators: list[Actuator] = field(default_factory=list)
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
@@ -182,6 +184,8 @@ class _Builder:
         name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
         self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
+        own = distance_equations(path, variables, self.frame)
+        self.distances += [Closure(f"distance {name} ({k + 1})", *each) for k, each in enumerate(own)]
         self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
@@ -265,6 +269,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         closure=independent,
         loops=tuple(everything),
         signs=tuple(builder.signs),
+        distances=tuple(builder.distances),
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
         structure=with_kept(builder.structure, independent),

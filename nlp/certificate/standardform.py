@@ -155,9 +155,9 @@ def standard_form(nlp: Nlp) -> StandardForm:
 
 
 def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
-    """Return the loop equations of the robot that the program leaves out, with the bounds of a closed loop.
+    """Return the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop.
 
-    They follow from those of the program near its answer, but not in the whole box: there joints that are assembled in
+    The former follow from those of the program near its answer, but not in the whole box: there joints that are assembled in
     no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
     that an exact equation could hold nowhere.
     """
@@ -165,7 +165,12 @@ def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> l
     further: dict[str, SX] = {}
     for k, robot in enumerate(program.robots):
         where = f" pose {k + 1}" if len(program.robots) > 1 else ""
-        for equation, expression in zip(program.model.closure, ca.vertsplit(robot.closure), strict=True):
+        model = program.model
+        pairs = (
+            *zip(model.closure, ca.vertsplit(robot.closure), strict=True),
+            *zip(model.distances, ca.vertsplit(robot.distances), strict=True),
+        )
+        for equation, expression in pairs:
             if f"{equation.name}{where}" not in names:
                 further[f"{equation.name}{where}"] = expression
     if not further:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -62,6 +63,12 @@ def free_pose(name: str, part: float) -> Case:
     return Case(model, parameters, position, [task], Rotation(None, Free(-part, part)))
 
 
+def moved(nlp: Nlp) -> list[int]:
+    """Indices of the pose's numbers."""
+    (unknowns,) = nlp.program.places.unknowns
+    return [index for index in range(nlp.n) if index not in unknowns]
+
+
 def in_another_mode(nlp: Nlp, limb: int) -> np.ndarray:
     """A closed point at home's pose with one limb's only unknown at its other solution."""
     x, (own,) = closed_start(nlp), nlp.program.places.unknowns
@@ -94,6 +101,12 @@ def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tupl
         start = closed_start(nlp)
         assert loops_are_closed(nlp, start), name
         assert standard_form(nlp).keeps_signs(start), name
+        distances = ca.Function("distances", [nlp.program.x, nlp.program.p], [nlp.program.robots[0].distances])
+        away = close_equations(nlp, start + 0.3 * nlp.scale * np.isin(np.arange(nlp.n), moved(nlp)))
+        assert loops_are_closed(nlp, away), name
+        found = np.array([distances(x, nlp.arguments).full().ravel() for x in (start, away, away + 0.1)])
+        assert np.abs(found[:2]).max(initial=0.0) < 1e-9, name
+        assert np.abs(found[2]).min(initial=1.0) > 1e-6, name  # where the loops are open
         if name in ("6-rus", "6-pus", "6-rss"):
             assert is_in_home_mode(nlp, in_another_mode(nlp, 2)) is False
 
