@@ -23,6 +23,7 @@ from .member import Member
 from .model import Model, ModelError
 from .parts import (
     Actuator,
+    AssemblySign,
     Closure,
     Dimension,
     GenericRanks,
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Actuator",
+    "AssemblySign",
     "AmbiguousModelError",
     "AxisAngle",
     "Body",

@@ -214,7 +214,11 @@ def _check_symbols(model: Model) -> None:
         *(part for member in model.members for part in (member.centre, member.screws)),
         *(each.screw for each in model.actuators),
         *(part for each in model.joint_screws for part in (each.passive, each.all)),
-        *(part for equation in (*model.closure, *model.loops, *model.distances) for part in (equation.expression, equation.size)),
+        *(
+            part
+            for equation in (*model.closure, *model.loops, *model.distances)
+            for part in (equation.expression, equation.size)
+        ),
         *(unknown.size for unknown in model.unknowns),
         *(each.value for each in model.signs),
         *(quantity.values for quantity in model.quantities),
