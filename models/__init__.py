@@ -65,8 +65,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Actuator",
-    "AssemblySign",
     "AmbiguousModelError",
+    "AssemblySign",
     "AxisAngle",
     "Body",
     "Circle",

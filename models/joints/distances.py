@@ -1,8 +1,8 @@
 """Distances that follow from a path's loop equations, each without the variables of one joint.
 
-A hinge or universal joint and the joint at which the path is opened are at a distance that the joint's own rotation does not
-change: the two places, one on each side of the opened loop, have the distance that the joints between give them. The
-equation lacks one or two of the unknowns, so that a search of a whole box finds where the others cannot be.
+A hinge or universal joint and the joint at which the path is opened are at a distance that the joint's own rotation
+does not change: the two places, one on each side of the opened loop, have the distance that the joints between give
+them. The equation lacks one or two of the unknowns, so that a search of a whole box finds where the others cannot be.
 """
 
 from __future__ import annotations

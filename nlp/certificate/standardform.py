@@ -157,9 +157,9 @@ def standard_form(nlp: Nlp) -> StandardForm:
 def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
     """Return the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop.
 
-    The former follow from those of the program near its answer, but not in the whole box: there joints that are assembled in
-    no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
-    that an exact equation could hold nowhere.
+    The former follow from those of the program near its answer, but not in the whole box: there joints that are
+    assembled in no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding
+    error in them, so that an exact equation could hold nowhere.
     """
     names = {constraint.name for constraint in program.constraints}
     further: dict[str, SX] = {}
