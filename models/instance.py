@@ -186,11 +186,11 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
-        closure=closure / sizes[: ends[0]],
+        closure=closure / sizes[: ends[0], :],
         rows=tuple(rows),
         inputs=ca.veccat(*substitution.all, length, *twists),
-        loops=loops / sizes[ends[0] : ends[1]],
-        distances=distances / sizes[ends[1] :],
+        loops=loops / sizes[ends[0] : ends[1], :],
+        distances=distances / sizes[ends[1] :, :],
         actuators=actuators,
         signs=signs,
         joints=tuple(each.replaced(following) for each in model.joints),
