@@ -23,6 +23,7 @@ from .member import Member
 from .model import Model, ModelError
 from .parts import (
     Actuator,
+    AssemblySign,
     Closure,
     Dimension,
     GenericRanks,
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Actuator",
     "AmbiguousModelError",
+    "AssemblySign",
     "AxisAngle",
     "Body",
     "Circle",

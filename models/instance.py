@@ -17,12 +17,14 @@ from itertools import islice
 from typing import TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member, resisted_parts, scaled_twists
 from .model import Model
+from .parts import Closure, Unknown
 from .wrench import Wrench, WrenchKind
 
 #: A matrix or vector of symbols or of numbers.
@@ -38,12 +40,15 @@ class Substitution:
         unknowns: (u, 1) internal unknowns, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
+        reference: (n,) values of the parameters at which the sizes of loop equations are taken; empty for the
+            expressions in place of the parameters.
     """
 
     parameters: SX
     unknowns: SX
     rotation: SX
     position: SX
+    reference: tuple[float, ...] = ()
 
     @classmethod
     def identity(cls, model: Model) -> Substitution:
@@ -57,7 +62,7 @@ class Substitution:
 
     @property
     def all(self) -> list[SX]:
-        """The four expressions, in the order of the fields."""
+        """The four expressions, in the order of the first four fields."""
         return [self.parameters, self.unknowns, self.rotation, self.position]
 
 
@@ -100,8 +105,11 @@ class RobotInstance:
             characteristic length, twists.
         loops: (k, 1) left sides of all loop equations, those beyond the closure included.
         actuators: (6, a) current unit screw of each of the model's actuators.
+        signs: (s, 1) numbers that are positive in home's assembly.
+        distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
         links: their links.
+        reference: values of the parameters at which the sizes of the loop equations are taken; empty for none.
     """
 
     parameters: SX
@@ -119,8 +127,11 @@ class RobotInstance:
     inputs: SX
     loops: SX
     actuators: SX
+    signs: SX
+    distances: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
+    reference: tuple[float, ...] = ()
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -132,20 +143,26 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         length: (1, 1) characteristic length, by which couple rows are multiplied.
         twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
     """
+    every = (*model.closure, *model.loops, *model.distances)
     outputs = [
         ca.horzcat(SX(3, 0), *[row.force for row in model.wrenches]),
         ca.horzcat(SX(3, 0), *[row.moment for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[row.square for row in model.wrenches]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
+        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.distances]),
+        ca.vertcat(SX(0, 1), *[equation.size for equation in every]),
         ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
+        ca.vertcat(SX(0, 1), *[each.value for each in model.signs]),
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, actuators, *others = function.call(substitution.all)
+    force, moment, square, closure, loops, distances, sizes, actuators, signs, *others = function.call(substitution.all)
+    sizes = sizes_at(model, every, substitution.reference, sizes)
+    ends = closure.numel(), closure.numel() + loops.numel()
     following = iter(others)
     quantities = list(islice(following, len(model.quantities)))
     joints = list(islice(following, 2 * len(model.legs)))
@@ -169,14 +186,35 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
             for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
         ),
-        closure=closure,
+        closure=closure / sizes[: ends[0], :],
         rows=tuple(rows),
         inputs=ca.veccat(*substitution.all, length, *twists),
-        loops=loops,
+        loops=loops / sizes[ends[0] : ends[1], :],
+        distances=distances / sizes[ends[1] :, :],
         actuators=actuators,
+        signs=signs,
         joints=tuple(each.replaced(following) for each in model.joints),
         links=tuple(each.replaced(following) for each in model.links),
+        reference=substitution.reference,
     )
+
+
+def sizes_at(model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...], otherwise: SX) -> SX:
+    """Return the sizes (k, 1) of loop equations or unknowns at values of the parameters.
+
+    Args:
+        model: the model.
+        parts: the k equations or unknowns.
+        reference: (n,) values of the parameters; empty for none.
+        otherwise: (k, 1) the sizes where there is no reference, or where a size has no positive value there.
+    """
+    if not (reference and parts):
+        return otherwise
+    own = Substitution.identity(model).parameters
+    function = ca.Function("sizes", [own], [ca.densify(ca.vertcat(*[each.size for each in parts]))])
+    values = function(np.array(reference)).full().ravel()
+    each = (SX(float(value)) if 0 < value < np.inf else otherwise[k] for k, value in enumerate(values))
+    return ca.vertcat(*each)
 
 
 def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ()) -> SX:

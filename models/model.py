@@ -20,6 +20,7 @@ from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member
 from .parts import (
     Actuator,
+    AssemblySign,
     Closure,
     GenericRanks,
     JointScrews,
@@ -60,6 +61,8 @@ class Model(Whole, Shown):
         unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
         closure: the independent equations that determine the unknowns.
         loops: all equations of closed loops, which hold where the robot is put together; empty for the closure alone.
+        signs: of home's assembly of its joints, where these are known.
+        distances: equations that follow from those of the loops, and help a search of a whole box.
         actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
         joint_screws: screws of the joints of its limbs, where they are known.
         joints: the joints of its limbs, as limits read them.
@@ -89,6 +92,8 @@ class Model(Whole, Shown):
     built: tuple[Wrench, ...] = ()
     members: tuple[Member, ...] = ()
     loops: tuple[Closure, ...] = ()
+    signs: tuple[AssemblySign, ...] = ()
+    distances: tuple[Closure, ...] = ()
     actuators: tuple[Actuator, ...] = ()
     joint_screws: tuple[JointScrews, ...] = ()
     joints: tuple[LimbJoint, ...] = ()
@@ -182,6 +187,9 @@ def _check_shapes(model: Model) -> None:
     expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(each.name, each.expression, (1, 1)) for each in (*model.closure, *model.loops)]
+    expected += [(each.name, each.value, (1, 1)) for each in model.signs]
+    expected += [(f"size of {each.name}", each.size, (1, 1)) for each in model.closure]
+    expected += [(f"size of {unknown.name}", unknown.size, (1, 1)) for unknown in model.unknowns]
     expected += [(quantity.name, quantity.values, (len(quantity.owners), 1)) for quantity in model.quantities]
     expected += [(name, expression, (3, 1)) for name, expression in model.scene.expressions]
     for leg in model.legs:
@@ -206,7 +214,13 @@ def _check_symbols(model: Model) -> None:
         *(part for member in model.members for part in (member.centre, member.screws)),
         *(each.screw for each in model.actuators),
         *(part for each in model.joint_screws for part in (each.passive, each.all)),
-        *(equation.expression for equation in (*model.closure, *model.loops)),
+        *(
+            part
+            for equation in (*model.closure, *model.loops, *model.distances)
+            for part in (equation.expression, equation.size)
+        ),
+        *(unknown.size for unknown in model.unknowns),
+        *(each.value for each in model.signs),
         *(quantity.values for quantity in model.quantities),
         *(expression for _, expression in model.scene.expressions),
         *(joint for leg in model.legs for joint in (leg.base, leg.platform)),

@@ -70,7 +70,8 @@ class Unknown:
         symbol: (1, 1) CasADi symbol.
         dimension: length, angle (radians) or plain number.
         description: a few words for people.
-        lower, upper: finite bounds between which the program searches the assembly.
+        lower, upper: finite bounds between which the program searches the assembly, in parts of ``size``.
+        size: (1, 1) expression of the parameters of the order of the unknown: 1, or a length of the robot's.
     """
 
     name: str
@@ -79,19 +80,47 @@ class Unknown:
     description: str
     lower: float
     upper: float
+    size: SX = field(default_factory=lambda: SX(1))
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
     """An equation of the robot's closed loops: ``expression == 0``.
 
+    A program divides the equation by its size at one point of the case: divided by the expression itself, the equation
+    and its derivatives would be longer.
+
     Attributes:
         name: unique within the model.
         expression: (1, 1) left side of the equation.
+        size: (1, 1) positive expression of the parameters, by which the equation becomes a number of order 1.
     """
 
     name: str
     expression: SX
+    size: SX = field(default_factory=lambda: SX(1))
+
+    @property
+    def scaled(self) -> SX:
+        """Left side of the equation (1, 1), of order 1."""
+        return self.expression / self.size
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblySign:
+    """A number that is positive in home's assembly of a robot's joints, where the loops are closed.
+
+    Attributes:
+        name: unique within the model.
+        limb: name of the limb.
+        value: (1, 1) expression; its size has no meaning.
+        is_mode: whether the joints hold together where it is negative too, in another working mode than home's.
+    """
+
+    name: str
+    limb: str
+    value: SX
+    is_mode: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,14 @@
 """Robots given joint by joint: limbs as chains of joints become the rows, unknowns and loop equations of a model.
 
 The modules in order, each of which imports only those before it: ``expression`` (the small language of a robot's
-numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is written),
-``words`` (a robot as it is written), ``chain`` (joints and limbs with their symbols), ``generic`` (ranks at random
-dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at which a
-limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``resistance`` (rows and members of
-a limb), ``angles`` and ``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop
-equations), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``structure``
-(its numbers for people), ``robot`` (the model).
+numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is
+written), ``words`` (a robot as it is written), ``chain`` (joints and limbs with their symbols), ``generic`` (ranks at
+random dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at
+which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``distances`` (equations
+that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``angles`` and
+``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``outline``
+(corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``structure`` (its numbers for
+people), ``robot`` (the model).
 """
 
 from .expression import ExpressionError

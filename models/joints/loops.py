@@ -14,6 +14,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..parts import Closure, Unknown
 from ..rotation import matrix_from_cayley
 from ..rows import DEPENDENT, independent_rows
 from .chain import HomeRobot
@@ -58,29 +59,34 @@ class PoseOf(NamedTuple):
     position: SX
 
 
-def examine_loops(robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unknowns: SX, samples: FloatArray) -> Loops:
+def examine_loops(
+    robot: HomeRobot, equations: Sequence[Closure], pose: PoseOf, unknowns: Sequence[Unknown], samples: FloatArray
+) -> Loops:
     """Return closed configurations near home, and which of the loop equations are independent there.
 
     Args:
         robot: the robot.
-        equations: (1, 1) expressions of dimensions, pose and unknowns; zero where the loops are closed.
+        equations: of dimensions, pose and unknowns.
         pose: symbols of the pose.
-        unknowns: (u, 1) symbols.
+        unknowns: their symbols, and the sizes by which they become numbers of order 1.
         samples: (s, d) random dimensions.
 
     Raises:
         RobotError: no closed configuration was found near home.
     """
     c, shift = SX.sym("c", 3), SX.sym("shift", 3)
-    moving = ca.vertcat(c, shift, unknowns)
+    own, scaled = (ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns]), SX.sym("scaled", len(unknowns)))
+    sizes = ca.vertcat(SX(0, 1), *[item.size for item in unknowns])
+    moving = ca.vertcat(c, shift, scaled)
     rotation, position = matrix_from_cayley(c), robot.home + robot.size * shift
-    stacked = ca.vertcat(SX(0, 1), *equations)
-    (residual,) = ca.Function("closure", [robot.symbols, unknowns, pose.rotation, pose.position], [stacked]).call(
-        [robot.symbols, unknowns, rotation, position]
+    stacked = ca.vertcat(SX(0, 1), *[each.scaled for each in equations])
+    (residual,) = ca.Function("closure", [robot.symbols, own, pose.rotation, pose.position], [stacked]).call(
+        [robot.symbols, scaled * sizes, rotation, position]
     )
     slopes = _slopes(residual, moving, robot)
     function = ca.Function("loops", [moving, robot.symbols], [ca.densify(residual), ca.densify(slopes)])
-    placed = ca.Function("placed", [moving, robot.symbols], [rotation, ca.densify(position)])
+    outputs = [rotation, ca.densify(position), ca.densify(scaled * sizes)]
+    placed = ca.Function("placed", [moving, robot.symbols], outputs)
     points: list[ClosedPoint] = []
     jacobians: list[FloatArray] = []
     rng = np.random.default_rng(1)
@@ -92,8 +98,8 @@ def examine_loops(robot: HomeRobot, equations: Sequence[SX], pose: PoseOf, unkno
             z = change * rng.uniform(-1.0, 1.0, free)
             found = _closed(function, z, sample)
             if found is not None:
-                R, p = (each.full() for each in placed(found, sample))
-                points.append(ClosedPoint(sample, R, p.ravel(), found[6:]))
+                R, p, values = (each.full() for each in placed(found, sample))
+                points.append(ClosedPoint(sample, R, p.ravel(), values.ravel()))
                 jacobians.append(function(found, sample)[1].full())
     if not points:
         raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")

@@ -37,6 +37,9 @@ class Motion(NamedTuple):
 
     def after(self, first: Motion) -> Motion:
         """Return this displacement after another one, which comes first."""
+        if first.rotation.is_eye():
+            # A translation moves the origin alone: this rotation then turns one sum of vectors, and not two vectors.
+            return Motion(self.rotation, self.origin - (first.image - first.origin), self.image)
         return Motion(self.rotation @ first.rotation, first.origin, self.point(first.image))
 
     def inverse(self) -> Motion:
@@ -79,10 +82,10 @@ class JointAxis:
     def motion(self, value: SX) -> Motion:
         """Return the displacement at a value of the variable: an angle in radians, or a length."""
         if self.kind is AxisKind.TRANSLATION:
-            return Motion(SX.eye(3), self.point, self.point + value * self.axis)
+            return Motion(SX.eye(3), SX.zeros(3), value * self.axis)
         turn = rotation_about(self.axis, value)
         if self.kind is AxisKind.PARALLELOGRAM:
-            return Motion(SX.eye(3), self.point, self.point + (turn @ self.rod - self.rod))
+            return Motion(SX.eye(3), SX.zeros(3), turn @ self.rod - self.rod)
         return Motion(turn, self.point, self.point + self.pitch * value * self.axis)
 
     def screw(self, value: SX, at: Motion) -> SX:

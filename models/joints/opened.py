@@ -9,13 +9,14 @@ it. The two sides meet at the cut, where equations say that the joint there hold
 * a rod of constant length: the distance of its ends is that at home (1); of a rod that is driven: none;
 * no joint: the two bodies coincide (6).
 
-Lengths in the equations are divided by the robot's size.
+Each equation has a size, by which it becomes a number of order 1: for lengths the robot's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -28,8 +29,15 @@ from .motion import Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
-#: Returns the variable of one axis of a joint: a symbol, times the robot's size for a translation.
+#: Returns the variable of one axis of a joint, a symbol.
 Variables = Callable[[Joint, int], SX]
+
+
+class LoopEquation(NamedTuple):
+    """An expression (1, 1) that is zero where a loop is closed, and its size, an expression of the dimensions."""
+
+    expression: SX
+    size: SX
 
 
 @dataclass(eq=False)
@@ -44,7 +52,7 @@ class OpenedPath:
         points: (3, 1) current place of each joint on the body before it, on the base's side, length.
         sides: displacement of the bodies on the base's and on the platform's side of the cut.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
-        equations: expressions that are zero where the path is closed.
+        equations: that hold where the path is closed.
         checks: further expressions that are zero there: signs that the equations leave open.
     """
 
@@ -55,7 +63,7 @@ class OpenedPath:
     points: list[SX]
     sides: tuple[Motion, Motion]
     rod: SX | None = None
-    equations: list[SX] = field(default_factory=list)
+    equations: list[LoopEquation] = field(default_factory=list)
     checks: list[SX] = field(default_factory=list)
 
 
@@ -83,6 +91,12 @@ class PathFrame:
         """Return the typical value of a vector (3, 1)."""
         x, y, z = (float(value) for value in self.typical_value(vector).ravel())
         return x, y, z
+
+    def value_at_home(self, expression: SX, unknowns: SX) -> float:
+        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
+        place = self.platform
+        function = ca.Function("home", [self._symbols, unknowns, place.rotation, place.image], [ca.densify(expression)])
+        return float(function(self._typical, 0, np.eye(3), self.typical_value(place.origin)))
 
     def sampled(self, expression: SX) -> list[float]:
         """Return the values of a scalar expression of the dimensions at all samples."""
@@ -126,10 +140,15 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     else:
         turn = base.rotation.T @ platform.rotation
         place = joints[min(cut.first, count - 1)].point
-        apart = base.rotation.T @ (platform.point(place) - base.point(place)) / frame.size
-        path.equations += [*ca.vertsplit(ca.inv_skew(turn - turn.T) / 2), *ca.vertsplit(apart)]
+        apart = base.rotation.T @ (platform.point(place) - base.point(place))
+        path.equations += _equations(ca.inv_skew(turn - turn.T) / 2) + _equations(apart, frame.size)
         path.checks.append(3 - ca.trace(turn))
     return path
+
+
+def _equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
+    """Return equations from their left sides (k, 1) and a common size; without one they are of order 1."""
+    return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
 
 
 def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
@@ -137,7 +156,7 @@ def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFra
     joints, j = path.joints, path.cut.joint
     joint = joints[j]
     ends = base.point(joint.point), platform.point(joint.point)
-    path.equations += ca.vertsplit((ends[0] - ends[1]) / frame.size)
+    path.equations += _equations(ends[0] - ends[1], frame.size)
     shorter_base = sum(len(each.axes) for each in joints[:j]) < sum(len(each.axes) for each in joints[j + 1 :])
     path.points[j] = ends[0] if shorter_base else ends[1]
     path.behind[j] = platform
@@ -146,14 +165,16 @@ def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFra
         return
     if joint.type == "U":
         first, second = joint.axes
-        path.screws[j] = [first.screw(SX(0), base), second.screw(SX(0), platform)]
+        directions = base.rotation @ first.axis, platform.rotation @ second.axis
+        # Both axes pass through one point where the loop is closed: the expressions of the point are the same then.
+        path.screws[j] = [ca.vertcat(each, ca.cross(path.points[j], each)) for each in directions]
         angle = ca.dot(first.axis, second.axis)
-        path.equations.append(ca.dot(base.rotation @ first.axis, platform.rotation @ second.axis) - angle)
+        path.equations += _equations(ca.dot(*directions) - angle)
         return
     (axis,) = joint.axes
     path.screws[j] = [axis.screw(SX(0), base)]
     across, turned = _normals(axis.axis, frame), platform.rotation @ axis.axis
-    path.equations += [ca.dot(base.rotation @ normal, turned) for normal in across]
+    path.equations += _equations(ca.vertcat(*[ca.dot(base.rotation @ normal, turned) for normal in across]))
     path.checks.append(1 - ca.dot(base.rotation @ axis.axis, turned))
 
 
@@ -179,7 +200,7 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     if joints[far].type == "U" and is_straight:
         path.screws[far] = _universal_screws(path, sides[0], home, frame)
     if slide is None:
-        path.equations.append((ca.sumsqr(path.rod) - square) / (2 * square))
+        path.equations += _equations(ca.sumsqr(path.rod) - square, 2 * square)
         return
     # The slide's own direction is not known where it is not along the rod: only its part along the rod does work.
     current = ca.sumsqr(path.rod)

@@ -83,7 +83,10 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
     screws = [screw for joint, own in zip(path.joints, path.screws, strict=True) if not joint.actuated for screw in own]
     centre = _centre_of(path.joints, given)
     body = path.behind[centre.behind]
-    place = path.points[centre.behind] if body is None else body.point(centre.point)
+    joint = path.joints[centre.behind]
+    is_cut = centre.behind == path.cut.joint and centre.point is joint.point and joint.type in ("R", "U")
+    # The point of the joint at the cut is the same on both sides where the loop is closed: one is shorter.
+    place = path.points[centre.behind] if body is None or is_cut else body.point(centre.point)
     return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, ())
 
 

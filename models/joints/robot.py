@@ -17,6 +17,7 @@ from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import (
     Actuator,
+    AssemblySign,
     Closure,
     Dimension,
     GenericRanks,
@@ -30,10 +31,12 @@ from ..parts import (
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
+from .distances import distance_equations
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
+from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
@@ -96,6 +99,8 @@ class _Builder:
     unknowns: list[Unknown] = field(default_factory=list)
     closure: list[Closure] = field(default_factory=list)
     checks: list[Closure] = field(default_factory=list)
+    signs: list[AssemblySign] = field(default_factory=list)
+    distances: list[Closure] = field(default_factory=list)
     actuators: list[Actuator] = field(default_factory=list)
     positions: list[SX] = field(default_factory=list)
     screws: list[JointScrews] = field(default_factory=list)
@@ -108,12 +113,14 @@ class _Builder:
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
-        if len(limb.branches) > 1 and not all(joint.actuated for joint in limb.stem):
-            fault = "has a passive joint before its branches; only actuated joints may stand there"
-            raise RobotError(limb.place, fault)
+        passive = [joint for joint in limb.stem if not joint.actuated]
+        if len(limb.branches) > 1 and passive:
+            fault = "is passive and before the branches of its limb; only actuated joints may stand there"
+            raise RobotError(passive[0].place, fault)
         known: dict[tuple[int, int], SX] = {}
         driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
         labels: dict[int, str] = {}
+        count, opened = len(self.unknowns), []
         for index, joints in enumerate(limb.paths):
             new = _labels(limb, index, joints, labels)
             labels |= new
@@ -127,11 +134,13 @@ class _Builder:
                     if id(each) in new
                 ]
                 continue
+            opened.append(path)
             self.joints += PathJoints(limb, path, known, self.frame).states(new)
             self.links.append((path, limb_links(path, labels, self.frame)))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
+        self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
         several = len(driven) > 1
         for k, (joint, path, j) in enumerate(driven.values()):
             name = f"{limb.name}.{k + 1}" if several else limb.name
@@ -173,8 +182,11 @@ class _Builder:
         self.wrenches += rows
         self.members += [] if member is None else [member]
         name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
-        self.closure += [Closure(f"loop {name} ({k + 1})", each) for k, each in enumerate(path.equations)]
+        self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
+        own = distance_equations(path, variables, self.frame)
+        self.distances += [Closure(f"distance {name} ({k + 1})", *each) for k, each in enumerate(own)]
+        self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
             every = [screw for own in path.screws for screw in own]
@@ -192,11 +204,11 @@ class _Builder:
                 name = f"q{limb.name}_{len(known) + 1}"
                 symbol = SX.sym(name)
                 slides = joint.axes[axis].kind is AxisKind.TRANSLATION
-                reach = _WAY if slides else _TURN
-                dimension = Dimension.NUMBER if slides else Dimension.ANGLE
-                words = "way of a slide in parts of the robot's size" if slides else "angle of a joint"
-                self.unknowns.append(Unknown(name, symbol, dimension, f"{words}, from home", -reach, reach))
-                known[key] = symbol * self.robot.size if slides else symbol
+                reach, size = (_WAY, self.robot.size) if slides else (_TURN, SX(1))
+                dimension = Dimension.LENGTH if slides else Dimension.ANGLE
+                words = "way of a slide" if slides else "angle of a joint"
+                self.unknowns.append(Unknown(name, symbol, dimension, f"{words}, from home", -reach, reach, size))
+                known[key] = symbol
             return known[key]
 
         return variable
@@ -237,13 +249,11 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         raise RobotError("actuated", fault)
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
-    loops = examine_loops(
-        at_home, [each.expression for each in closure], PoseOf(pose.rotation, pose.position), unknowns, samples
-    )
+    loops = examine_loops(at_home, closure, PoseOf(pose.rotation, pose.position), builder.unknowns, samples)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     members = [_with_kinds(member, builder, numbers, loops.points[0]) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
-    everything = [Closure(f"{each.name} in full", each.expression) for each in (*closure, *builder.checks)]
+    everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
     model = Model(
         name=words.name,
         description=words.description,
@@ -258,6 +268,8 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
+        signs=tuple(builder.signs),
+        distances=tuple(builder.distances),
         actuators=tuple(builder.actuators),
         joint_screws=tuple(builder.screws),
         structure=with_kept(builder.structure, independent),

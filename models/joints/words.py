@@ -44,6 +44,8 @@ _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
 #: Most joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
 _MOST_IN_ALL = 120
+#: Fault of a branch with branches of its own.
+NESTED_BRANCH = "is a branch of a branch; allowed are branches of a limb, each with joints up to the platform"
 #: Copies of a limb nearer than this coincide, degrees.
 _SAME_ANGLE = 1e-6
 
@@ -207,6 +209,8 @@ def _check_path(place: str, joints: Sequence[JointWords]) -> None:
 def _only_joints(place: str, branch: object) -> object:
     """Return the joints of a branch, which has no other key."""
     table = table_of(place, branch)
+    if "branch" in table:
+        raise RobotError(f"{place}, branch", NESTED_BRANCH)
     refuse_other_keys(place, table, ("joints",))
     if not table.get("joints"):
         raise RobotError(f"{place}, joints", "is missing: a branch needs at least one joint")

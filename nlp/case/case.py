@@ -331,4 +331,5 @@ def _check_tolerance(case: Case) -> None:
     if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
     if not case.model.built or case.model.unknowns:
-        raise CaseError("tolerance.joint_centre", f"means nothing for {case.model.name!r}, whose joints are not known")
+        reason = "which is given joint by joint" if case.model.structure else "whose joints are not known"
+        raise CaseError("tolerance.joint_centre", f"is not computed for {case.model.name!r}, {reason}")

@@ -30,7 +30,7 @@ from .examination import Examination, Verdict
 from .incumbent import Incumbent, IncumbentError
 from .openboxes import Boxes, OpenBoxes
 from .proofwriter import ProofWriter
-from .standardform import StandardForm, standard_form
+from .standardform import StandardForm, is_in_home_mode, standard_form
 
 #: The gap asked for when none is given: a ten-thousandth.
 GAP = 1e-4
@@ -323,6 +323,8 @@ class _Search:
         else:
             status = CertificateStatus.PROVED if known else CertificateStatus.INFEASIBLE
         allowed, is_relative = self._allowed_gap()
+        own = self.incumbent.x
+        in_other_mode = not nlp.in_home_mode and own is not None and is_in_home_mode(nlp, own) is False
         return Certificate(
             status=status,
             nlp=nlp,
@@ -339,4 +341,5 @@ class _Search:
             seconds=seconds,
             reason=reason,
             history=tuple(self.history),
+            in_other_mode=in_other_mode,
         )

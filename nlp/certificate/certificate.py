@@ -50,6 +50,7 @@ class Certificate(Whole, Shown):
         seconds: wall time.
         reason: for stopping before every box was closed, or for refusing the claim; else empty.
         history: (seconds, bound, incumbent) during the search, finite numbers only.
+        in_other_mode: whether the incumbent is in another working mode than home's.
     """
 
     status: CertificateStatus
@@ -67,6 +68,7 @@ class Certificate(Whole, Shown):
     seconds: float
     reason: str
     history: tuple[tuple[float, float, float], ...]
+    in_other_mode: bool = False
 
     def __repr__(self) -> str:
         return f"<Certificate of {self.nlp.case.name!r}: {self.statement}>"
@@ -96,10 +98,15 @@ class Certificate(Whole, Shown):
     def statement(self) -> str:
         """The proven statement in one sentence, with its limits."""
         if self.status is CertificateStatus.INFEASIBLE:
-            return f"proved: no point of the box keeps all limits, {SCOPE}"
+            return f"proved: no point of the box keeps all limits{self._mode}, {SCOPE}"
         if self.status is CertificateStatus.REFUSED:
             return f"refused: {self.reason}"
         return self._bound_statement
+
+    @property
+    def _mode(self) -> str:
+        """The set that the statement is about, where it is a part of the box, as words at the end of a clause."""
+        return " in home's working mode" if self.nlp.in_home_mode else ""
 
     @property
     def _bound_statement(self) -> str:
@@ -108,9 +115,11 @@ class Certificate(Whole, Shown):
         value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_size else self.incumbent
         best = "" if math.isnan(value) else f"; the best point known has {value:.10g}"
         beaten = ", better than the one given" if self.was_beaten else ""
+        beaten += ", in another working mode than home's" if self.in_other_mode else ""
         if self.above is not None and self.status is CertificateStatus.PROVED:
             obvious = ", which says nothing useful: F is at least 0" if self.above < 0 else ""
-            return f"proved: F is above {self.above:.10g} on the whole box within the limits{obvious}{best}, {SCOPE}"
+            where = f"on the whole box within the limits{self._mode}"
+            return f"proved: F is above {self.above:.10g} {where}{obvious}{best}, {SCOPE}"
         if not math.isfinite(self.bound):
             return f"nothing is proved: {self.reason}{best}"
         if self.is_obvious:
@@ -120,7 +129,7 @@ class Certificate(Whole, Shown):
         # A lower bound may be rounded down to 0, an upper one may not.
         is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_size
         bound = 0.0 if is_noise else self.bound + 0.0
-        what = f"no point of the box within the limits has F {word} than {bound:.10g}{best}{beaten}"
+        what = f"no point of the box within the limits{self._mode} has F {word} than {bound:.10g}{best}{beaten}"
         if self.status is CertificateStatus.PROVED:
             return f"proved: {what}, {SCOPE}"
         return f"incomplete ({self.reason}), but proved: {what}, {SCOPE}"

@@ -107,6 +107,8 @@ class Incumbent:
         The program has independent loop equations only, which other ways to assemble the joints fulfil too.
         """
         nlp, whole = self._form.nlp, self._with_level(point, value)
+        if not self._form.keeps_signs(point):
+            return math.inf
         violation = linearise(nlp, whole).violation
         return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf
 

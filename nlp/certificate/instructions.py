@@ -251,6 +251,12 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
         writer.write(Op.SQUARE, other, b)
         writer.write(Op.ADD, one, one, other)
         writer.write(Op.SQRT, to, one)
+    elif op == ca.OP_FABS:
+        _write_size(writer, to, a)
+    elif op == ca.OP_SIGN:
+        # x / |x|, off 0: the derivative of |x|.
+        _write_size(writer, one, a)
+        writer.write(Op.DIV, to, a, one)
     elif op in (ca.OP_ASIN, ca.OP_ACOS):
         # asin y = atan(y / sqrt(1 - y^2)), acos y = pi/2 - asin y, for |y| < 1.
         writer.write(Op.SQUARE, one, a)
@@ -277,6 +283,13 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
         _write_power(writer, to, a, writer.constant[b])
     else:
         raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
+
+
+def _write_size(writer: _TapeWriter, to: int, a: int) -> None:
+    """Write ``|x|`` as the root of ``x^2``, as the length of a vector with one component is."""
+    square = writer.temporary()
+    writer.write(Op.SQUARE, square, a)
+    writer.write(Op.SQRT, to, square)
 
 
 def _add_half_pi(writer: _TapeWriter, to: int) -> None:

@@ -63,6 +63,7 @@ class Statement:
         task: index of the task.
         minimise: whether the task's sense is set to a minimum, to prove that F is above a value.
         weights, best, ceiling: numbers of the combined program.
+        in_home_mode: whether it is about home's working mode alone.
     """
 
     kind: Literal["task", "weighted-sum", "worst-case"] = "task"
@@ -71,6 +72,7 @@ class Statement:
     weights: tuple[float, ...] = ()
     best: tuple[float, ...] = ()
     ceiling: float = 0.0
+    in_home_mode: bool = False
 
 
 @dataclass(frozen=True)

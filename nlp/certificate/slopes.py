@@ -250,6 +250,10 @@ class _Boxes:
     def hypot(self, y: Slope, x: Slope) -> Slope:
         return self.sqrt(self.add(self.square(y), self.square(x)))
 
+    def size(self, u: Slope) -> Slope:
+        """Return ``|u|``, as the root of the square."""
+        return self.sqrt(self.square(u))
+
     def sin(self, u: Slope) -> Slope:
         return self.smooth(u, lambda x: _wave(x, np.sin), lambda x: _wave(x, np.cos))
 
@@ -267,6 +271,8 @@ _UNARY: dict[int, Callable[[_Boxes, Slope], Slope]] = {
     ca.OP_TWICE: lambda at, u: at.scale(u, 2.0),
     ca.OP_SQ: _Boxes.square,
     ca.OP_SQRT: _Boxes.sqrt,
+    ca.OP_FABS: _Boxes.size,
+    ca.OP_SIGN: lambda at, u: at.div(u, at.size(u)),
     ca.OP_INV: lambda at, u: at.div(at.one(), u),
     ca.OP_SIN: _Boxes.sin,
     ca.OP_COS: _Boxes.cos,

@@ -10,7 +10,7 @@ variable. The program's arguments are put in as doubles, and a proof is about th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -43,8 +43,9 @@ class StandardForm:
         x: (n,) symbols.
         lower, upper: (n,) ends of the box.
         functions: ``phi_j``, the least of which is maximised.
-        conditions: ``h_k``; numbered after the functions where both are counted.
+        conditions: ``h_k``, with ``signs`` at the end; numbered after the functions where both are counted.
         sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
+        signs: conditions of a robot's assembly, which are no constraints of the program.
         has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
     """
 
@@ -54,6 +55,7 @@ class StandardForm:
     upper: FloatArray
     functions: tuple[SX, ...]
     conditions: tuple[Condition, ...]
+    signs: tuple[Condition, ...]
     sign: float
     has_epigraph: bool
 
@@ -91,6 +93,14 @@ class StandardForm:
     def value_at(self, x: FloatArray) -> float:
         """Return the value that is maximised at a point (n,), as computed in doubles."""
         return float(np.min(np.array(self._functions_at(x))))
+
+    def keeps_signs(self, x: FloatArray) -> bool:
+        """Return whether the conditions of the assembly hold at a point (n,), as computed in doubles."""
+        return not self.signs or bool(np.all(np.array(self._signs_at(x)) <= 0))
+
+    @cached_property
+    def _signs_at(self) -> ca.Function:
+        return ca.Function("signs", [self.x], [ca.densify(ca.vertcat(*[each.expression for each in self.signs]))])
 
     @cached_property
     def _functions_at(self) -> ca.Function:
@@ -130,30 +140,37 @@ def standard_form(nlp: Nlp) -> StandardForm:
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
     constraints += _further_loop_equations(program, x, nlp.arguments)
+    signs = _signs(nlp, x)
     return StandardForm(
         nlp=nlp,
         x=x[:count],
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        conditions=tuple(_conditions(constraints)),
+        conditions=(*_conditions(constraints), *signs),
+        signs=tuple(signs),
         sign=-nlp.sign,
         has_epigraph=epigraph is not None,
     )
 
 
 def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
-    """Return the loop equations of the robot that the program leaves out, with the bounds of a closed loop.
+    """Return the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop.
 
-    They follow from those of the program near its answer, but not in the whole box: there joints that are assembled in
-    no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
-    that an exact equation could hold nowhere.
+    The former follow from those of the program near its answer, but not in the whole box: there joints that are
+    assembled in no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding
+    error in them, so that an exact equation could hold nowhere.
     """
     names = {constraint.name for constraint in program.constraints}
     further: dict[str, SX] = {}
     for k, robot in enumerate(program.robots):
         where = f" pose {k + 1}" if len(program.robots) > 1 else ""
-        for equation, expression in zip(program.model.closure, ca.vertsplit(robot.closure), strict=True):
+        model = program.model
+        pairs = (
+            *zip(model.closure, ca.vertsplit(robot.closure), strict=True),
+            *zip(model.distances, ca.vertsplit(robot.distances), strict=True),
+        )
+        for equation, expression in pairs:
             if f"{equation.name}{where}" not in names:
                 further[f"{equation.name}{where}"] = expression
     if not further:
@@ -163,6 +180,37 @@ def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> l
     return [
         _BoundedExpression(name, each, -CLOSED, CLOSED)
         for name, each in zip(further, values, strict=True)
+        if any(ca.which_depends(each, x, 1, True))
+    ]
+
+
+def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
+    """Return whether a robot is in home's working mode at a point (n,); None where it has no sign of a mode."""
+    if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
+        return None
+    form = standard_form(replace(nlp, in_home_mode=True))
+    return form.keeps_signs(x[: form.n])
+
+
+def _signs(nlp: Nlp, x: SX) -> list[Condition]:
+    """Return the conditions of a robot's assembly: where its joints do not hold together it is no robot.
+
+    Those of home's working mode count where the program says so.
+    """
+    program = nlp.program
+    found: dict[str, SX] = {}
+    for k, robot in enumerate(program.robots):
+        where = f" pose {k + 1}" if len(program.robots) > 1 else ""
+        for each, value in zip(program.model.signs, ca.vertsplit(robot.signs), strict=True):
+            if nlp.in_home_mode or not each.is_mode:
+                found[f"{each.name}{where}"] = -value
+    if not found:
+        return []
+    function = ca.Function("signs", [program.x, program.p], list(found.values()))
+    values = function.call([x, SX(ca.DM(nlp.arguments))])
+    return [
+        Condition(name, each, is_equation=False)
+        for name, each in zip(found, values, strict=True)
         if any(ca.which_depends(each, x, 1, True))
     ]
 

@@ -34,6 +34,10 @@ def certify(
             help="Starting points for the incumbent instead of the case's.",
         ),
     ] = None,
+    all_assemblies: Annotated[
+        bool,
+        typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
+    ] = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
 ) -> None:
@@ -42,7 +46,9 @@ def certify(
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..output.files import check_outputs, write_text
+    from ..output.terminal import show
     from ..results.certified import certified_of
+    from ..results.unknownwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 
@@ -53,8 +59,17 @@ def certify(
             raise InputError("standard output can take one of --json - and --proof - only")
         loaded, text, inputs = read_case(case, read_settings(settings))
         check_outputs(inputs, {"--json": json_file, "--proof": proof})
+        if "-" not in (json_file, proof):
+            show(console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
         certified = certify_with_progress(
-            loaded, gap=gap, above=above, time_limit=time, jobs=jobs, starts=starts, with_proof=proof is not None
+            loaded,
+            gap=gap,
+            above=above,
+            time_limit=time,
+            jobs=jobs,
+            starts=starts,
+            all_assemblies=all_assemblies,
+            with_proof=proof is not None,
         )
     except OptionError as error:
         raise InputError(f"--{error}") from None
@@ -64,7 +79,6 @@ def certify(
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):
-        from ..output.terminal import show
         from ..results.summary import certified_summary
 
         show(console(), certified_summary(loaded, result))

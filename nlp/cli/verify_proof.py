@@ -41,5 +41,6 @@ def verify_proof(
     what = "there is no feasible point"
     if given.bound is not None:
         what = f"F is at most {given.bound:.10g}" if nlp.sign < 0 else f"F is at least {-given.bound:.10g}"
-    typer.echo(f"holds: {what} within the limits of {one_line(loaded.name)}")
+    where = " in home's working mode" if given.statement.in_home_mode else ""
+    typer.echo(f"holds: {what} within the limits of {one_line(loaded.name)}{where}")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")

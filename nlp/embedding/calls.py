@@ -75,9 +75,15 @@ class Calls:
 
 @dataclass(frozen=True)
 class RobotValues:
-    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form."""
+    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form.
+
+    Attributes:
+        model: the robot.
+        reference: as for :class:`~screwsynth.models.instance.Substitution`.
+    """
 
     model: Model
+    reference: tuple[float, ...]
 
     def __call__(self, inputs: SX) -> SX:
         """Return :func:`robot_values` of a robot from its inputs (k, 1)."""
@@ -89,8 +95,10 @@ class RobotValues:
         for each in Substitution.identity(self.model).all:
             parts.append(ca.reshape(inputs[at : at + each.numel()], each.shape))
             at += each.numel()
+        parameters, unknowns, rotation, position = parts
+        own = Substitution(parameters, unknowns, rotation, position, self.reference)
         twists = [inputs[j : j + 6] for j in range(at + 1, inputs.numel(), 6)]
-        return instantiate(self.model, Substitution(*parts), inputs[at], twists)
+        return instantiate(self.model, own, inputs[at], twists)
 
 
 def robot_values(robot: RobotInstance) -> SX:
@@ -162,7 +170,7 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
             values = robot_values(robot)
             if matrices:
                 values[values.numel() - matrices[k].numel() :] = matrices[k]
-            calls.append(InnerCall(Call(Form(RobotValues(program.model)), robot.inputs), values))
+            calls.append(InnerCall(Call(Form(RobotValues(program.model, robot.reference)), robot.inputs), values))
     return tuple(calls)
 
 

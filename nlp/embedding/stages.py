@@ -134,7 +134,7 @@ def _robot_expressions(program: Program) -> _RobotExpressions:
     """Return the robot's expressions: of the program's symbols, or with several poses of symbols of one pose."""
     robot, inputs = program.robot, SX.sym("inputs", program.robot.inputs.numel())
     if len(program.robots) > 1:
-        robot = RobotValues(program.model).robot(inputs)
+        robot = RobotValues(program.model, program.robot.reference).robot(inputs)
     base = ca.horzcat(SX(3, 0), *[leg.base for leg in robot.legs])
     platform = ca.horzcat(SX(3, 0), *[leg.base + leg.span for leg in robot.legs])
     lengths = ca.vertcat(SX(0, 1), *[ca.norm_2(leg.span) for leg in robot.legs])

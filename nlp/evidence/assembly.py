@@ -100,7 +100,7 @@ def assembly_at(model: Model, parameters: FloatArray, pose: FloatArray, unknowns
     if found is None:
         return Assembly(is_home=False, nearness=0.0)
     angles = np.array([item.dimension is Dimension.ANGLE for item in model.unknowns])
-    apart = np.abs(found - unknowns)
+    apart = np.abs(found - unknowns) / _sizes_of_unknowns(model, parameters)
     apart[angles] = np.abs(np.remainder(apart[angles] + np.pi, 2 * np.pi) - np.pi)
     return Assembly(is_home=bool(apart.max(initial=0.0) <= _SAME), nearness=nearness)
 
@@ -139,11 +139,13 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
         at, done = closed, part
         step = 2 * step if change < _LARGE / 4 else step
         nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
-    return at[6:], nearness
+    return at[6:] * _sizes_of_unknowns(model, parameters), nearness
 
 
 class _Path:
     """Loop equations of a robot and their derivatives, by rotation vector, position and unknowns in one vector.
+
+    Unknowns are in parts of their sizes.
 
     Args:
         model: the robot.
@@ -158,8 +160,11 @@ class _Path:
         # A rotation vector of zero has no direction: half a unit of rounding gives it one.
         angle = ca.sqrt(ca.sumsqr(z[:3]) + np.finfo(float).tiny)
         rotation = matrix_from_axis_angle(z[:3] / angle, angle)
-        equations = ca.vertcat(*[each.expression for each in model.closure])
-        (residual,) = ca.Function("closure", own.all, [equations]).call([own.parameters, z[6:], rotation, z[3:6]])
+        equations = ca.vertcat(*[each.scaled for each in model.closure])
+        sizes = ca.vertcat(*[item.size for item in model.unknowns])
+        (residual,) = ca.Function("closure", own.all, [equations]).call(
+            [own.parameters, z[6:] * sizes, rotation, z[3:6]]
+        )
         # About home, lengths of the robot's own size make the singular values those of equations of order 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
         self._function = ca.Function("path", [z, own.parameters], outputs)
@@ -192,6 +197,13 @@ class _Path:
             z = z.copy()
             z[first:] += scale * step
         return None
+
+
+def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:
+    """Return the sizes (u,) of a robot's unknowns with its parameters (k,)."""
+    sizes = ca.vertcat(SX(0, 1), *[item.size for item in model.unknowns])
+    function = ca.Function("sizes", [Substitution.identity(model).parameters], [ca.densify(sizes)])
+    return np.asarray(function(parameters).full().ravel(), dtype=np.float64)
 
 
 def _size(model: Model) -> float:

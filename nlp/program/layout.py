@@ -29,6 +29,7 @@ from casadi import SX
 from ...models import (
     Dimension,
     Displacement,
+    Model,
     Parameter,
     RobotInstance,
     Substitution,
@@ -36,6 +37,7 @@ from ...models import (
     matrix_from_axis_angle,
     matrix_from_quaternion_vector,
 )
+from ...models.instance import sizes_at
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, squared
 from ..case.limits.pairs import PairFamily
@@ -128,8 +130,10 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         for item in model.parameters
     ]
     stated = [_add_pose(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
+    reference = _reference(case)
+    ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
-        [table.add(f"{at}{item.name}", item.dimension, Free(item.lower, item.upper)) for item in model.unknowns]
+        [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
         for at in _unknown_prefixes(case)
     ]
     length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
@@ -151,7 +155,7 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
     poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.displacements]
     for k, (rotation, position) in enumerate(poses):
         own_unknowns = ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]])
-        substitution = Substitution(values, own_unknowns, rotation, position)
+        substitution = Substitution(values, own_unknowns, rotation, position, reference)
         robot = instantiate(model, substitution, length, [twist.symbols for twist in twists])
         robots.append(robot)
         where = f" pose {k + 1}" if len(poses) > 1 else ""
@@ -188,6 +192,23 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         ),
     )
     return Layout(case, table, places, tuple(robots), (*constraints, *limits.varying), limits.constant, limits.families)
+
+
+def _reference(case: Case) -> tuple[float, ...]:
+    """Return the middle of the range of each component of the parameters, at which sizes of equations are taken.
+
+    The numbers are lengths of the case, so that its equations do not depend on its unit of length.
+    """
+    values = [value for item in case.model.parameters for value in case.components(item.name)]
+    return tuple((each.lower + each.upper) / 2 if isinstance(each, Free) else float(each) for each in values)
+
+
+def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free]:
+    """Return the range of each of a model's unknowns at values of the parameters."""
+    sizes = sizes_at(model, model.unknowns, reference, SX.ones(len(model.unknowns)))
+    values = [float(size) for size in ca.vertsplit(sizes)] if model.unknowns else []
+    pairs = zip(model.unknowns, values, strict=True)
+    return [Free(size * item.lower, size * item.upper) for item, size in pairs]
 
 
 def _unknown_prefixes(case: Case) -> list[str]:

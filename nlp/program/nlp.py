@@ -106,6 +106,7 @@ class Nlp(Whole):
             :mod:`.pairs`.
         pairs: family, first and second index of these pairs; their constraints are the program's last.
         pair_count: number of constraints that these pairs have.
+        in_home_mode: whether a search of the whole box keeps to home's working mode of a robot given joint by joint.
         size: positive size of the objective, where the objective does not consist of the robot's F.
     """
 
@@ -122,6 +123,7 @@ class Nlp(Whole):
     families: tuple[PairFamily, ...] = ()
     pairs: tuple[PairPlace, ...] = ()
     pair_count: int = 0
+    in_home_mode: bool = False
     size: float | None = None
 
     def __repr__(self) -> str:

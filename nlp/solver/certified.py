@@ -14,7 +14,7 @@ from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
 from ..certificate.certificate import Certificate, CertificateStatus
 from ..certificate.proof import Proof, Statement, fingerprint
 from ..certificate.proofwriter import ProofWriter
-from ..certificate.standardform import standard_form
+from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
 from ..program.epigraph import formulate_worst
 from ..program.formulation import formulate, formulate_each, formulate_weighted
@@ -101,6 +101,7 @@ def certify(
     jobs: int | None = None,
     starts: int | None = None,
     seed: int | None = None,
+    all_assemblies: bool = False,
     with_proof: bool = False,
     progress: Callable[[str], CertifyProgress] | None = None,
 ) -> Certified:
@@ -114,6 +115,8 @@ def certify(
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
+        all_assemblies: cover all working modes of a robot given joint by joint, in the place of home's, where a solve
+            begins. All are covered too where the solution is in another mode.
         with_proof: keep the proof of the case's one task, or of its combined program, for :func:`proof_of`.
         progress: returns, for the name of a program, the function that is called from time to time during its search.
 
@@ -130,15 +133,17 @@ def certify(
     if several and with_proof and case.method is Method.AVERAGE:
         raise OptionError("proof: a case whose tasks are averaged has no one program to prove something of")
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
+    has_modes = not all_assemblies and any(each.is_mode for each in case.model.signs)
     if given is None and nlps[0].n:
         # An operation without a rule is refused before a solve.
-        search_tape(standard_form(nlps[0]))
+        search_tape(standard_form(replace(nlps[0], in_home_mode=has_modes)))
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None) -> Certificate:
         x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
+        in_home_mode = has_modes and (x is None or is_in_home_mode(own.nlp, x) is True)
         return certify_program(
-            own.nlp,
+            replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
             x,
             claimed=claimed,
             gap=options.gap,
@@ -158,6 +163,7 @@ def certify(
         if certificate.was_beaten and certificate.x is not None:
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
         solution = solution_of_one_task(case, own)
+        statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or solve_programs(case, nlps, search, jobs=jobs)
     alone = tuple(certify_one(outcome.own, outcome.task.name, None) for outcome in solution.outcomes)
@@ -167,6 +173,7 @@ def certify(
     writer = _proof_writer(combined.nlp) if with_proof else None
     certificate = certify_one(combined, case.method.value, writer)
     statement = _combined_statement(solution.combination, combined)
+    statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
 
 
@@ -176,6 +183,12 @@ def program_of(case: Case, statement: Statement) -> Nlp:
     Raises:
         InputError: the case has no such program.
     """
+    nlp = _stated_program(case, statement)
+    return replace(nlp, in_home_mode=True) if statement.in_home_mode else nlp
+
+
+def _stated_program(case: Case, statement: Statement) -> Nlp:
+    """Formulate the program of a case to which a proof belongs, for all working modes."""
     if statement.kind == "task":
         if not 0 <= statement.task < len(case.tasks):
             raise InputError(f"the proof is for task {statement.task + 1}, which the case does not have")

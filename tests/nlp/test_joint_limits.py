@@ -126,9 +126,7 @@ def forward(limb: list[dict[str, Any]], coordinates: list[Array]) -> list[Place]
 def unknowns_at(model: Model, platform: Place) -> Array:
     """Unknowns that close the loops with the platform at a place, from home."""
     own = Substitution.identity(model)
-    loops, closure = (
-        ca.vertcat(ca.SX(0, 1), *[each.expression for each in part]) for part in (model.loops, model.closure)
-    )
+    loops, closure = (ca.vertcat(ca.SX(0, 1), *[each.scaled for each in part]) for part in (model.loops, model.closure))
     slopes = ca.jacobian(closure, own.unknowns)
     function = ca.Function("loops", own.all, [ca.densify(each) for each in (closure, slopes, loops)])
     z = np.zeros(len(model.unknowns))

@@ -20,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from screwsynth.models import Model, hexapod, stewart_gough, three_upu
+from screwsynth.models import Model, hexapod, robot_function, stewart_gough, three_upu
 from screwsynth.nlp import (
     BaseJointAngle,
     Case,
@@ -342,8 +342,14 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
     for limit in (LegClearance(1.0), JointSpacing(1.0), BaseJointAngle(1.0)):
         with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
             Case(**common, tasks=[task], limits=Limits(limit))
-    with pytest.raises(CaseError, match=r"tolerance\.joint_centre"):
+    with pytest.raises(CaseError, match=r"tolerance\.joint_centre: is not computed for 'hexapod', whose joints"):
         Case(**common, tasks=[task], joint_centre_tolerance=0.1)
+    by_joints = robot_function("6-ups")()
+    values = {item.name: item.typical[0] for item in by_joints.parameters}
+    with pytest.raises(
+        CaseError, match=r"tolerance\.joint_centre: is not computed for '6-ups', which is given joint by"
+    ):
+        Case(by_joints, values, by_joints.home, [task], joint_centre_tolerance=0.1)
     for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
         limited = Case(**common, tasks=[task], limits=Limits(limit))
         solution = solved(limited)

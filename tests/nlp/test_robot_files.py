@@ -239,7 +239,7 @@ def test_a_robot_that_the_program_cannot_treat_is_refused() -> None:
     definition: dict[str, Any] = tomllib.loads(DELTA)
     passive = copy.deepcopy(definition)
     passive["limb"][0]["joints"][0]["actuated"] = False
-    with pytest.raises(ValueError, match=r"limb 1: has a passive joint before its branches"):
+    with pytest.raises(ValueError, match=r"limb 1, joint 1 \(R\): is passive and before the branches"):
         robot(**passive)
     floating = {
         "name": "floating",

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, FiniteFloat, StringConstraints, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
+from ....models.joints.words import NESTED_BRANCH
 from ...errors import CaseError
 from ..faults import case_error
 from ..table import Table, Vector
@@ -134,6 +135,8 @@ def _error(fault: ErrorDetails) -> CaseError:
         return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
     if fault["type"] in ("greater_than_equal", "less_than_equal") and location[-1] == "count":
         return CaseError(_place(location), f"must be a whole number from 1 to {_MOST_COPIES}", written.value)
+    if fault["type"] == "unknown_key" and location[-1] == "branch" and "branch" in location[:-1]:
+        return CaseError(_place(location), NESTED_BRANCH)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
     sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
     return CaseError(_place(location), sentence, written.value)

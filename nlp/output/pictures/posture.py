@@ -69,7 +69,7 @@ class Linkage:
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
-        closure = ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure])
+        closure = ca.vertcat(SX(0, 1), *[equation.scaled for equation in model.closure])
         slopes = ca.jacobian(closure, own.unknowns)
         self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 

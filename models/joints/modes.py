@@ -1,0 +1,93 @@
+"""Signs that tell the assemblies of a limb apart: those of joints that hold together, and of home's working mode.
+
+The equations of a closed loop also hold for some joints that do not hold together, such as a hinge whose axes point
+against each other. Of the positions of a limb's joints at which it does hold together, those of one *working mode* are
+connected without a singularity of the limb: an elbow bent to one side. A mode's sign is that of the determinant of the
+derivatives of the equations by the limb's unknowns, which is zero at such singularities alone:
+
+* one unknown, on which one equation of each path depends, such as that of a rod: the sum of the derivatives;
+* two unknowns of a limb that moves in a plane: the derivatives of the point at the cut, and the plane's normal;
+* three unknowns: the derivatives of the point at the cut.
+
+Other limbs have no sign here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+from casadi import SX
+
+from ..parts import AssemblySign, Unknown
+from .generic import INCIDENT
+from .motion import AxisKind
+from .opened import OpenedPath, PathFrame
+
+#: Part of its largest possible size below which a mode's sign at home is zero: home is singular. Rounding leaves 1e-16.
+_SINGULAR = 1e-6
+
+
+def joint_signs(limb: str, name: str, path: OpenedPath) -> list[AssemblySign]:
+    """Return the signs of a path's joints that its equations leave open, each 1 where the joints hold together."""
+    return [AssemblySign(f"sign {name} ({k + 1})", limb, 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
+
+
+def mode_signs(
+    limb: str, paths: Sequence[OpenedPath], unknowns: Sequence[Unknown], frame: PathFrame
+) -> list[AssemblySign]:
+    """Return the sign of home's working mode of a limb; none where it has no unknowns, or no sign here.
+
+    Args:
+        limb: name of the limb.
+        paths: its paths.
+        unknowns: its unknowns.
+        frame: values that all paths of the robot share.
+    """
+    count, symbols = len(unknowns), ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns])
+    if count == 1:
+        moved = [[each for each in path.equations if ca.depends_on(each.expression, symbols)] for path in paths]
+        if any(len(own) != 1 for own in moved):
+            return []
+        value = sum((ca.jacobian(own.expression, symbols) for (own,) in moved), SX(0))
+        largest = sum((own.size / unknowns[0].size for (own,) in moved), SX(0))
+    elif len(paths) == 1 and count in (2, 3) and paths[0].cut.type and paths[0].rod is None:
+        (path,) = paths
+        normal = _normal(path, frame) if count == 2 else SX(3, 0)
+        if normal is None:
+            return []
+        point = ca.vertcat(*[each.expression for each in path.equations[:3]])
+        columns = ca.horzcat(ca.jacobian(point, symbols), normal)
+        value = ca.det(columns)
+        largest = ca.norm_2(columns[:, 0]) * ca.norm_2(columns[:, 1]) * ca.norm_2(columns[:, 2])
+    else:
+        return []
+    at_home, most = (frame.value_at_home(each, symbols) for each in (value, largest))
+    if not abs(at_home) > _SINGULAR * most:
+        return []
+    return [AssemblySign(f"working mode {limb}", limb, value / at_home, is_mode=True)]
+
+
+def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:
+    """Return the current axis (3, 1) to which all motions of a path's unknowns are perpendicular; None without one.
+
+    The path moves in a plane where all its rotations have one direction, and its slides are across it.
+    """
+    cut = range(path.cut.first, path.cut.last + 1)
+    pairs = [
+        (axis, screw)
+        for j, (joint, own) in enumerate(zip(path.joints, path.screws, strict=True))
+        if j not in cut
+        for axis, screw in zip(joint.axes, own, strict=True)
+    ]
+    turning = [(axis, screw) for axis, screw in pairs if axis.kind is AxisKind.ROTATION]
+    if not turning or any(not axis.pitch.is_zero() for axis, _ in turning):
+        return None
+    across = [axis for axis, _ in pairs if axis.kind is AxisKind.TRANSLATION]
+    if len(turning) + len(across) < len(pairs):
+        return None
+    first = turning[0][0].axis
+    values = [ca.norm_2(ca.cross(first, axis.axis)) for axis, _ in turning[1:]]
+    values += [ca.dot(first, axis.axis) for axis in across]
+    is_flat = all(abs(each) <= INCIDENT for value in values for each in frame.sampled(value))
+    return turning[0][1][:3] if is_flat else None

@@ -1,0 +1,217 @@
+"""Working modes: the signs that tell them apart, and certificates that keep to home's or cover them all."""
+
+import json
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from screwsynth.models import robot, robot_function
+from screwsynth.models.catalog import gallery_names
+from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, case_from_tables, certify, formulate, solve
+from screwsynth.nlp.certificate.certificate import CertificateStatus
+from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.standardform import is_in_home_mode, standard_form
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.solver.certified import proof_of
+
+Run = Callable[..., tuple[int, str, str]]
+
+DELTA = """
+title = "Delta"
+[units]
+length = "m"
+[robot]
+model = "delta"
+[robot.parameters]
+rb = { min = 0.12, max = 0.2 }
+rp = 0.044
+arm = { min = 0.4, max = 0.6 }
+rod = 1.244
+w = 0.131
+tilt = 20
+[pose]
+position = [0, 0, -1.1]
+[[task]]
+name = "vertical"
+sense = "max"
+axis = [0, 1, 2]
+pitch = inf
+[solve]
+starts = 2
+"""
+
+
+def delta() -> Case:
+    """A Delta at a fixed pose; its arms can bend either way."""
+    return case_from_tables(tomllib.loads(DELTA), name="delta", source="delta")
+
+
+def free_pose(name: str, part: float) -> Case:
+    """A robot of the gallery with the pose free about home, by a part of its size."""
+    model = robot_function(name)()
+    size = float(np.linalg.norm(model.home)) or 1.0
+    position = [Free(value - part * size, value + part * size) for value in model.home]
+    parameters = {item.name: item.typical[0] for item in model.parameters}
+    task = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
+    return Case(model, parameters, position, [task], Rotation(None, Free(-part, part)))
+
+
+def moved(nlp: Nlp) -> list[int]:
+    """Indices of the pose's numbers."""
+    (unknowns,) = nlp.program.places.unknowns
+    return [index for index in range(nlp.n) if index not in unknowns]
+
+
+def in_another_mode(nlp: Nlp, limb: int) -> np.ndarray:
+    """A closed point at home's pose with one limb's only unknown at its other solution."""
+    x, (own,) = closed_start(nlp), nlp.program.places.unknowns
+    for angle in np.linspace(0.3, 3.0, 10):
+        for sign in (1, -1):
+            other = x.copy()
+            other[own[limb]] += sign * angle
+            other = close_equations(nlp, other)
+            if loops_are_closed(nlp, other) and np.abs(other - x)[list(own)].max() > 0.1:
+                return other
+    raise AssertionError("the limb has no other mode")
+
+
+FEW = ("3-rrs", "6-pus", "planar-3-rrr", "spherical-3-rrr")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [FEW, pytest.param([each for each in gallery_names() if each not in FEW], marks=pytest.mark.slow)],
+    ids=["few", "others"],
+)
+def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tuple[str, ...]) -> None:
+    for name in names:
+        nlp = replace(formulate(free_pose(name, 0.05)), in_home_mode=True)
+        model = nlp.program.model
+        assert len({each.name for each in model.signs}) == len(model.signs)
+        if not model.unknowns:
+            assert model.signs == ()
+            continue
+        start = closed_start(nlp)
+        assert loops_are_closed(nlp, start), name
+        assert standard_form(nlp).keeps_signs(start), name
+        distances = ca.Function("distances", [nlp.program.x, nlp.program.p], [nlp.program.robots[0].distances])
+        away = close_equations(nlp, start + 0.3 * nlp.scale * np.isin(np.arange(nlp.n), moved(nlp)))
+        assert loops_are_closed(nlp, away), name
+        found = np.array([distances(x, nlp.arguments).full().ravel() for x in (start, away, away + 0.1)])
+        assert np.abs(found[:2]).max(initial=0.0) < 1e-9, name
+        assert np.abs(found[2]).min(initial=1.0) > 1e-6, name  # where the loops are open
+        if name in ("6-rus", "6-pus", "6-rss"):
+            assert is_in_home_mode(nlp, in_another_mode(nlp, 2)) is False
+
+
+def test_a_hinge_whose_axes_point_against_each_other_is_no_assembly() -> None:
+    nlp = formulate(free_pose("planar-3-rrr", 0.05))
+    form = standard_form(nlp)  # for all modes
+    assert len(form.signs) == 3
+    x = closed_start(nlp)
+    assert form.keeps_signs(x)
+    turned = x.copy()
+    turned[list(nlp.program.places.rotations[0].q)] = [0.0, 1.0 - 1e-9, 0.0]  # type: ignore[union-attr]
+    assert not form.keeps_signs(turned)
+
+
+def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
+    case = delta()
+    solution = solve(case)
+    own = certify(solution, with_proof=True)
+    assert own.certificate is not None
+    assert own.certificate.status is CertificateStatus.PROVED
+    assert not own.certificate.was_beaten
+    assert own.certificate.bound == pytest.approx(solution.F, rel=1.1e-4)
+    assert "in home's working mode has F larger than" in own.certificate.statement
+    every = certify(solution, all_assemblies=True)
+    assert every.certificate is not None
+    assert every.certificate.status is CertificateStatus.PROVED
+    assert every.certificate.incumbent > 1.1 * solution.F
+    assert "better than the one given, in another working mode than home's" in every.certificate.statement
+    # A solution in another mode is no incumbent of home's: all modes are covered.
+    (outcome,) = solution.outcomes
+    elsewhere = replace(outcome.own, x=every.certificate.x)
+    again = certify(replace(solution, outcomes=(replace(outcome, own=elsewhere),)))
+    assert again.certificate is not None
+    assert not again.certificate.nlp.in_home_mode
+    assert not again.statement.in_home_mode
+    # The proof is about home's mode alone, and fails for all modes.
+    proof = proof_of(own, DELTA)
+    assert proof.statement.in_home_mode
+    nlp = own.certificate.nlp
+    assert check_proof(proof, nlp).leaves > 10
+    with pytest.raises(Exception, match=r".+"):
+        check_proof(proof, replace(nlp, in_home_mode=False))
+
+
+def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -> None:
+    path, proof = tmp_path / "delta.toml", tmp_path / "proof.json"
+    path.write_text(DELTA, encoding="utf-8")
+    status, out, err = cli("certify", str(path), "--proof", str(proof))
+    assert (status, err) == (0, "")
+    words = "limbs 1, 2, 3 need 1 joint position each and the loop equations, in"
+    assert " ".join(out.split()).startswith(f"unknowns {words} home's working mode Delta certificate proved")
+    status, out, err = cli("verify-proof", str(proof))
+    assert (status, err) == (0, "")
+    assert "within the limits of delta in home's working mode" in out
+    status, out, err = cli("certify", str(path), "--all-assemblies", "--json", "-")
+    assert (status, err) == (0, "")
+    assert json.loads(out)["certificate"]["status"] == "proved"
+    status, out, _ = cli("certify", str(path), "--all-assemblies", "--time", "1e-9")
+    assert status == 1
+    assert " ".join(out.split()).startswith(f"unknowns {words} every assembly Delta")
+    assert "unknowns" not in cli("certify", "paper-4.2-rotation", "--starts", "1")[1]
+
+
+@pytest.mark.parametrize(("name", "proved"), [("3-rps", 10), ("6-pus", 50), ("tricept", 10), ("exechon", 10)])
+def test_robots_at_home_are_proved_in_a_few_boxes(name: str, proved: int) -> None:
+    model = robot_function(name)()
+    parameters: dict[str, float | Free] = {item.name: item.typical[0] for item in model.parameters}
+    for key in list(parameters)[:2]:
+        parameters[key] = Free(0.95 * float(parameters[key]), 1.05 * float(parameters[key]))  # type: ignore[arg-type]
+    task = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]), "max")  # type: ignore[arg-type]
+    found = certify(Case(model, parameters, model.home, [task]), starts=2, time_limit=20).certificate
+    assert found is not None
+    assert found.status is CertificateStatus.PROVED
+    assert found.boxes <= proved
+
+
+def scaled(name: str, factor: float) -> Case:
+    """A robot of the gallery in another unit of length, with a dimension and the pose free."""
+    tables = tomllib.loads((Path(__file__).parents[2] / f"models/robots/{name}.toml").read_text(encoding="utf-8"))
+    for item in tables["dimensions"].values():
+        item["typical"] *= factor if item.get("kind", "length") == "length" else 1
+    model = robot(**tables)
+    size = float(np.linalg.norm(model.home))
+    parameters: dict[str, float | Free] = {item.name: item.typical[0] for item in model.parameters}
+    parameters["rb"] = Free(0.8 * model.parameters[0].typical[0], 1.2 * model.parameters[0].typical[0])
+    position = [Free(value - 0.1 * size, value + 0.1 * size) for value in model.home]
+    twist = np.array([0.3, -0.5, 0.7, 0.4 * factor, 0.6 * factor, -0.2 * factor])
+    return Case(
+        model,
+        parameters,
+        position,
+        [Task(twist, "max")],
+        Rotation(None, Free(-0.2, 0.2)),
+        characteristic_length=0.7 * factor,
+    )  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["3-rps", "6-pus", "tricept"])
+def test_loops_do_not_depend_on_the_unit_of_length(name: str) -> None:
+    metres, millimetres = (formulate(scaled(name, factor)) for factor in (1.0, 1000.0))
+    here, there = (nlp.evaluate(nlp.start + 0.1 * nlp.scale) for nlp in (metres, millimetres))
+    np.testing.assert_allclose(there.g, here.g, rtol=1e-9, atol=1e-12)
+    assert np.abs(here.g).max() > 1e-3
+    found = [solve(scaled(name, factor), starts=2, seed=1) for factor in (1.0, 1000.0)]
+    assert pytest.approx(1e6 * found[0].F, rel=1e-9) == found[1].F
+    iterations = [[start.iterations for start in each.outcomes[0].own.starts] for each in found]
+    assert iterations[0] == iterations[1]
