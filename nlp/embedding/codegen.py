@@ -33,9 +33,11 @@ from .ctext import comment_text, identifier, integer_table, matrix_table, number
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
+from .measured import header_texts
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words
+from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Endings of the files whose names begin with the case's prefix, and their templates.
@@ -62,9 +64,6 @@ _OTHERS = (
 )
 #: Number of starting points in the solver's table.
 _SEEDS = 16
-#: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
-_ITERATIONS = 100
-_TRIALS = 30
 #: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
@@ -197,9 +196,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        "iterations": str(_ITERATIONS),
-        "trials": str(_TRIALS),
-        "most_iterations": str((_SEEDS + 1) * _ITERATIONS),
+        **worst_case_texts(n, c, _SEEDS + 1),
+        **header_texts(),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
