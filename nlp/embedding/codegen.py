@@ -165,7 +165,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c, multipliers, numbers at a point. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 19 * n + 14 * c + 3 * c * n + 1
+    solver_work = work + 5 * n**2 + 19 * n + 15 * c + 3 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,

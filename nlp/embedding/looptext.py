@@ -78,7 +78,9 @@ def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
     first = slots + len(_columns(staged).columns) + k + q + r + _most_slopes(staged) + plain * (1 + n)
     second = slots + plain + loops.entries.numel() + _most_second(staged) + n + n * n + n
     of_j = 6 * rows
-    return first + second + (3 * of_j + 2 * of_j * n + n * n if loops.spectra else 0)
+    # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
+    spectrum = 10 * n * n + 115 * n + 1080 + of_j
+    return first + second + (3 * of_j + 2 * of_j * n + n * n + spectrum if loops.spectra else 0)
 
 
 class _Columns(NamedTuple):
