@@ -106,8 +106,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
-    functions = staged.all if limits.function is None else (*staged.all, limits.function)
-    casadi = _casadi_files(functions, f"{prefix}_CASADI")
+    casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
     return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
 
@@ -180,6 +179,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "m": str(rows),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
+        "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
         "ninputs": str(inputs),

@@ -17,7 +17,7 @@ from .runtimelimits import RunTimeLimit
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
 #: Version of the manifest's keys and of the functions for many problems; another one is refused.
-FORMAT = 1
+FORMAT = 2
 #: A status in the header: its name, and a comment that says what it means.
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 

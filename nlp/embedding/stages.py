@@ -80,8 +80,9 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     * ``magnitude``: size of the objective without cancellation.
 
     Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
-    the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a multiplier for each entry at the end. A Hessian of
-    very many operations is returned as its product with a direction, which is one more input then.
+    the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a
+    multiplier for each entry at the end. A Hessian of very many operations is returned as its product with a direction,
+    which is one more input then.
 
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 

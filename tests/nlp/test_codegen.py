@@ -161,3 +161,29 @@ def test_cmake_builds_it_too(tmp_path: Path) -> None:
         done = subprocess.run([cmake, *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
     assert subprocess.run([str(build / "selftest")], check=False, capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("version", "accepted"),
+    [("0.4.2", {"0.4", "0.4.1"}), ("1.3.0", {"1.0", "1.3"}), ("2.0.1", {"2.0", "2"})],
+)
+def test_versions_are_compatible_as_semantic_versioning_says(
+    version: str, accepted: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cmake = shutil.which("cmake")
+    if cmake is None or not COMPILERS:
+        pytest.skip("cmake or a C compiler is not installed")
+    monkeypatch.setattr("screwsynth.nlp.embedding.codegen.__version__", version)
+    where, name = folder("paper-4.2-translation", tmp_path / "c"), identifier("paper-4.2-translation")
+    words = [cmake, "-S", str(where), "-B", "build", "-DCMAKE_C_COMPILER_WORKS=1"]
+    subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+    asked = ["0.3", "0.4", "0.4.1", "0.5", "1.0", "1.3", "1.4", "2", "2.0", "2.1", "3.0"]
+    lines = []
+    for each in asked:
+        major, minor = [*each.split("."), "0"][:2]
+        lines += [f"set(PACKAGE_FIND_VERSION {each})", f"set(PACKAGE_FIND_VERSION_MAJOR {major})"]
+        lines += [f"set(PACKAGE_FIND_VERSION_MINOR {minor})", f"include(build/{name}-config-version.cmake)"]
+        lines += [f'if(PACKAGE_VERSION_COMPATIBLE)\n  message(STATUS "accepts {each} ")\nendif()']
+    (tmp_path / "ask.cmake").write_text("set(CMAKE_SIZEOF_VOID_P 8)\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    done = subprocess.run([cmake, "-P", "ask.cmake"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert set(re.findall(r"accepts (\S+)", done.stdout)) == accepted
