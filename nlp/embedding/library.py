@@ -124,7 +124,7 @@ class CompiledCase:
     @property
     def status_texts(self) -> tuple[str, ...]:
         """Sentences of the statuses by code, without a full stop, as the C has them."""
-        text = self._function("status_text")
+        text: Any = self._function("status_text")
         text.restype = ctypes.c_char_p
         return tuple(text(code).decode("ascii") for code in range(len(self.statuses)))
 
@@ -308,7 +308,7 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
         InputError: the folder is none of generated C or of another version, or there is no working C compiler.
     """
     manifest = read_manifest(Path(folder))
-    path = shared_library(manifest.files | budget_files(manifest.prefix))
+    path = shared_library({**manifest.files, **budget_files(manifest.prefix)})
     try:
         return CompiledCase(manifest, ctypes.CDLL(str(path)))
     except (OSError, AttributeError) as error:
