@@ -3,8 +3,7 @@
 Both versions are compiled first, two at a time. Then their programs run in turns, so that a busy machine burdens both.
 Instructions are counted by valgrind and do not depend on the load. Run by hand on a quiet machine:
 
-    git clone . /tmp/old && git -C /tmp/old checkout 347ab32
-    .venv/bin/python -P bench/generated_c.py --old /tmp/old
+    .venv/bin/python -P bench/generated_c.py --old CHECKOUT
 
 Without ``--old`` the table has this version alone, as it always has for several tasks or poses, which were another
 problem before. The old code of hexapod-machining takes two minutes to compile; for a Cortex-M7 it is left out unless
