@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -14,11 +15,15 @@ def codegen(
     case: CaseName,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
     settings: SettingTexts = None,
+    measure: Annotated[
+        bool, typer.Option("--measure/--no-measure", help="Compile it, and write flash and stack into it.")
+    ] = True,
     force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
 ) -> None:
     """Write F and its derivatives as C for embedding."""
     from ..case.reader import read_case
     from ..embedding.codegen import generate_c, size_words
+    from ..embedding.ctext import identifier
     from ..errors import one_line
     from ..output.files import check_folder, check_outputs, write_folder
 
@@ -29,5 +34,24 @@ def codegen(
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
     typer.echo(size_words(loaded, files))
+    if measure:
+        files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)
     typer.echo(f"{len(files)} files in {one_line(out)}: make -C {one_line(out)} test")
+
+
+def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
+    """Return the files with figures of flash and stack, which are printed; a terminal shows the progress."""
+    from ..embedding.measure import measure
+    from ..embedding.measured import figure_words, with_figures
+
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status("compiling to measure flash and stack; --no-measure leaves this out"):
+            figures = measure(files, prefix)
+    else:
+        figures = measure(files, prefix)
+    for each in figures:
+        typer.echo(figure_words(each))
+    return with_figures(files, prefix, figures)

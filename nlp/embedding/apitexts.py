@@ -32,5 +32,7 @@ def version_texts(version: str) -> dict[str, str]:
     """
     parts = [*(match.group() for match in re.finditer(r"\d+", version)), "0", "0", "0"]
     named = dict(zip(("version_major", "version_minor", "version_patch"), parts, strict=False))
+    # Semantic versioning: with the major version 0 a minor one may break what was, with a later one it may not.
+    named["compatibility"] = "SameMinorVersion" if int(parts[0]) == 0 else "SameMajorVersion"
     number = (int(parts[0]) * 1000 + int(parts[1])) * 1000 + int(parts[2])
     return {"version": version, "version_number": str(number)} | named

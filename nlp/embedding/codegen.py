@@ -33,9 +33,11 @@ from .ctext import comment_text, identifier, integer_table, matrix_table, number
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
+from .measured import header_texts
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words
+from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
 #: Endings of the files whose names begin with the case's prefix, and their templates.
@@ -62,9 +64,6 @@ _OTHERS = (
 )
 #: Number of starting points in the solver's table.
 _SEEDS = 16
-#: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
-_ITERATIONS = 100
-_TRIALS = 30
 #: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
@@ -107,8 +106,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
-    functions = staged.all if limits.function is None else (*staged.all, limits.function)
-    casadi = _casadi_files(functions, f"{prefix}_CASADI")
+    casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
     return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
 
@@ -166,7 +164,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c, multipliers, numbers at a point. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 19 * n + 14 * c + 3 * c * n + 1
+    solver_work = work + 5 * n**2 + 19 * n + 15 * c + 3 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,
@@ -181,6 +179,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "m": str(rows),
         "nc": str(c),
         "ntasks": str(len(case.tasks)),
+        "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
         "ninputs": str(inputs),
@@ -197,9 +196,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        "iterations": str(_ITERATIONS),
-        "trials": str(_TRIALS),
-        "most_iterations": str((_SEEDS + 1) * _ITERATIONS),
+        **worst_case_texts(n, c, _SEEDS + 1),
+        **header_texts(),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),

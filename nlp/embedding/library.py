@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from ...models import FloatArray
 from ..case.task import Sense
 from ..errors import InputError, listing, nearest
 from ..solver.compiled import shared_library
+from .arguments import checked_budget, checked_numbers, checked_rows, is_between
+from .budget import budget_files
 from .folder import CompiledLimit, CompiledNumber, Manifest, read_manifest
+from .structures import Batch, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -42,6 +45,13 @@ class CompiledSolutions(NamedTuple):
         runs: (n,) number of searches.
         converged: (n,) number of searches that ended at an optimum.
         iterations: (n,) number of iterations of all searches.
+        lower_multipliers: (n, variables) by how much F improves per unit by which a variable's lower bound alone is
+            moved outwards; 0 for an inactive one, and all where the point is no optimum.
+        upper_multipliers: (n, variables) likewise.
+        g_lower_multipliers: (n, constraints) likewise for lower bounds of constraints, in the constraint's own unit.
+        g_upper_multipliers: (n, constraints) likewise.
+        limit_multipliers: (n, limits) by how much F improves per unit by which a limit alone is loosened, in the order
+            of ``CompiledCase.limits``.
     """
 
     F: FloatArray
@@ -55,6 +65,11 @@ class CompiledSolutions(NamedTuple):
     runs: NDArray[np.intc]
     converged: NDArray[np.intc]
     iterations: NDArray[np.intc]
+    lower_multipliers: FloatArray
+    upper_multipliers: FloatArray
+    g_lower_multipliers: FloatArray
+    g_upper_multipliers: FloatArray
+    limit_multipliers: FloatArray
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -106,6 +121,18 @@ class CompiledCase:
         """Names of the statuses by code, such as ``OK`` for 0."""
         return self._manifest.statuses
 
+    @property
+    def status_texts(self) -> tuple[str, ...]:
+        """Sentences of the statuses by code, without a full stop, as the C has them."""
+        text: Any = self._function("status_text")
+        text.restype = ctypes.c_char_p
+        return tuple(text(code).decode("ascii") for code in range(len(self.statuses)))
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of the constraints, in the order of their multipliers."""
+        return self._manifest.constraints
+
     def solve(
         self,
         x0: ArrayLike | None = None,
@@ -117,6 +144,8 @@ class CompiledCase:
         sense: Sense | str | None = None,
         seeds: int | None = None,
         threads: int | None = None,
+        max_iterations: ArrayLike | None = None,
+        deadline_seconds: ArrayLike | None = None,
     ) -> CompiledSolutions:
         """Return the answers to n problems; n is the number of rows of the arrays that have rows.
 
@@ -129,6 +158,9 @@ class CompiledCase:
             sense: ``"max"`` or ``"min"``; the case's own where None.
             seeds: number of further searches from the table of starting points; all of them where None.
             threads: number of threads; that of the processors where None.
+            max_iterations: number or (n,) numbers, largest number of iterations of all searches of a problem.
+            deadline_seconds: number or (n,) numbers, seconds from the begin of a problem's own solve until its end.
+                A problem that a budget ends has the status ``BUDGET`` and the best point so far.
 
         Raises:
             InputError: an array has another shape or a number that is not finite, a limit is unknown or not allowed, or
@@ -136,34 +168,37 @@ class CompiledCase:
         """
         manifest = self._manifest
         n, k = len(self.variables), len(self.parameters)
-        arrays = {"x0": _rows("x0", x0, n), "p": _rows("p", p, k)}
-        arrays |= {"lower": _rows("lower", lower, n), "upper": _rows("upper", upper, n)}
+        arrays = {"x0": checked_rows("x0", x0, n), "p": checked_rows("p", p, k)}
+        arrays |= {"lower": checked_rows("lower", lower, n), "upper": checked_rows("upper", upper, n)}
         arrays["limits"] = self._limit_rows(limits or {})
+        budget = {"max_iterations": checked_budget("max_iterations", max_iterations, is_whole=True)}
+        budget["deadline_seconds"] = checked_budget("deadline_seconds", deadline_seconds, is_whole=False)
         counts = {name: len(each) for name, each in arrays.items() if each is not None and each.ndim == 2}
+        counts |= {name: len(each) for name, each in budget.items() if each is not None and each.ndim == 1}
         if len(set(counts.values())) > 1:
             said = ", ".join(f"{name} has {count}" for name, count in counts.items())
             raise InputError(f"arrays must have one number of rows, and {said}")
         count = next(iter(counts.values()), 1)
         if sense not in ("max", "min", *Sense, None):
             raise InputError(f"sense = {sense!r}: must be 'max' or 'min'")
-        if seeds is not None and not _is_between(seeds, 0, manifest.seeds):
+        if seeds is not None and not is_between(seeds, 0, manifest.seeds):
             raise InputError(f"seeds = {seeds!r}: must be a whole number from 0 to {manifest.seeds}")
         if seeds == 0 and x0 is None:
             raise InputError("seeds = 0 without x0: a search needs a point to start from")
-        if threads is not None and not _is_between(threads, 1, None):
+        if threads is not None and not is_between(threads, 1, None):
             raise InputError(f"threads = {threads!r}: must be a whole number of at least 1")
         batch, answers = self._batch(count, arrays)
         batch.maximise = -1 if sense is None else int(Sense(sense) is Sense.MAX)
         batch.seeds = -1 if seeds is None else seeds
-        self._run(batch, count, threads or os.cpu_count() or 1)
+        self._run(batch, count, threads or os.cpu_count() or 1, budget)
         return answers
 
-    def _batch(self, count: int, arrays: Mapping[str, FloatArray | None]) -> tuple[_Batch, CompiledSolutions]:
+    def _batch(self, count: int, arrays: Mapping[str, FloatArray | None]) -> tuple[Batch, CompiledSolutions]:
         """Return problems as the C reads them, and the arrays that it writes."""
-        batch = _Batch()
+        batch = Batch()
         for name, given in arrays.items():
             if given is not None:
-                setattr(batch, name, _Rows(given.ctypes.data, given.shape[-1], int(given.ndim == 1)))
+                setattr(batch, name, Rows(given.ctypes.data, given.shape[-1], int(given.ndim == 1)))
         answers = CompiledSolutions(
             F=np.zeros(count),
             x=np.zeros((count, len(self.variables))),
@@ -176,6 +211,11 @@ class CompiledCase:
             runs=np.zeros(count, dtype=np.intc),
             converged=np.zeros(count, dtype=np.intc),
             iterations=np.zeros(count, dtype=np.intc),
+            lower_multipliers=np.zeros((count, len(self.variables))),
+            upper_multipliers=np.zeros((count, len(self.variables))),
+            g_lower_multipliers=np.zeros((count, len(self.constraints))),
+            g_upper_multipliers=np.zeros((count, len(self.constraints))),
+            limit_multipliers=np.zeros((count, len(self.limits))),
         )
         for name, values in answers._asdict().items():
             setattr(batch, name, values.ctypes.data)
@@ -183,9 +223,13 @@ class CompiledCase:
         batch.kept = (*arrays.values(), answers)
         return batch, answers
 
-    def _run(self, batch: _Batch, count: int, threads: int) -> None:
+    def _run(self, batch: Batch, count: int, threads: int, budget: Mapping[str, FloatArray | None]) -> None:
         """Solve the problems in chunks. ctypes releases the interpreter's lock during a call."""
-        solve_each = self._function("solve_each")
+        solve_within = self._function("solve_within")
+        most, seconds = budget["max_iterations"], budget["deadline_seconds"]
+        iterations = None if most is None else np.array(np.broadcast_to(most, count), dtype=np.intc)
+        ends = None if seconds is None else np.array(np.broadcast_to(seconds, count))
+        limits = tuple(None if each is None else _address(each) for each in (iterations, ends))
         share = max(1, min(_CHUNK, -(-count // threads)))
         waiting = queue.SimpleQueue[int]()
         for first in range(0, count, share):
@@ -198,7 +242,7 @@ class CompiledCase:
                 while not is_stopped.is_set():
                     first = waiting.get_nowait()
                     last = min(first + share, count)
-                    solve_each(ctypes.byref(batch), first, last, _address(reals), _address(integers))
+                    solve_within(ctypes.byref(batch), *limits, first, last, _address(reals), _address(integers))
 
         workers = min(threads, -(-count // share)) if count else 0
         if workers <= 1:
@@ -224,7 +268,7 @@ class CompiledCase:
         for key, values in given.items():
             if key not in columns:
                 raise InputError(f"limits: no limit {key!r} can be set; {nearest(str(key), columns)}")
-            columns[key] = _numbers(f"limits[{key!r}]", values)
+            columns[key] = checked_numbers(f"limits[{key!r}]", values)
             if columns[key].ndim > 1:
                 raise InputError(f"limits[{key!r}]: must be a number or one for each problem, got {columns[key].shape}")
         for limit in self.limits:
@@ -264,70 +308,11 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
         InputError: the folder is none of generated C or of another version, or there is no working C compiler.
     """
     manifest = read_manifest(Path(folder))
-    path = shared_library(manifest.files)
+    path = shared_library({**manifest.files, **budget_files(manifest.prefix)})
     try:
         return CompiledCase(manifest, ctypes.CDLL(str(path)))
     except (OSError, AttributeError) as error:
         raise InputError(f"{folder}: the compiled library cannot be loaded: {error}") from None
-
-
-class _Rows(ctypes.Structure):
-    """Rows of numbers, as the C has them."""
-
-    _fields_: ClassVar = [("values", ctypes.c_void_p), ("length", ctypes.c_int), ("is_shared", ctypes.c_int)]
-
-
-class _Batch(ctypes.Structure):
-    """Problems and answers, as the C has them."""
-
-    _fields_: ClassVar = [
-        *((name, _Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),
-        *((name, ctypes.c_int) for name in ("maximise", "seeds")),
-        *((name, ctypes.c_void_p) for name in ("status", "runs", "converged", "iterations")),
-        *((name, ctypes.c_void_p) for name in ("F", "x", "R", "axis", "angle", "violation", "residual")),
-    ]
-    maximise: int
-    seeds: int
-    kept: tuple[Any, ...]
-
-
-def _rows(name: str, given: ArrayLike | None, length: int) -> FloatArray | None:
-    """Return an array (length,) or (n, length) of finite numbers.
-
-    Raises:
-        InputError: the shape is another one, or a number is not finite.
-    """
-    if given is None:
-        return None
-    array = _numbers(name, given)
-    if array.ndim not in (1, 2) or array.shape[-1] != length:
-        raise InputError(f"{name}: must have the shape ({length},) or (n, {length}), got {array.shape}")
-    return array
-
-
-def _numbers(name: str, given: ArrayLike) -> FloatArray:
-    """Return an array of finite numbers, contiguous.
-
-    Raises:
-        InputError: something in it is no number, or not finite.
-    """
-    try:
-        array = np.array(given, dtype=np.float64, order="C")
-    except (ValueError, TypeError):
-        raise InputError(f"{name}: must be an array of numbers") from None
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        place = ", ".join(str(index) for index in wrong[0])
-        where = f"{name}[{place}]" if place else name
-        raise InputError(f"{where} = {array[tuple(wrong[0])]}: must be finite")
-    return array
-
-
-def _is_between(value: object, least: int, most: int | None) -> bool:
-    """Return whether a value is a whole number within bounds."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool):
-        return False
-    return bool(least <= value and (most is None or value <= most))
 
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:

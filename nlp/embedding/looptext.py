@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from .ctext import short_table
-from .stages import StagedFunctions
+from .stages import LoopFunctions, StagedFunctions
 
 
 def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
@@ -46,6 +47,9 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         "most_inputs": str(_most(loop.inputs for loop in loops.all)),
         "most_constants": str(_most(loop.constants for loop in loops.all)),
         "most_values": str(_most(loop.values for loop in loops.all)),
+        "most_slopes": str(_most_slopes(staged)),
+        "most_second": str(_most_second(staged)),
+        "ncolumns": str(len(_columns(staged).columns)),
         "casadi_work": str(casadi_work(staged)),
         # Eigenvalues by another order of operations, and by inverses, lose two digits more.
         "limits_close": "1e-10" if loops.spectra else "1e-12",
@@ -71,10 +75,46 @@ def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
         )
     )
     plain, slots = len(loops.plain), loops.slot_count
-    first = slots * (1 + n) + k + q + r + r * k + plain * (1 + n)
-    second = slots + plain + loops.entries.numel() + k * k + k * n + n * n + n
+    first = slots + len(_columns(staged).columns) + k + q + r + _most_slopes(staged) + plain * (1 + n)
+    second = slots + plain + loops.entries.numel() + _most_second(staged) + n + n * n + n
     of_j = 6 * rows
-    return first + second + (3 * of_j + 2 * of_j * n + n * n if loops.spectra else 0)
+    # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
+    spectrum = 10 * n * n + 115 * n + 1080 + of_j
+    return first + second + (3 * of_j + 2 * of_j * n + n * n + spectrum if loops.spectra else 0)
+
+
+class _Columns(NamedTuple):
+    """Variables on which slots depend: where those of each slot begin, with the end of the last, and their indices."""
+
+    first: list[int]
+    columns: list[int]
+
+
+def _columns(staged: StagedFunctions) -> _Columns:
+    """Return the variables on which the slots depend by structure."""
+    entries = staged.loops.entries
+    own: list[list[int]] = [[] for _ in range(staged.loops.slot_count)]
+    for row, column in zip(*ca.jacobian(entries, staged.x).sparsity().get_triplet(), strict=True):
+        own[row].append(column)
+    for loop, functions in zip(staged.loops.inner, staged.of_loops, strict=False):
+        for slots, outputs in zip(loop.slots, loop.outputs, strict=True):
+            for value, place in enumerate(outputs):
+                taken = (own[slots[i]] for r, i in functions.slopes if r == value)
+                own[place] = sorted({column for columns in taken for column in columns})
+    first = [0]
+    for columns in own:
+        first.append(first[-1] + len(columns))
+    return _Columns(first, [column for columns in own for column in sorted(columns)])
+
+
+def _most_slopes(staged: StagedFunctions) -> int:
+    """Return the largest number of slopes of a loop, or of inputs: their place in the workspace has both."""
+    return max((max(len(own.slopes), own.values.numel_in(0)) for own in staged.of_loops), default=0) or 1
+
+
+def _most_second(staged: StagedFunctions) -> int:
+    """Return the largest number of second derivatives of a loop, at least 1."""
+    return max((len(own.second) for own in staged.of_loops), default=0) or 1
 
 
 def _most(vectors: Iterable[SX]) -> int:
@@ -88,14 +128,23 @@ def _tables(staged: StagedFunctions) -> str:
     slots: list[int] = []
     constants: list[int] = []
     outputs: list[int] = []
+    slopes: list[int] = []
+    second: list[int] = []
     lines = []
-    for loop in loops.all:
+    for loop, own in zip(loops.all, staged.of_loops, strict=True):
         sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
-        lines.append(", ".join(map(str, (*sizes, len(slots), len(constants), len(outputs)))))
+        counts = (len(own.slopes), len(own.second))
+        firsts = (len(slots), len(constants), len(outputs), len(slopes) // 2, len(second) // 2)
+        lines.append(", ".join(map(str, (*sizes, *counts, *firsts))))
+        slopes.extend(each for pair in own.slopes for each in pair)
+        second.extend(each for pair in own.second for each in pair)
         for into, table in ((slots, loop.slots), (constants, loop.constant_places), (outputs, loop.outputs)):
             into.extend(value for row in table for value in row)
-    rows = ",\n".join(f"    {{{line}}}" for line in (*lines, "0, 0, 0, 0, 0, 0, 0"))
+    rows = ",\n".join(f"    {{{line}}}" for line in (*lines, ", ".join("0" * 11)))
     blocks = [short_table("slots", slots), short_table("constant_places", constants), short_table("outputs", outputs)]
+    blocks += [short_table("slope_places", slopes), short_table("second_places", second)]
+    columns = _columns(staged)
+    blocks += [short_table("first_column", columns.first), short_table("columns", columns.columns)]
     blocks.append(f"static const loop loops[LOOPS + 1] = {{\n{rows}}};")
     blocks.append(short_table("plain_places", loops.plain))
     if loops.spectra:
@@ -104,7 +153,7 @@ def _tables(staged: StagedFunctions) -> str:
     return "\n".join(blocks) + "\n"
 
 
-def _cases(functions: Sequence[tuple[ca.Function, ca.Function]]) -> str:
+def _cases(functions: Sequence[LoopFunctions]) -> str:
     """Return the cases of the switch that calls the loops' functions."""
-    flat = [function for pair in functions for function in pair]
+    flat = [function for own in functions for function in (own.values, own.curvature)]
     return "".join(f"    case {i}: return {each.name()}(arg, res, 0, work, 0);\n" for i, each in enumerate(flat))

@@ -17,7 +17,7 @@ from .runtimelimits import RunTimeLimit
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
 #: Version of the manifest's keys and of the functions for many problems; another one is refused.
-FORMAT = 1
+FORMAT = 2
 #: A status in the header: its name, and a comment that says what it means.
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 
@@ -72,6 +72,7 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "tasks": [{"name": task.name, "twist": np.asarray(task.twist).tolist()} for task in case.tasks],
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],
+        "measured": [],
         "sources": sorted(name for name in files if name.startswith(prefix) and name.endswith(".c")),
         "headers": sorted(name for name in files if name.startswith(prefix) and name.endswith((".h", ".hpp"))),
         "files": sorted([*files, MANIFEST]),

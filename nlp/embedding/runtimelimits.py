@@ -75,6 +75,7 @@ class RunTimeLimits:
     Attributes:
         limits: the limits, in the order of the constraints.
         function: the limits' numbers (k, 1) to the converted numbers (m, 1); None where there is no limit.
+        slopes: likewise, and the derivatives of the converted numbers (m, 1), each by the limit that it follows from.
         sides: sides of constraints that the converted numbers are bounds of.
         widenings: variables whose bounds follow from converted numbers.
         owners: index of the limit that each converted number follows from.
@@ -85,6 +86,12 @@ class RunTimeLimits:
     sides: tuple[Side, ...]
     widenings: tuple[Widening, ...]
     owners: tuple[int, ...] = ()
+    slopes: ca.Function | None = None
+
+    @property
+    def functions(self) -> tuple[ca.Function, ...]:
+        """Both functions; none where there is no limit."""
+        return tuple(each for each in (self.function, self.slopes) if each is not None)
 
     @property
     def converted(self) -> int:
@@ -93,8 +100,8 @@ class RunTimeLimits:
 
     @property
     def work(self) -> int:
-        """Size of the function's workspace in doubles."""
-        return 0 if self.function is None else int(self.function.sz_w())
+        """Size of the functions' workspace in doubles."""
+        return max((int(each.sz_w()) for each in self.functions), default=0)
 
 
 def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
@@ -139,10 +146,13 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
     if not limits:
         return RunTimeLimits((), None, (), ())
     values = ca.vertcat(*symbols.values())
-    function = ca.Function(f"{prefix}_bounds", [values], [ca.densify(ca.vertcat(*outputs))])
+    converted_values = ca.densify(ca.vertcat(*outputs))
+    function = ca.Function(f"{prefix}_bounds", [values], [converted_values])
+    by_owner = [ca.gradient(each, list(symbols.values())[k]) for each, k in zip(outputs, owners, strict=True)]
+    slopes = ca.Function(f"{prefix}_bounds_slopes", [values], [converted_values, ca.densify(ca.vertcat(*by_owner))])
     names = c_names(key.upper() for key in limits)
     named = tuple(replace(each, name=name) for each, name in zip(limits.values(), names, strict=True))
-    return RunTimeLimits(named, function, tuple(sides), tuple(widenings), tuple(owners))
+    return RunTimeLimits(named, function, tuple(sides), tuple(widenings), tuple(owners), slopes)
 
 
 def _squared_sine(angle: SX) -> SX:

@@ -21,23 +21,41 @@ from .loops import Loop, Loops, find_loops
 _LARGE_HESSIAN = 3000
 
 
+class LoopFunctions(NamedTuple):
+    """Functions of a loop, whose derivatives have their structural nonzeros alone, and the places of these.
+
+    Attributes:
+        values: ``(inputs, constants) -> (values, slopes)``.
+        curvature: ``(inputs, constants, multipliers) -> (gradient, second)`` of the sum of values times multipliers.
+        slopes: value and input of each nonzero of the Jacobian, in the order of the values.
+        second: two inputs of each nonzero of the Hessian's lower triangle, row after row; the second is not larger.
+    """
+
+    values: ca.Function
+    curvature: ca.Function
+    slopes: tuple[tuple[int, int], ...]
+    second: tuple[tuple[int, int], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class StagedFunctions:
     """Functions in two stages.
 
     Attributes:
+        x: (n, 1) symbols of the free variables.
         prepare: first stage, ``p -> k``: (count, 1) numbers that depend on the arguments alone; the last ones are the
             constants of the loops.
         functions: second stage, by name: functions of ``(x, k)`` and of further inputs, with dense results.
-        of_loops: two functions of each loop, as :func:`_loop_functions` returns them.
+        of_loops: the functions of each loop.
         of_robot: with several poses, functions of the robot's inputs at one of them.
         loops: the program's loops.
         by_direction: whether ``curvature`` is the Hessian's product with a direction.
     """
 
+    x: SX
     prepare: ca.Function
     functions: Mapping[str, ca.Function]
-    of_loops: tuple[tuple[ca.Function, ca.Function], ...]
+    of_loops: tuple[LoopFunctions, ...]
     of_robot: Mapping[str, ca.Function]
     loops: Loops
     by_direction: bool
@@ -45,7 +63,7 @@ class StagedFunctions:
     @property
     def all(self) -> tuple[ca.Function, ...]:
         """Every function, the first stage first."""
-        of_loops = (function for pair in self.of_loops for function in pair)
+        of_loops = (function for own in self.of_loops for function in (own.values, own.curvature))
         return (self.prepare, *self.functions.values(), *self.of_robot.values(), *of_loops)
 
 
@@ -61,9 +79,10 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation.
 
-    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries with their
-    gradients too, ``limits`` is absent, and ``curvature`` takes a multiplier for each entry at the end. A Hessian of
-    very many operations is returned as its product with a direction, which is one more input then.
+    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
+    the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a
+    multiplier for each entry at the end. A Hessian of very many operations is returned as its product with a direction,
+    which is one more input then.
 
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 
@@ -97,7 +116,7 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     }
     if loops:
         del outputs["limits"]
-        outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T]
+        outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T.nz[:]]
     if several and loops.has_objective:
         del outputs["F"], outputs["F_gradient"]
     robots = _robot_expressions(program)
@@ -114,6 +133,7 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
         functions[name] = ca.Function(f"{prefix}_{name}", [x, k, *inputs.get(name, [])], own)
     of_robot = {} if len(program.robots) == 1 else robots.expressions
     return StagedFunctions(
+        x,
         ca.Function(f"{prefix}_prepare", [program.p], [prepared]),
         functions,
         tuple(_loop_functions(loop, f"{prefix}_loop{i}") for i, loop in enumerate(loops.all)),
@@ -151,20 +171,22 @@ def _robot_expressions(program: Program) -> _RobotExpressions:
     return _RobotExpressions(dense, inputs)
 
 
-def _loop_functions(loop: Loop, name: str) -> tuple[ca.Function, ca.Function]:
-    """Return the functions of a loop.
-
-    * ``(inputs, constants) -> (values, Jacobian)``, row after row;
-    * ``(inputs, constants, multipliers) -> (gradient, Hessian)`` of the sum of the values times their multipliers.
-    """
+def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
+    """Return the functions of a loop."""
     u, values = loop.inputs, loop.values
     multipliers = SX.sym("multipliers", values.numel())
     hessian, gradient = ca.hessian(ca.dot(multipliers, values), u)
-    first = ca.cse([ca.densify(values), ca.densify(ca.jacobian(values, u).T)])
-    second = ca.cse([ca.densify(gradient), ca.densify(hessian)])
-    return (
+    # CasADi orders nonzeros by columns: those of a transposed matrix are in the order of its rows.
+    jacobian, triangle = ca.jacobian(values, u).T, ca.triu(hessian)
+    inputs, outputs = jacobian.sparsity().get_triplet()
+    others, rows = triangle.sparsity().get_triplet()
+    first = ca.cse([ca.densify(values), jacobian.nz[:]])
+    second = ca.cse([ca.densify(gradient), triangle.nz[:]])
+    return LoopFunctions(
         ca.Function(f"{name}_values", [u, loop.constants], first),
         ca.Function(f"{name}_curvature", [u, loop.constants, multipliers], second),
+        tuple(zip(outputs, inputs, strict=True)),
+        tuple(zip(rows, others, strict=True)),
     )
 
 

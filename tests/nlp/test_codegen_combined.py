@@ -144,6 +144,14 @@ def test_the_c_has_the_programs_values_and_its_optimum(name: str, embed: Callabl
         assert better * (solved.F - subject.optimum) >= -1e-6 * max(1.0, abs(subject.optimum))
 
 
+@pytest.mark.parametrize("name", ["camera-mount", "flight-simulator"])
+def test_a_worst_case_converges_from_wherever_it_starts(name: str, embedded: Callable[[str], Embedded]) -> None:
+    # From a feasible point inside of all constraints the level has no curvature at all.
+    c, nlp = embedded(name), find_subject(load_case(name)).nlp
+    ends = [c.solve(x0=np.ascontiguousarray(x), seeds=0) for x in starting_points(nlp, 301, 5)[1:]]
+    assert [each.status for each in ends] == [0] * 300
+
+
 def test_weights_senses_and_twists_change_at_run_time(embedded: Callable[[str], Embedded]) -> None:
     c, case = embedded("peg-in-hole"), load_case("peg-in-hole")
     places = find_subject(case).nlp.program.places

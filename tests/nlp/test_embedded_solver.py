@@ -12,7 +12,7 @@ import pytest
 
 from screwsynth.nlp import Case, Free, Nlp, Rotation, Sense, Task, build_model, formulate, load_case, shipped_cases
 from screwsynth.nlp.case.settings import Search
-from screwsynth.nlp.embedding import codegen
+from screwsynth.nlp.embedding import worstcase
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
 from screwsynth.nlp.program.sampling import starting_points
 from screwsynth.nlp.solver.multistart import solve_program
@@ -250,7 +250,7 @@ def test_a_saddle_is_left(embedded: EmbeddedCase) -> None:
 def test_a_search_that_is_cut_off_is_no_answer(
     embed: Embed, embedded: EmbeddedCase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(codegen, "_ITERATIONS", 4)
+    monkeypatch.setattr(worstcase, "_ITERATIONS", 4)
     unfinished = 0
     for name in ("paper-4.3", "paper-4.4-max", "paper-4.1-rotation"):
         c, nlp = embed(load_case(name), "-O0"), formulate(load_case(name))
@@ -272,7 +272,7 @@ def test_a_search_that_ends_at_a_saddle_is_no_answer(
     iterations: int, embed: Embed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # From Park's own axes the search runs into a saddle, and is cut off before it has left it.
-    monkeypatch.setattr(codegen, "_ITERATIONS", iterations)
+    monkeypatch.setattr(worstcase, "_ITERATIONS", iterations)
     case = load_case("paper-4.4-max")
     solved = embed(case, "-O0").solve(x0=formulate(case).start, seeds=0)
     assert solved.status != OK

@@ -140,15 +140,15 @@ typedef int int_T;
 typedef struct { double number; } mxArray;
 typedef struct {
     int parameters, outputs, widths[8], iwidth, rwidth;
-    real_T twist[6], *out[8], *rwork, time;
+    real_T twist[64], *out[8], *rwork, time;
     int_T *iwork;
-    mxArray given[2];
+    mxArray given[3];
 } SimStruct;
 #define SS_OPTION_EXCEPTION_FREE_CODE 1
 #define mxGetScalar(a) ((a)->number)
 #define ssSetNumSFcnParams(S, n) ((S)->parameters = (n))
 #define ssGetNumSFcnParams(S) ((S)->parameters)
-#define ssGetSFcnParamsCount(S) 2
+#define ssGetSFcnParamsCount(S) 3
 #define ssGetSFcnParam(S, i) (&(S)->given[i])
 #define ssSetSFcnParamTunable(S, i, yes) ((void)(S), (void)(i))
 #define ssSetNumContStates(S, n) ((void)(S))
@@ -178,6 +178,7 @@ int main(void) {
     int k;
     S.given[0].number = 1e-3;
     S.given[1].number = 16;
+    S.given[2].number = -1;
     mdlInitializeSizes(&S);
     mdlInitializeSampleTimes(&S);
     mdlStart(&S);
@@ -269,3 +270,70 @@ def test_two_folders_are_one_project_are_installed_and_found(tmp_path: Path, cma
     targets = cmake("--build", "bare", "--target", "help", where=tmp_path)
     assert "screwsynth_paper_4_2_rotation" in targets
     assert "selftest" not in targets
+
+
+#: The second task gets the twist, the weight and the sense of the first one, and the other way round.
+EXCHANGED = """#include <cstdio>
+#include "screwsynth_peg_in_hole.hpp"
+namespace robot = screwsynth_peg_in_hole;
+int main() {
+    robot::Solver solver;
+    robot::Twist twists[2];
+    const double weights[2] = {solver.weight(0), solver.weight(1)};
+    for (std::size_t task = 0; task < 2; ++task)
+        for (std::size_t i = 0; i < 6; ++i) twists[task][i] = screwsynth_peg_in_hole_task_twists[6 * task + i];
+    const robot::Result before = solver.solve();
+    for (std::size_t task = 0; task < 2; ++task) {
+        solver.set_twist(task, twists[1 - task]);
+        solver.set_weight(task, weights[1 - task]);
+    }
+    const robot::Result exchanged = solver.solve();
+    solver.set_weight(1, -weights[0]);
+    const robot::Result other = solver.solve();
+    std::printf("%d %.9g %d %.9g %d %d\\n", before.status, before.F, exchanged.status, exchanged.F, other.status,
+                other.F > before.F + 1e-6 || other.F < before.F - 1e-6);
+    try { solver.set_weight(2, 1.0); return 1; } catch (const std::out_of_range &) {}
+    try { solver.set_twist(2, twists[0]); return 1; } catch (const std::out_of_range &) {}
+    return 0;
+}
+"""
+#: Simulink's solver with the tasks exchanged in its input.
+SAMPLES = """#include <stdio.h>
+int main(void) {
+    static SimStruct S;
+    const double *p = screwsynth_peg_in_hole_parameter_defaults;
+    int task, i;
+    S.given[0].number = 1e-3;
+    S.given[1].number = 16;
+    S.given[2].number = -1;
+    mdlInitializeSizes(&S);
+    mdlInitializeSampleTimes(&S);
+    mdlStart(&S);
+    for (task = 0; task < 2; ++task) {
+        for (i = 0; i < 6; ++i) S.twist[6 * task + i] = p[SCREWSYNTH_PEG_IN_HOLE_TWIST_OF(1 - task) + i];
+        S.twist[12 + task] = p[screwsynth_peg_in_hole_weights[1 - task]];
+    }
+    mdlOutputs(&S, 0);
+    printf("%d wide: status %g, F %.9g\\n", S.iwidth, *S.out[2], *S.out[1]);
+    mdlTerminate(&S);
+    return 0;
+}
+"""
+
+
+@needs_compiler
+@pytest.mark.skipif(not shutil.which("g++"), reason="g++ is not installed")
+def test_several_tasks_are_reached_from_cpp_and_simulink(tmp_path: Path) -> None:
+    where, prefix = write("peg-in-hole", tmp_path), identifier("peg-in-hole")
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT.replace('-O1', '-O0')}", "library", "realtime.o", where=where)
+    for name, text in (("e.cpp", EXCHANGED), ("simstruc.h", SIMSTRUC), ("simulink.c", SAMPLES)):
+        (where / name).write_text(text, encoding="utf-8")
+    run("g++", *STRICT_CPP.split(), "e.cpp", "-L.", f"-l{prefix}", "-lm", "-o", "e", where=where)
+    status, before, again, exchanged, third, differs = run("./e", where=where).split()
+    assert (status, again, third, differs) == ("0", "0", "0", "1")
+    assert float(exchanged) == pytest.approx(float(before), rel=1e-7)
+    words = ["-DMATLAB_MEX_FILE", "sfunction.c", "-L.", f"-l{prefix}", "-lm", "-o", "s"]
+    run(COMPILERS[0], *STRICT.split(), *words, where=where)
+    wide, F = re.findall(r"^(\d+) wide: status 0, F (\S+)$", run("./s", where=where))[0]
+    assert int(wide) == 14
+    assert float(F) == pytest.approx(float(before), rel=1e-7)

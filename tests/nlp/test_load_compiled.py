@@ -159,11 +159,11 @@ def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, m
 
     refused("is no folder", tmp_path / "nowhere")
     refused("is no folder", tmp_path)
-    for text in ("", "[]", "{}", '{"format": 1}', json.dumps(manifest | {"variables": [1]})):
+    for text in ("", "[]", "{}", '{"format": 2}', json.dumps(manifest | {"variables": [1]})):
         (copy / "manifest.json").write_text(text, encoding="utf-8")
         refused("is not as")
     (copy / "manifest.json").write_text(json.dumps(manifest | {"format": 99}), encoding="utf-8")
-    refused("format = 99 is not the format 1 of this version")
+    refused("format = 99 is not the format 2 of this version")
     (copy / "manifest.json").write_text(json.dumps(manifest | {"sources": ["../x.c"]}), encoding="utf-8")
     refused("is not as")
     (copy / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
@@ -184,3 +184,60 @@ def test_the_manifest_says_what_the_folder_holds(folder: Path) -> None:
     assert all(each["c_name"] in header for each in manifest["limits"])
     (task,) = manifest["tasks"]
     assert [each["default"] for each in manifest["parameters"]][-6:] == task["twist"]
+
+
+def test_a_budget_ends_each_problem_by_itself(compiled: CompiledCase) -> None:
+    x0, p = problems(60)
+    whole = compiled.solve(x0, p, seeds=2)
+    most = np.where(np.arange(60) % 2, 3, 10_000)
+    cut = compiled.solve(x0, p, seeds=2, max_iterations=most, threads=2)
+    odd = most == 3
+    assert (cut.iterations[odd] == 3).all()
+    assert (cut.status[odd] == compiled.statuses.index("BUDGET")).all()
+    for name in ("F", "status", "iterations"):
+        assert (getattr(cut, name)[~odd] == getattr(whole, name)[~odd]).all()
+    assert (compiled.solve(x0, p, seeds=2, max_iterations=3).iterations == 3).all()
+    # A nanosecond is over before the second evaluation; a minute is not.
+    late = compiled.solve(x0, p, seeds=2, deadline_seconds=np.where(odd, 1e-9, 60.0))
+    assert (late.status[odd] == compiled.statuses.index("BUDGET")).all()
+    assert (late.F[~odd] == whole.F[~odd]).all()
+    assert (late.iterations[odd] <= 2).all()
+    assert compiled.status_texts[compiled.statuses.index("BUDGET")].startswith("the budget ended the solve")
+    assert len(set(compiled.status_texts)) == len(compiled.statuses)
+
+
+def test_multipliers_are_slopes_of_the_optimum(compiled: CompiledCase, embedded: Callable[[str], Any]) -> None:
+    angle, step = 0.3, 1e-4
+    found = compiled.solve(limits={"angle.max": angle + step * np.array([-1.0, 0.0, 1.0])})
+    (key,) = [each.key for each in compiled.limits]
+    assert key == "angle.max"
+    assert found.limit_multipliers.shape == (3, 1)
+    slope = (found.F[2] - found.F[0]) / (2 * step)
+    assert found.limit_multipliers[1, 0] == pytest.approx(slope, rel=1e-5)
+    assert slope > 0.1
+    c = embedded(NAME).solve()
+    own = compiled.solve()
+    for name in ("lower", "upper", "g_lower", "g_upper"):
+        given = getattr(own, f"{name}_multipliers")[0]
+        assert (given == getattr(c, f"{name}_multipliers")).all()
+        assert (given >= 0).all()
+    assert len(compiled.constraints) == own.g_lower_multipliers.shape[1]
+    # Where the point is no optimum, there are none.
+    assert not compiled.solve(max_iterations=1).limit_multipliers.any()
+
+
+@pytest.mark.parametrize(
+    ("budget", "sentence"),
+    [
+        ({"max_iterations": 0}, "max_iterations = 0: must be a whole number from 1 to 2147483647"),
+        ({"max_iterations": 2.5}, "max_iterations = 2.5: must be a whole number"),
+        ({"max_iterations": 1e300}, "must be a whole number"),
+        ({"deadline_seconds": -1}, "deadline_seconds = -1: must be above 0"),
+        ({"deadline_seconds": np.nan}, "deadline_seconds = nan: must be finite"),
+        ({"deadline_seconds": [[1.0]]}, r"got \(1, 1\)"),
+        ({"max_iterations": [1, 2], "deadline_seconds": [1.0]}, "max_iterations has 2, deadline_seconds has 1"),
+    ],
+)
+def test_wrong_budgets_are_refused_in_a_sentence(budget: dict[str, Any], sentence: str, compiled: CompiledCase) -> None:
+    with pytest.raises(InputError, match=sentence):
+        compiled.solve(**budget)

@@ -1,0 +1,273 @@
+"""Table of generated C before and after: flash, stack, workspace, time to compile, times of a solve, and instructions.
+
+Both versions are compiled first, two at a time. Then their programs run in turns, so that a busy machine burdens both.
+Instructions are counted by valgrind and do not depend on the load. Run by hand on a quiet machine:
+
+    .venv/bin/python -P bench/generated_c.py --old CHECKOUT
+
+Without ``--old`` the table has this version alone, as it always has for several tasks or poses, which were another
+problem before. The old code of hexapod-machining takes two minutes to compile; for a Cortex-M7 it is left out unless
+``--all`` is given.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.embedding.callgraph import stack_bound
+from screwsynth.nlp.embedding.ctext import identifier
+from screwsynth.nlp.embedding.measure import CORTEX_M7
+
+CASES = ("paper-4.1-helical", "paper-4.3", "drilling-spindle", "hexapod-machining", "flight-simulator", "camera-mount")
+FLAGS = ("-std=gnu99", "-O2")
+#: Number of solves of each kind, in rounds by turns; those of a slow case are fewer.
+SOLVES, ROUNDS = 10_000, 10
+SLOW = {"hexapod-machining": 3_000}
+KINDS = ("cold", "task", "warm")
+#: Cases whose C before was that of their first task at their first pose.
+COMBINED = ("flight-simulator", "camera-mount")
+#: A case whose C before takes too long for a second compiler.
+LARGE = "hexapod-machining"
+GENERATE = """import sys
+from pathlib import Path
+from screwsynth.nlp import load_case
+from screwsynth.nlp.embedding.codegen import generate_c
+for name, text in generate_c(load_case(sys.argv[1]), "").items():
+    (Path(sys.argv[2]) / name).write_text(text, encoding="utf-8")
+"""
+#: The first word is the kind: `cold` from random starts, `task` with random tasks, `warm` from the last answer while
+#: the task turns by 1e-4 rad each, `seeds` from all starting points. `stack` paints the stack below.
+DRIVER = """#include "ID.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#define AREA 400000
+static double work[BIG_SOLVERWORK], p[BIG_P], x[BIG_N + 1], lower[BIG_N + 1], upper[BIG_N + 1];
+static int iwork[BIG_SOLVERIWORK];
+static ID_result result;
+static ID_problem problem;
+static uint64_t state;
+static double uniform(void) {
+    state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+    return (double)(state >> 11) / 9007199254740992.0;
+}
+static void turn(double angle) {
+    const double *twist = ID_parameter_defaults + BIG_TWIST, c = cos(angle), s = sin(angle);
+    int i;
+    for (i = 0; i < 6; i += 3) {
+        p[BIG_TWIST + i] = c * twist[i] - s * twist[i + 1];
+        p[BIG_TWIST + i + 1] = s * twist[i] + c * twist[i + 1];
+    }
+}
+static void __attribute__((noinline)) paint(volatile unsigned char *top) {
+    long i;
+    for (i = 512; i < AREA; ++i) top[-i] = 0xA5;
+}
+static long __attribute__((noinline)) depth(const volatile unsigned char *top) {
+    long i = AREA - 1;
+    while (i > 512 && top[-i] == 0xA5) --i;
+    return i;
+}
+int main(int count, char **words) {
+    volatile unsigned char here = 0;
+    volatile unsigned char *volatile top = &here;
+    const char kind = words[1][0];
+    const long first = atol(words[2]), last = first + atol(words[3]);
+    long k;
+    int i;
+    (void)count;
+    ID_defaults(&problem);
+    for (i = 0; i < BIG_P; ++i) p[i] = ID_parameter_defaults[i];
+    if (words[1][1] == 't') {
+        paint(top);
+        ID_solve(&problem, &result, work, iwork);
+        return printf("%ld\\n", depth(top)) < 0;
+    }
+    if (words[1][1] == 'e') {
+        for (k = first; k < last; ++k) ID_solve(&problem, &result, work, iwork);
+        return printf("%d %d %.10g\\n", result.runs, result.iterations, result.F) < 0;
+    }
+    problem.p = p;
+    if (kind == 'w') {
+        turn(1e-4 * (double)first);
+        ID_solve(&problem, &result, work, iwork);
+    }
+    problem.x0 = x;
+    problem.seeds = 0;
+    for (k = first; k < last; ++k) {
+        struct timespec begin, end;
+        int status;
+        state = 88172645463325252ull + 1000003ull * (uint64_t)k;
+        for (i = 0; i < 20; ++i) uniform();
+        for (i = 0; i < BIG_N; ++i)
+            x[i] = kind == 'w' ? result.x[i] : problem.lower[i] + uniform() * (problem.upper[i] - problem.lower[i]);
+        if (kind == 'w') turn(1e-4 * (double)k);
+        for (i = 0; kind == 't' && i < 6; ++i) p[BIG_TWIST + i] = 2.0 * uniform() - 1.0;
+        clock_gettime(CLOCK_MONOTONIC, &begin);
+        status = (int)ID_solve(&problem, &result, work, iwork);
+        clock_gettime(CLOCK_MONOTONIC, &end);
+        printf("%d %d %.0f\\n", status, result.iterations,
+               (double)(end.tv_sec - begin.tv_sec) * 1e9 + (double)(end.tv_nsec - begin.tv_nsec));
+    }
+    return 0;
+}
+"""
+
+
+class Build(NamedTuple):
+    """A case's C of one version, compiled: flash by compiler, seconds of gcc, doubles and ints, stack, instructions."""
+
+    name: str
+    version: str
+    folder: Path
+    flash: int
+    flash_m7: int | None
+    seconds: float
+    workspace: int
+    bound: int | None
+    painted: int
+
+
+def compiled(name: str, version: str, checkout: Path | None, root: Path, cortex: bool) -> Build:
+    """Generate and compile the C of a case."""
+    folder, prefix = root / version / name, identifier(name)
+    folder.mkdir(parents=True)
+    environment = dict(os.environ)
+    if checkout is not None:
+        package = root / version / "import" / "screwsynth"
+        package.mkdir(parents=True, exist_ok=True)
+        for room in ("models", "nlp", "cases"):
+            if not (package / room).exists():
+                (package / room).symlink_to(checkout.resolve() / room)
+        environment["PYTHONPATH"] = str(package.parent)
+    case = Path(shutil.copy(find_case(name), root / version / f"{name}.toml"))
+    words = [sys.executable, "-P", "-c", GENERATE, str(case), str(folder)]
+    subprocess.run(words, env=environment, check=True)
+    text = DRIVER.replace("BIG", prefix.upper()).replace("ID", prefix)
+    (folder / "driver.c").write_text(text, encoding="utf-8")
+    sources = sorted(path.name for path in folder.glob(f"{prefix}*.c"))
+    began = time.perf_counter()
+    subprocess.run(["gcc", *FLAGS, "-fcallgraph-info=su", "-c", *sources], cwd=folder, check=True)
+    seconds = time.perf_counter() - began
+    objects = [f"{source[:-2]}.o" for source in sources]
+    flash = size("size", folder, objects)
+    subprocess.run(["gcc", *FLAGS, "driver.c", *objects, "-Wl,-z,now", "-lm", "-o", "driver"], cwd=folder, check=True)
+    flash_m7 = None
+    if cortex and shutil.which(CORTEX_M7.compilers[0]):
+        (folder / "m7").mkdir()
+        words = [CORTEX_M7.compilers[0], *CORTEX_M7.flags, *FLAGS, "-I..", "-c", *(f"../{each}" for each in sources)]
+        subprocess.run(words, cwd=folder / "m7", check=True)
+        flash_m7 = size(CORTEX_M7.size, folder / "m7", objects)
+    header = (folder / f"{prefix}.h").read_text(encoding="utf-8")
+    doubles, ints = (int(re.findall(rf"_SOLVER{part} (\d+)", header)[0]) for part in ("WORK", "IWORK"))
+    graphs = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.ci")}
+    # The pointers of a version before are others: its stack is painted only.
+    bound = stack_bound(graphs, prefix) if checkout is None else None
+    painted = int(output(folder, "stack", "0", "0"))
+    return Build(name, version, folder, flash, flash_m7, seconds, 8 * doubles + 4 * ints, bound, painted)
+
+
+def size(program: str, folder: Path, objects: list[str]) -> int:
+    """Return the bytes of code and constants of object files."""
+    lines = subprocess.run([program, *objects], cwd=folder, capture_output=True, text=True, check=True).stdout
+    return sum(int(text) + int(data) for text, data in (line.split()[:2] for line in lines.splitlines()[1:]))
+
+
+def output(folder: Path, *words: str) -> str:
+    """Run a driver and return what it prints."""
+    return subprocess.run([folder / "driver", *words], capture_output=True, text=True, check=True).stdout
+
+
+def instructions(build: Build, *words: str) -> int:
+    """Return the instructions of a driver, by valgrind."""
+    tool = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "--log-fd=1"]
+    done = subprocess.run([*tool, build.folder / "driver", *words], capture_output=True, text=True, check=True)
+    return int(re.findall(r"Collected : (\d+)", done.stdout)[0])
+
+
+def times(builds: list[Build], kind: str) -> list[str]:
+    """Return a row of each build: the solves of one kind, in turns."""
+    name = builds[0].name
+    count = SLOW.get(name, SOLVES) // ROUNDS
+    found: dict[str, list[list[float]]] = {each.version: [] for each in builds}
+    for turn in range(ROUNDS):
+        for build in builds if turn % 2 else builds[::-1]:
+            lines = output(build.folder, kind, str(turn * count), str(count)).splitlines()
+            found[build.version] += [[float(part) for part in line.split()] for line in lines]
+    rows = []
+    for build in builds:
+        status, iterations, took = zip(*found[build.version], strict=True)
+        ordered = sorted(took)
+        ok = sum(each == 0 for each in status)
+        cells = [
+            f"{median(took) / 1e3:.1f}",
+            f"{ordered[int(0.999 * len(took))] / 1e3:.0f}",
+            f"{ordered[-1] / 1e3:.0f}",
+        ]
+        cells += [f"{sum(iterations) / len(took):.1f}, {max(iterations):.0f}", f"{ok} of {len(took)}"]
+        rows.append(f"| `{name}` | {build.version} | {kind} | {' | '.join(cells)} |")
+    return rows
+
+
+def show(columns: str) -> None:
+    """Print the head of a table."""
+    print(f"| {columns} |\n|{'---|' * (columns.count('|') + 1)}", flush=True)
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--old", type=Path, help="a checkout of the version before")
+    parser.add_argument("--all", action="store_true", help="for a Cortex-M7 also what takes long to compile")
+    parser.add_argument("cases", nargs="*", default=CASES)
+    given = parser.parse_args()
+    began = time.perf_counter()
+    jobs = [(name, "after") for name in given.cases]
+    jobs += [(name, "before") for name in given.cases if given.old and name not in COMBINED]
+    # What takes longest comes first.
+    jobs.sort(key=lambda job: (job[0] != LARGE, job[1] != "before"))
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
+
+        def make(job: tuple[str, str]) -> Build:
+            name, version = job
+            old = version == "before"
+            cortex = given.all or not (old and name == LARGE)
+            return compiled(name, version, given.old if old else None, Path(folder), cortex)
+
+        made = list(pool.map(make, jobs))
+        print(f"compiled after {time.perf_counter() - began:.0f} s", file=sys.stderr)
+        by_case = {
+            name: sorted((each for each in made if each.name == name), key=lambda each: each.version)[::-1]
+            for name in given.cases
+        }
+        show("case | version | flash kB | on a Cortex-M7 | workspace kB | stack bound | stack | gcc s | M instructions")
+        for build in (each for builds in by_case.values() for each in builds):
+            seeds = instructions(build, "seeds", "0", "1") - instructions(build, "seeds", "0", "0")
+            cells = [f"{build.flash / 1e3:.0f}", "-" if build.flash_m7 is None else f"{build.flash_m7 / 1e3:.0f}"]
+            cells += [f"{build.workspace / 1e3:.1f}", "-" if build.bound is None else str(build.bound)]
+            cells += [str(build.painted), f"{build.seconds:.1f}", f"{seeds / 1e6:.1f}"]
+            print(f"| `{build.name}` | {build.version} | {' | '.join(cells)} |", flush=True)
+        print("\nTimes in microseconds; instructions above are those of a solve from all starting points.\n")
+        show("case | version | solves | median | 99.9 % | largest | iterations, mean and largest | OK")
+        for builds in by_case.values():
+            for kind in KINDS:
+                print("\n".join(times(builds, kind)), flush=True)
+    print(f"took {time.perf_counter() - began:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

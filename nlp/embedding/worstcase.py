@@ -1,0 +1,57 @@
+"""Largest numbers of iterations and evaluations of a solve in C, from the constants of the solver.
+
+The templates take the constants from here, so that the bounds and the solver cannot differ.
+"""
+
+from __future__ import annotations
+
+#: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
+_ITERATIONS = 100
+_TRIALS = 30
+#: Number of times that F is scaled in one search, and that it looks for a feasible point first.
+_ROUNDS = 3
+_RESTORES = 2
+#: Parts of the way to contradicting bounds that are tried: a quadratic program for each.
+_PARTS = ("1.0", "0.25", "0.0625", "0.015625", "0.00390625", "0.0")
+#: Second derivatives in one iteration: for the step; along the sides that are active at the point, to recognise a
+#: saddle; and again for the step.
+_CURVATURES = 3
+
+
+def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
+    """Return the texts of the placeholders for the solver's constants and for its worst case.
+
+    First derivatives in an iteration are those of each trial length, and of one step that is corrected for curvature.
+    The search for a feasible point has no such correction, and one evaluation at its iterate instead. Beside iterations
+    a search evaluates once to scale the constraints; at the begin and the end of each part, of which it has one for
+    each scale of F and for each feasible point found; and twice at the begin of each search for a feasible point.
+
+    Args:
+        n: number of variables.
+        c: number of constraints.
+        searches: largest number of searches of a solve.
+    """
+    parts = _ROUNDS + _RESTORES
+    by_iteration, by_search = _TRIALS + 1, 1 + 2 * parts + 2 * _RESTORES
+    programs = len(_PARTS) + 1
+    passes = 20 * (2 * (n + c) + 5)
+    iterations = searches * _ITERATIONS
+    return {
+        "iterations": str(_ITERATIONS),
+        "trials": str(_TRIALS),
+        "rounds": str(_ROUNDS),
+        "restores": str(_RESTORES),
+        "parts": ", ".join(_PARTS),
+        "most_searches": str(searches),
+        "most_iterations": str(iterations),
+        "derivatives_by_iteration": str(by_iteration),
+        "derivatives_by_search": str(by_search),
+        "curvatures_by_iteration": str(_CURVATURES),
+        "magnitudes_by_search": str(2 + parts),
+        "programs_by_iteration": str(programs),
+        "passes": str(passes),
+        "most_derivatives": str(by_iteration * iterations + by_search * searches),
+        "most_curvatures": str(_CURVATURES * iterations),
+        "most_magnitudes": str((2 + parts) * searches),
+        "most_programs": str(programs * iterations),
+    }

@@ -1,0 +1,131 @@
+"""Limits on singular values in generated C: small, exact, and held where the solver ends."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.nlp import Nlp, case_from_tables, formulate, solve
+from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp.program.sampling import starting_points
+
+Embedded = Any
+
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
+
+SPECTRA = """
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+[robot.parameters]
+x1 = { min = 20, max = 32 }
+x2 = { min = 8, max = 15 }
+x3 = { min = 0, max = 20 }
+x4 = { min = 0, max = 25 }
+[pose]
+position = [{ min = -6, max = 6 }, { min = -6, max = 6 }, { min = 16, max = 26 }]
+rotation = { angle = { min = -15, max = 15 } }
+[[task]]
+sense = "max"
+axis = [1, 2, 6]
+point = [3, 1, 12]
+pitch = 0.1
+[limits]
+leg_length = { min = 24, max = 34 }
+condition_number = { max = 6, length = 10 }
+smallest_singular_value = { min = 0.2, length = 7 }
+[solve]
+starts = 4
+"""
+
+
+def made(where: Path, *words: str) -> str:
+    done = subprocess.run(["make", "-C", str(where), *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def spectral(target: Path) -> tuple[Path, Nlp]:
+    """The folder of a case with limits on singular values, and its program."""
+    case = case_from_tables(tomllib.loads(SPECTRA), name="spectra", source="spectra.toml")
+    for file, text in generate_c(case, SPECTRA).items():
+        (target / file).write_text(text, encoding="utf-8")
+    return target, formulate(case)
+
+
+@needs_compiler
+def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_path: Path) -> None:
+    tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
+        "limits": {"condition_number": {"max": 300, "length": 10}}
+    }
+    for file, text in generate_c(case_from_tables(tables, name="alone", source="alone"), "").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    for compiler in COMPILERS:
+        command = [compiler, *STRICT.split(), "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
+
+
+@needs_compiler
+def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
+    where, nlp = spectral(tmp_path)
+    assert sum(path.stat().st_size for path in where.glob("screwsynth_spectra*")) <= 400_000
+    began = time.monotonic()
+    assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -fPIC", "test")
+    assert time.monotonic() - began < 60
+    objects = sorted(str(path) for path in where.glob("screwsynth_spectra*.o"))
+    lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
+    wanted = {line.split()[-1] for line in lines if " U " in line}
+    assert {symbol for symbol in wanted if not symbol.startswith("screwsynth_spectra")} <= {
+        "sin", "sincos", "cos", "sqrt", "atan2", "fmin", "fmax", "memcpy", "memset", "__stack_chk_fail",
+        "_GLOBAL_OFFSET_TABLE_",  # of -fPIC, and no function
+    }  # fmt: skip
+    assert not [line for line in lines if line.split()[-2:-1] in (["D"], ["B"], ["d"], ["b"])]
+    library = str(where / "all.so")
+    subprocess.run([COMPILERS[0], "-shared", *objects, "-lm", "-o", library], check=True)
+    c, prefix = ctypes.CDLL(library), "screwsynth_spectra"
+    header = (where / f"{prefix}.h").read_text(encoding="utf-8")
+    sizes = {name: int(value) for name, value in re.findall(r"#define SCREWSYNTH_SPECTRA_(\w+) (\d+)", header)}
+    n, limits, p = nlp.n, len(nlp.program.constraints), np.ascontiguousarray(nlp.arguments)
+    k, work = np.zeros(sizes["K"] + 1), np.zeros(sizes["WORK"])
+    address = ctypes.POINTER(ctypes.c_double)
+
+    def at(array: np.ndarray) -> ctypes._Pointer[ctypes.c_double]:
+        return array.ctypes.data_as(address)
+
+    assert c[f"{prefix}_prepare"](at(p), at(k), at(work)) == 0
+    generator = np.random.default_rng(5)
+    singular = [j for j, each in enumerate(nlp.program.constraints) if each.spectral is not None]
+    assert len(singular) == 2
+    for x in starting_points(nlp, 101, 7)[1:]:
+        g, dg, H, weight = np.zeros(limits), np.zeros((limits, n)), np.zeros((n, n)), np.array([0.7])
+        assert c[f"{prefix}_limits"](at(x), at(k), at(g), at(dg), at(work)) == 0
+        _, _, constraint, slopes = nlp.program.kernels.derivatives(x, p)
+        np.testing.assert_allclose(g, constraint.ravel(), rtol=1e-10, atol=1e-12)
+        for j in range(limits):
+            np.testing.assert_allclose(dg[j], slopes[j], rtol=0, atol=1e-10 * max(1e-3, np.abs(slopes[j]).max()))
+        multipliers = generator.normal(size=limits) * (np.arange(limits) >= min(singular))
+        inputs, outputs = (address * 8)(at(x), at(k), at(weight), at(multipliers)), (address * 8)(at(H))
+        assert c[f"{prefix}_SQP_curvature"](inputs, outputs, at(work)) == 0
+        second = nlp.program.kernels.hessian(x, p, 0.7, multipliers)
+        np.testing.assert_allclose(H, second, rtol=0, atol=1e-10 * np.abs(second).max())
+
+
+@needs_compiler
+def test_limits_on_singular_values_hold_where_the_solver_ends(embed: Callable[..., Embedded]) -> None:
+    case = case_from_tables(tomllib.loads(SPECTRA), name="spectra", source="spectra.toml")
+    solved, wanted = embed(case).solve(), solve(case)
+    assert solved.status == 0
+    assert abs(solved.F - wanted.F) <= 1e-6 * wanted.F

@@ -1,0 +1,126 @@
+"""Flash and stack that ``codegen`` writes: from compilers, the same each time, and a clear line without one."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import generate_c, load_case
+from screwsynth.nlp.embedding.callgraph import stack_bound
+from screwsynth.nlp.embedding.ctext import identifier
+from screwsynth.nlp.embedding.measure import CORTEX_M7, X86_64, measure
+from screwsynth.nlp.embedding.measured import NOT_MEASURED, with_figures
+
+Run = Callable[..., tuple[int, str, str]]
+
+NAME = "paper-4.2-rotation"
+PREFIX = identifier(NAME)
+
+
+def macros(header: str) -> dict[str, int]:
+    found = re.findall(r"#define \w+?_((?:FLASH|STACK)_BYTES_\w+) (\d+)", header)
+    return {name: int(value) for name, value in found}
+
+
+@pytest.mark.slow
+def test_the_command_writes_what_the_compilers_say(tmp_path: Path, cli: Run) -> None:
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is not installed")
+    code, out, err = cli("codegen", NAME, "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    plain = generate_c(load_case(NAME), (tmp_path / "case.toml").read_text(encoding="utf-8"))
+    figures = measure(plain, PREFIX)
+    # The same files and compilers give the same bytes.
+    for name, text in with_figures(plain, PREFIX, figures).items():
+        assert (tmp_path / name).read_text(encoding="utf-8") == text, name
+    header = (tmp_path / f"{PREFIX}.h").read_text(encoding="utf-8")
+    readme = (tmp_path / "README.md").read_text(encoding="utf-8")
+    version = subprocess.run(["gcc", "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+    for text in (header, readme):
+        assert version in text
+        assert NOT_MEASURED not in text
+    own = figures[0]
+    assert own.target is X86_64
+    if own.fault:
+        pytest.skip(own.fault)
+    # Only functions of math.h may be deeper than the bound, which does not have them.
+    assert own.painted is not None
+    assert own.stack is not None
+    assert 0.5 * own.stack < own.painted < own.stack + 1000
+    named = {"FLASH_BYTES_X86_64": own.flash, "STACK_BYTES_X86_64": own.stack}
+    assert named.items() <= macros(header).items()
+    assert f"stack at most {own.stack} bytes" in out
+    data = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))["measured"]
+    assert [each["target"] for each in data] == [X86_64.name, CORTEX_M7.name]
+    assert data[0]["stack_bytes"] == own.stack
+
+
+def test_without_a_compiler_one_line_says_so(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path / "empty"))
+    monkeypatch.delenv("CC", raising=False)
+    code, out, err = cli("codegen", NAME, "--out", str(tmp_path / "c"))
+    assert (code, err) == (0, "")
+    header = (tmp_path / "c" / f"{PREFIX}.h").read_text(encoding="utf-8")
+    assert not macros(header)
+    for sentence in (
+        "x86-64: not measured: no compiler for it was found: gcc or cc or clang",
+        "Cortex-M7: not measured: no compiler for it was found: arm-none-eabi-gcc",
+    ):
+        assert sentence in out.splitlines()
+        assert f"/* {sentence} */" in header
+        assert f"{sentence}." in (tmp_path / "c" / "README.md").read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize(
+    ("script", "sentence"),
+    [
+        ("exit 3", "cc1: failed: exit status 3"),
+        ("case $1 in --version) echo one;; -dumpmachine) echo mips;; esac", "cc1 compiles for mips"),
+        ("case $1 in --version) echo one;; -dumpmachine) echo x86_64;; *) echo bad >&2; exit 1;; esac", "bad"),
+    ],
+)
+def test_a_compiler_that_fails_is_no_failure_of_the_command(
+    script: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler = tmp_path / "cc1"
+    compiler.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    files = {f"{PREFIX}.c": "int a(void);", "manifest.json": "{}"}
+    own = measure(files, PREFIX)[0]
+    assert sentence.replace("cc1: failed", "cc1 failed") in own.fault
+    assert (own.flash, own.stack) == (None, None)
+
+
+def test_python_and_no_measure_run_no_compiler(tmp_path: Path, cli: Run) -> None:
+    assert cli("codegen", NAME, "--no-measure", "--out", str(tmp_path))[0] == 0
+    files = generate_c(load_case(NAME), (tmp_path / "case.toml").read_text(encoding="utf-8"))
+    assert all((tmp_path / name).read_text(encoding="utf-8") == text for name, text in files.items())
+    assert f"/* {NOT_MEASURED} */" in files[f"{PREFIX}.h"]
+    assert NOT_MEASURED in files["README.md"]
+
+
+def graph(frames: dict[str, str], edges: list[tuple[str, str]]) -> str:
+    """A call graph as gcc writes it."""
+    nodes = [f'node: {{ title: "{name}" label: "{name}\\nx.c:1:1\\n{size}\\n" }}' for name, size in frames.items()]
+    return "\n".join([*nodes, *(f'edge: {{ sourcename: "{a}" targetname: "{b}" label: "x" }}' for a, b in edges)])
+
+
+def test_the_bound_is_the_deepest_path_and_none_where_there_is_no_bound() -> None:
+    frames = {"p_solve": "100 bytes (static)", "p-x.c:a": "40 bytes (static)", "b": "60 bytes (static)"}
+    edges = [("p_solve", "p-x.c:a"), ("p_solve", "b"), ("p-x.c:a", "sin"), ("b", "sin")]
+    # A return address of 8 bytes for each of the three calls and for the solver.
+    assert stack_bound({"p-x": graph(frames, edges)}, "p") == 100 + 60 + 3 * 8
+    assert stack_bound({"p-x": graph(frames, [*edges, ("b", "p_solve")])}, "p") is None
+    assert stack_bound({"p-x": graph(frames | {"b": "60 bytes (dynamic)"}, edges)}, "p") is None
+    assert stack_bound({}, "p") is None
+    # A search calls the program by pointers, and that calls the caller's deadline.
+    frames = {"p_solve": "1 bytes (static)", "p_SCALED_values": "200 bytes (static)"}
+    edges = [("p_solve", "__indirect_call"), ("p_SCALED_values", "__indirect_call")]
+    assert stack_bound({"p-x": graph(frames, edges)}, "p") == 201 + 2 * 8
