@@ -205,7 +205,7 @@ def _check_symbols(model: Model) -> None:
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
         *(part for member in model.members for part in (member.centre, member.screws)),
         *(each.screw for each in model.actuators),
-        *(part for each in model.joint_screws for part in (each.passive, each.all)),
+        *(each.all for each in model.joint_screws),
         *(equation.expression for equation in (*model.closure, *model.loops)),
         *(quantity.values for quantity in model.quantities),
         *(expression for _, expression in model.scene.expressions),

@@ -40,7 +40,7 @@ from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
-from .structure import structure_of, with_kept
+from .structure import joint_screws, structure_of, with_kept
 from .words import RobotWords, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -117,7 +117,7 @@ class _Builder:
         for index, joints in enumerate(limb.paths):
             new = _labels(limb, index, joints, labels)
             labels |= new
-            path = self._path(limb, index, joints, self._variables(limb, known))
+            path = self._path(limb, index, joints, self._variables(limb, known), labels)
             if path is None:
                 self._remark_idle(limb)
                 fault = "its limb neither resists nor drives the platform"
@@ -153,7 +153,9 @@ class _Builder:
         if remark not in self.remarks:
             self.remarks.append(remark)
 
-    def _path(self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables) -> OpenedPath | None:
+    def _path(
+        self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
+    ) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
         robot = self.robot
         joints = simplified(robot, joints, self.samples)
@@ -176,11 +178,8 @@ class _Builder:
         self.closure += [Closure(f"loop {name} ({k + 1})", each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
-        if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
-            every = [screw for own in path.screws for screw in own]
-            passive = [s for joint, own in zip(joints, path.screws, strict=True) if not joint.actuated for s in own]
-            some, all_of_them = ca.horzcat(SX(6, 0), *passive), ca.horzcat(SX(6, 0), *every)
-            self.screws.append(JointScrews(limb.name, some, all_of_them, ranks.passive, ranks.all))
+        screws = joint_screws(limb.name, path, ranks, labels)
+        self.screws += [] if screws is None else [screws]
         return path
 
     def _variables(self, limb: Limb, known: dict[tuple[int, int], SX]) -> Variables:

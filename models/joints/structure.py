@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from ..parts import Closure, PathStructure
+import casadi as ca
+from casadi import SX
+
+from ..parts import Closure, JointScrews, PathStructure
+from .chain import Joint
 from .opened import OpenedPath
 from .resistance import Ranks
 
@@ -33,6 +37,32 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
         equations=count,
         kept=count,
     )
+
+
+def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int, str]) -> JointScrews | None:
+    """Return the current screws of a path's joints; None where those of a joint are not known.
+
+    Args:
+        limb: name of the limb.
+        path: the path.
+        ranks: of its screws.
+        labels: of the joints as they are written, by identity.
+    """
+    if any(len(own) != len(joint.axes) for joint, own in zip(path.joints, path.screws, strict=True)):
+        return None
+    names = [name for joint in path.joints for name in _column_labels(joint, labels)]
+    driven = [joint.actuated for joint in path.joints for _ in joint.axes]
+    screws = ca.horzcat(SX(6, 0), *[screw for own in path.screws for screw in own])
+    indices = tuple(k for k, is_driven in enumerate(driven) if is_driven)
+    return JointScrews(limb, tuple(names), screws, indices, ranks.passive, ranks.all)
+
+
+def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
+    """Return the label of the joint of each axis; the three axes of a ball joint are along those of the world."""
+    written = joint.parts or (joint,)
+    if joint.type == "S" and len(written) > 1:
+        return [f"{labels[id(written[0])]} to {labels[id(written[-1])]}"] * len(joint.axes)
+    return [labels[id(part)] for part in written for _ in part.axes]
 
 
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:

@@ -10,6 +10,7 @@ from ..case.pose import OverPoses
 from ..case.task import Sense
 from .jointdata import JointsData
 from .jsondata import Absent, Inline, JsonObject, Size, Vector, Vector3, Vector6
+from .motiondata import MotionData
 
 #: Version of the format.
 SCHEMA = 1
@@ -75,22 +76,6 @@ class PoseData(JsonObject):
     axis: Vector3
     angle: float
     rotation_matrix: RotationMatrix
-
-
-class MotionData(JsonObject):
-    """An instantaneous motion of the platform.
-
-    Attributes:
-        twist: angular velocity, then velocity at the world origin.
-        axis: unit direction of the screw axis.
-        point: the axis's point nearest to the world origin; null for a translation.
-        pitch: length per radian; "inf" for a translation.
-    """
-
-    twist: Vector6
-    axis: Vector3
-    point: Vector3 | None
-    pitch: float | Literal["inf"]
 
 
 class TaskData(JsonObject):

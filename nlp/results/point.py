@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Quantity, axis_from_screw
+from ...models import Dimension, FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
 from ..evidence.assembly import assembly_of
@@ -23,11 +23,11 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from .jointdata import ActuatorData, JointsData
 from .jsondata import Vector, finite_or_none, matrix, vector
+from .motiondata import motion_data
 from .parts import (
     SCHEMA,
     ByOwner,
     HeadData,
-    MotionData,
     PoseData,
     PosesData,
     PoseStateData,
@@ -39,7 +39,7 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    pass
 
 #: Violations of less than this part of the worst are left out: a failed solve leaves them beside the worst.
 _SMALL = 1e-3
@@ -197,18 +197,6 @@ def task_data(case: Case, task: int) -> TaskData:
         sense=chosen.sense,
         motion=motion_data(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
-    )
-
-
-def motion_data(twist: ArrayLike) -> MotionData:
-    """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
-    screw = axis_from_screw(twist)
-    translation = math.isinf(screw.pitch)
-    return MotionData(
-        twist=vector(np.asarray(twist, dtype=np.float64)),
-        axis=vector(screw.axis),
-        point=None if translation else vector(screw.point),
-        pitch="inf" if translation else screw.pitch,
     )
 
 
