@@ -178,6 +178,7 @@ def _check_shapes(model: Model) -> None:
         expected += [
             (f"member {index} centre", member.centre, (3, 1)),
             (f"member {index} screws", member.screws, (6, member.screws.shape[1])),
+            *([] if member.slide is None else [(f"member {index} slide", member.slide, (3, 1))]),
         ]
     expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
@@ -203,7 +204,12 @@ def _check_symbols(model: Model) -> None:
         raise _model_error(model, "a symbol stands for two things")
     used: Iterable[SX] = [
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
-        *(part for member in model.members for part in (member.centre, member.screws)),
+        *(
+            part
+            for member in model.members
+            for part in (member.centre, member.screws, member.slide)
+            if part is not None
+        ),
         *(each.screw for each in model.actuators),
         *(each.all for each in model.joint_screws),
         *(equation.expression for equation in (*model.closure, *model.loops)),

@@ -40,7 +40,7 @@ from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
-from .structure import joint_screws, structure_of, with_kept
+from .structure import joint_screws, member_remarks, structure_of, with_kept
 from .words import RobotWords, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -262,7 +262,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         structure=with_kept(builder.structure, independent),
         joints=tuple(builder.joints),
         links=with_shared_places(builder.links, frame),
-        remarks=(*remarks, *builder.remarks),
+        remarks=(*remarks, *builder.remarks, *member_remarks(builder.structure)),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

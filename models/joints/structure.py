@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -12,6 +12,9 @@ from ..parts import Closure, JointScrews, PathStructure
 from .chain import Joint
 from .opened import OpenedPath
 from .resistance import Ranks
+
+#: A member with so many wrenches resists nearly every motion alike.
+_MANY_WRENCHES = 5
 
 
 def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns: int) -> PathStructure:
@@ -72,6 +75,25 @@ def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) ->
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
         for each in structures
     )
+
+
+def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
+    """Return remarks on members of so many wrenches, or so few members, that F says little about the robot.
+
+    F is a sum over members of orthonormal wrenches: within one member it has no conditioning.
+    """
+    members = [each for each in structures if each.wrenches > 0]
+    if len(members) == 1:
+        text = (
+            "the robot has one member only, so F says little: within a member F does not tell good directions from bad"
+        )
+        return [text]
+    names = [each.name for each in members if each.wrenches >= _MANY_WRENCHES]
+    if not names:
+        return []
+    who = f"member {names[0]} resists" if len(names) == 1 else f"members {', '.join(names)} resist"
+    words = f"{who} with {_MANY_WRENCHES} wrenches or more, so that part of F says little"
+    return [f"{words}: within a member F does not tell good directions from bad"]
 
 
 def _opened(path: OpenedPath) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,13 @@ from .state import RobotState
 _FEASIBLE = 1e-12
 
 
+class LimbPart(NamedTuple):
+    """The part of F that a limb has: of its actuators, and of its constraints, with which no actuator can move."""
+
+    actuation: float
+    constraint: float
+
+
 @dataclass(frozen=True, eq=False)
 class Mobility:
     """Freedoms and rates at a point.
@@ -32,6 +40,7 @@ class Mobility:
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
             actuator cannot drive the platform.
         constrained: part of F that the constraints carry, 0 to 1; 0 where the platform can make the motion.
+        parts: actuation and constraint in F, by limb.
         singularities: all that were found.
     """
 
@@ -39,6 +48,7 @@ class Mobility:
     constraint_rank: int
     actuator_rates: Mapping[str, float]
     constrained: float
+    parts: Mapping[str, LimbPart]
     singularities: tuple[Singularity, ...]
 
 
@@ -59,7 +69,11 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
     constraints = constraint_rows(model, J, screws)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
-    rates, left = _actuator_rates(model, J, screws, numbers.rates[:, 0])
+    rates, parts = _actuator_rates(model, J, screws, numbers.rates[:, 0])
+    left = sum(part.constraint for part in parts.values())
+    is_feasible = left <= _FEASIBLE * state.size
+    if is_feasible:  # what is left is rounding
+        parts = {limb: LimbPart(part.actuation, 0.0) for limb, part in parts.items()}
     found = limb_singularities(nlp, x, state, pose)
     # The wrenches of a limb whose passive joints are dependent are not those of its model, so J says nothing.
     if all(each.kind is not SingularityKind.PASSIVE for each in found):
@@ -71,27 +85,30 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
         freedoms=6 - constraint_rank,
         constraint_rank=constraint_rank,
         actuator_rates=MappingProxyType(rates),
-        constrained=left / state.F if left > _FEASIBLE * state.size else 0.0,
+        constrained=0.0 if is_feasible else left / state.F,
+        parts=MappingProxyType(parts),
         singularities=tuple(found),
     )
 
 
 def _actuator_rates(
     model: Model, J: FloatArray, screws: FloatArray, rates: FloatArray
-) -> tuple[dict[str, float], float]:
-    """Return the rate of each actuator by name, and the part of F that no actuator moves with."""
+) -> tuple[dict[str, float], dict[str, LimbPart]]:
+    """Return the rate of each actuator by name, and the parts of F of each limb."""
     found: dict[str, float] = {}
-    left = 0.0
+    parts: dict[str, LimbPart] = {}
     for limb in model.limbs:
         rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
         own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
         driven = J[rows] @ np.vstack([screws[3:, own], screws[:3, own]])
         values: FloatArray = np.zeros(len(own))
         residual, resisted = rates[rows], np.linalg.norm(driven, axis=0)
-        if own and float(np.linalg.norm(driven)) > DEPENDENT * float(np.abs(J[rows]).max()):
+        zero = DEPENDENT * float(np.abs(J[rows]).max())
+        if own and float(np.linalg.norm(driven)) > zero:
             values = np.asarray(np.linalg.lstsq(driven, rates[rows], rcond=DEPENDENT)[0], dtype=np.float64)
             residual = rates[rows] - driven @ values
-        left += float(residual @ residual)
+        moved = rates[rows] - residual
+        parts[limb] = LimbPart(float(moved @ moved), float(residual @ residual))
         for k, value, size in zip(own, values, resisted, strict=True):
-            found[model.actuators[k].name] = float(value) if size > 0 else float("inf")
-    return {each.name: found.get(each.name, float("inf")) for each in model.actuators}, left
+            found[model.actuators[k].name] = float(value) if size > zero else float("inf")
+    return {each.name: found.get(each.name, float("inf")) for each in model.actuators}, parts

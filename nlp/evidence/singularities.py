@@ -19,6 +19,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -33,6 +34,10 @@ DEPENDENT = 1e-7
 _TAKES_PART = 1e-6
 
 
+#: Keys of kinds in results as JSON.
+SingularityKey: TypeAlias = Literal["passive", "serial", "constraint", "actuation", "architecture"]
+
+
 class SingularityKind(enum.Enum):
     """Kind of a singularity; each value is a clause for people."""
 
@@ -41,6 +46,20 @@ class SingularityKind(enum.Enum):
     CONSTRAINT = "the constraints are dependent: the platform gains a freedom even with free actuators"
     ACTUATION = "the platform can move with every actuator locked"
     ARCHITECTURE = "the rank is below six at all dimensions and poses: the platform can always move"
+
+    @property
+    def key(self) -> SingularityKey:
+        """The kind's key in results as JSON."""
+        return _KEYS[self]
+
+
+_KEYS: dict[SingularityKind, SingularityKey] = {
+    SingularityKind.PASSIVE: "passive",
+    SingularityKind.SERIAL: "serial",
+    SingularityKind.CONSTRAINT: "constraint",
+    SingularityKind.ACTUATION: "actuation",
+    SingularityKind.ARCHITECTURE: "architecture",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +265,7 @@ def _span_of(columns: FloatArray) -> FloatArray:
 
 
 def _dual(wrenches: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
-    """Return an orthonormal basis (6, r) of wrenches (m, 6): moments about a centre in parts of a length, then forces."""
+    """Return an orthonormal basis (6, r) of wrenches (m, 6): moments in parts of a length, then forces."""
     moments = wrenches[:, 3:] - np.cross(centre, wrenches[:, :3])
     rows = np.hstack([moments / reach, wrenches[:, :3]])
     return _span_of(rows.T) if len(rows) else np.zeros((6, 0))

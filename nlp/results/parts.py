@@ -152,6 +152,8 @@ class RobotData(JsonObject):
         quantities: leg lengths, joint angles and the like, by limb.
         limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
         characteristic_length: that relates couples to forces; absent for robots without constraint couples.
+        length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
+            where F is 0, and with several tasks.
         joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
         several: the robot at every pose; absent where there is one.
     """
@@ -170,6 +172,7 @@ class RobotData(JsonObject):
     quantities: Mapping[str, ByOwner]
     limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
+    length_dependence: Absent[float]
     joints: Absent[JointsData]
     several: Inline[PosesData | None]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -15,14 +14,13 @@ import numpy as np
 from ...models import Dimension, FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
-from ..evidence.assembly import assembly_of
+from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
-from ..evidence.mobility import mobility_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .jointdata import ActuatorData, JointsData
-from .jsondata import Vector, finite_or_none, matrix, vector
+from .jointpoint import joints_data
+from .jsondata import Vector, matrix, vector
 from .motiondata import motion_data
 from .parts import (
     SCHEMA,
@@ -77,6 +75,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
     case = nlp.case
     limited = _limited_quantities(nlp, x)
     several = _poses_data(nlp, x, limited)
+    dependence = None if task is None else dependence_of(nlp, x)
     return RobotData(
         parameters=parameters_data(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
@@ -92,33 +91,9 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         quantities=_quantities(case, state),
         limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
-        joints=_joints_data(nlp, x, state, with_task=task is not None),
+        length_dependence=None if dependence is None else dependence.length,
+        joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
         several=several,
-    )
-
-
-def _joints_data(nlp: Nlp, x: FloatArray, state: RobotState, *, with_task: bool) -> JointsData | None:
-    """Return the joints of a robot given joint by joint; None for others."""
-    found = mobility_of(nlp, x, state)
-    if found is None:
-        return None
-    assembly = assembly_of(nlp, x, state)
-    actuators = (
-        ActuatorData(
-            name=each.name,
-            kind="angle" if each.dimension is Dimension.ANGLE else "length",
-            rate=finite_or_none(found.actuator_rates.get(each.name, math.inf)),
-        )
-        for each in nlp.program.model.actuators
-    )
-    return JointsData(
-        freedoms=found.freedoms,
-        actuators=tuple(actuators) if with_task else None,
-        constrained=found.constrained if with_task else None,
-        singularities=tuple(
-            f"{'' if each.limb is None else f'limb {each.limb}: '}{each.kind.value}" for each in found.singularities
-        ),
-        assembly=() if assembly is None else assembly.sentences,
     )
 
 

@@ -49,6 +49,8 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "measures", "what it is"), tuple(rows))
+    for remark in model.remarks:
+        yield Line(remark, label="note")
 
 
 def _structure_words(model: Model) -> Iterator[Line | TextTable]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from ..evidence.kkt import ACTIVE
 from ..units import Units
 from .data import CombinedData
+from .motionwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
-from .wording import SET, counted, motion_words
+from .wording import SET, counted
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

@@ -8,6 +8,7 @@ from ...case.case import Case
 from ...case.pose import sizes_of_turn
 from ...results.data import CombinedResult, SolveResult
 from ...results.designtable import combined_design_table, solved_design_table
+from ...results.jointwording import limb_part_table
 from ...results.parts import LimitData, MarginData, RobotData
 from ...results.point import task_data
 from ...results.robottables import robot_tables
@@ -271,6 +272,11 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
     for table in others:
         caption = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
         parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
+    parts_by_limb = limb_part_table(case, robot)
+    if parts_by_limb is not None:
+        parts.append(
+            html_table(parts_by_limb, "Actuation and constraints in F, limb by limb", id=f"{anchor}-actuation")
+        )
     if not reached:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts
