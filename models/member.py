@@ -33,6 +33,7 @@ class Member:
         is_pinned: whether a spherical joint at the centre leaves forces through the centre only.
         slide: (3, 1) current unit axis along which the centre could as well lie elsewhere, because it is any point of
             the last passive joint's; None for a centre that the joints or the user determine.
+        name: its name where the limb has several members; empty for the limb's.
     """
 
     limb: str
@@ -42,6 +43,12 @@ class Member:
     kinds: tuple[WrenchKind, ...]
     is_pinned: bool = False
     slide: SX | None = None
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its name; that of the limb where the limb has no other member."""
+        return self.name or self.limb
 
     @property
     def size(self) -> int:

@@ -117,14 +117,14 @@ class Model(Whole, Shown):
     @property
     def rows(self) -> tuple[RowLabel, ...]:
         """Limb and kind of each row of the Jacobian as results state it: for a member, a basis of its wrenches."""
-        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
-        return (*own, *(RowLabel(each.limb, kind) for each in self.members for kind in each.kinds))
+        own = [row.label for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, kind, each.label) for each in self.members for kind in each.kinds))
 
     @property
     def frame_rows(self) -> tuple[RowLabel, ...]:
         """Limb and kind of each row of a :class:`~.instance.RobotInstance`: for a member, all rows of its projector."""
-        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
-        return (*own, *(RowLabel(each.limb, each.kind) for each in self.members for _ in range(each.size)))
+        own = [row.label for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, each.kind, each.label) for each in self.members for _ in range(each.size)))
 
     @property
     def has_couples(self) -> bool:

@@ -172,9 +172,10 @@ class _Builder:
         before = sum(row.limb == limb.name for row in self.wrenches)
         row = before if len(limb.branches) > 1 and len(rows) == 1 else None
         self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
-        self.wrenches += rows
-        self.members += [] if member is None else [member]
-        name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
+        several = len(limb.branches) > 1
+        name = f"{limb.name}.{index + 1}" if several else limb.name
+        self.wrenches += [replace(each, member=name) for each in rows] if several else rows
+        self.members += [] if member is None else [replace(member, name=name if several else "")]
         self.closure += [Closure(f"loop {name} ({k + 1})", each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))

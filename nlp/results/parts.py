@@ -142,6 +142,7 @@ class RobotData(JsonObject):
         pose: of the platform; with several poses, the first that the case states.
         task: the task that the rates belong to; absent where there are several.
         limbs: limb of each row of the Jacobian.
+        members: member of its limb that applies each row: the limb, with a number where the limb has several.
         jacobian: unit wrenches as rows, force then moment about the world origin.
         rates: work rate of each row in the task's motion.
         rank: of the Jacobian.
@@ -162,6 +163,7 @@ class RobotData(JsonObject):
     pose: PoseData
     task: Absent[TaskData]
     limbs: tuple[str, ...]
+    members: tuple[str, ...]
     jacobian: Jacobian
     rates: Absent[Vector]
     rank: int

@@ -81,6 +81,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
         task=None if task is None else task_data(case, task),
         limbs=tuple(row.limb for row in case.model.rows),
+        members=tuple(row.member for row in case.model.rows),
         jacobian=matrix(state.jacobian),
         rates=None if task is None else vector(state.rates),
         rank=state.rank,

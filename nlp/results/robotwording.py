@@ -44,7 +44,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     )
     if model.structure:
         yield from _structure_words(model)
-    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.rows)]
+    rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]

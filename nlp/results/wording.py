@@ -192,6 +192,7 @@ def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator
         F = number(task_F(robot, found.F))
         if index and number(task_F(robot, starts.optima[index - 1].F)) == F:
             note += ", at another point"
+        note += f", in {found.assembly}" if found.assembly else ""
         yield Line(f"  {found.count} at F = {F}{note}")
     worse = len(starts.optima) - _OPTIMA
     if worse > 0:

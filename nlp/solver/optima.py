@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray
+from ..evidence.assembly import Assembly, assembly_over_poses
 from ..evidence.optimality import Evidence, PointKind, examine
+from ..evidence.workingmode import turned_over_poses
 from ..program.nlp import Nlp
 from .phase import Phase, PhaseProgress
 from .starts import SAME_POINT, Start, StartStatus
@@ -29,6 +32,7 @@ class Optimum:
         spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
             isolated optimum, up to 1 for a set of them, which may have several pieces.
         evidence: the evidence at ``x``.
+        nlp: the program.
     """
 
     F: float
@@ -36,6 +40,12 @@ class Optimum:
     x: FloatArray
     spread: float
     evidence: Evidence
+    nlp: Nlp
+
+    @cached_property
+    def assembly(self) -> Assembly | None:
+        """The way in which the joints are assembled at ``x``, found when it is first used; None without loops."""
+        return assembly_over_poses(self.nlp, self.x)
 
 
 def same_value(nlp: Nlp) -> float:
@@ -53,7 +63,8 @@ class Distinct(NamedTuple):
 def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Distinct:
     """Group converged starts by value and point, and examine one point of each group, once.
 
-    Where an optimum is not isolated, all points of its F count as one set; it may have several pieces.
+    Where an optimum is not isolated, all points of its F count as one set; it may have several pieces. Points in
+    different working modes of a robot's limbs count as different sets.
     """
     optima: list[Optimum] = []
     refused: dict[int, StartStatus] = {}
@@ -66,7 +77,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Di
         evidence = examine(nlp, lead.x)
         # The lead is the first start of the level, and so of the first group: its evidence serves that group.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED
-        groups = _group_by_point(nlp, level) if isolated else [level]
+        groups = _group_by_point(nlp, level) if isolated else _group_by_mode(nlp, level)
         examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
         for each, group in zip(examined, groups, strict=True):
             if not each.kind.is_optimum:
@@ -77,7 +88,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Di
                 continue
             x = np.array([start.x for start in group])
             spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))
-            optima.append(Optimum(group[0].F, len(group), group[0].x, spread, each))
+            optima.append(Optimum(group[0].F, len(group), group[0].x, spread, each, nlp))
         remaining = [start for start in remaining if start not in level]
     starts = [replace(start, status=refused.get(id(start), start.status)) for start in done]
     return Distinct(starts, optima)
@@ -93,6 +104,14 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
         else:
             same.append(start)
     return groups
+
+
+def _group_by_mode(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
+    """Group starts whose points are in the same working modes, in the order of the first of each group."""
+    groups: dict[tuple[tuple[str, ...], ...], list[Start]] = {}
+    for start in starts:
+        groups.setdefault(turned_over_poses(nlp, start.x), []).append(start)
+    return list(groups.values())
 
 
 def _largest_distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -165,8 +165,14 @@ class Panel:
                 key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))),
             )
             places = line[0] + np.outer(_ALONG_LINK, line[1] - line[0])
-            own = list(dict.fromkeys(rate for _, each in lines if each.limb == limb and (rate := self._own_rate(each))))
-            text = f"limb {limb}" if not rates else f"limb {limb}\n{self._rates_text(own or [rates[limb]])}"
+            own = {
+                row: None for _, each in lines if each.limb == limb and (row := self.drawing.link_row(each)) is not None
+            }
+            text = (
+                f"limb {limb}"
+                if not rates
+                else f"limb {limb}\n{self._rates_text(list(own)) or self._rate_text(rates[limb])}"
+            )
             self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
     def _paint_rails(self) -> None:
@@ -329,10 +335,11 @@ class Panel:
         row = self.drawing.link_row(link)
         return None if row is None else self.drawing.rows[row].rate
 
-    def _rates_text(self, rates: Sequence[float]) -> str:
-        """Return rates with their unit, those of a limb's rods side by side."""
-        unit = self._rate_unit()
-        return " and ".join(self._rate_text(each).removesuffix(unit).strip() for each in rates) + f" {unit}".rstrip()
+    def _rates_text(self, limb: str) -> str:
+        """Return the rates of a limb's rods side by side, with their unit; empty for a limb without such rods."""
+        unit, rows = self._rate_unit(), self.drawing.own_rows(limb)
+        texts = [f"{row.member}: {self._rate_text(row.rate).removesuffix(unit).strip()}" for row in rows]
+        return " and ".join(texts) + f" {unit}".rstrip() if texts else ""
 
     def _rate_text(self, rate: float) -> str:
         """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""

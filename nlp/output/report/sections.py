@@ -213,7 +213,7 @@ def _rates(view: ViewData) -> Markup:
         body.append(
             tag(
                 "tr",
-                tag("th", row["limb"], scope="row"),
+                tag("th", row["member"], scope="row"),
                 tag("td", row["kind"]) if couples else None,
                 *(tag("td", cell, class_=kind) for cell, kind in zip(cells, kinds, strict=True)),
             )
