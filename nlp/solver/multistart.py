@@ -27,6 +27,7 @@ from ..program.relaxation import (
     unrelaxed_pairs,
 )
 from ..program.sampling import starting_points
+from .closing import closed_point, closing
 from .interface import Solver
 from .ipopt import ipopt
 from .optima import Optimum, distinct_optima
@@ -165,8 +166,10 @@ def _search(
     ends violate; such starts are repeated until none is left.
     """
     began = time.perf_counter()
-    if nlp.n == 0:
-        return _evaluate_without_variables(nlp, search, began)
+    if nlp.is_fixed:
+        return _evaluate_fixed(nlp, search, began)
+    if nlp.is_overdetermined:
+        solver = closing
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
@@ -226,13 +229,13 @@ def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
     return nlp.sign * min(values) if values else None
 
 
-def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
-    """Evaluate a program without variables."""
-    x = frozen_array(nlp.start, (0,))
+def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
+    """Evaluate a program of a case that leaves nothing free, once: only the robot's loops are closed."""
+    x = closed_point(nlp, search)
     status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)
-    state = evaluate(nlp, x)
-    return ProgramSolution(status, nlp, x, state, evidence, (), (), search.seed, time.perf_counter() - began)
+    state, seconds = state_or_none(nlp, x), time.perf_counter() - began
+    return ProgramSolution(status, nlp, frozen_array(x, (nlp.n,)), state, evidence, (), (), search.seed, seconds)
 
 
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:

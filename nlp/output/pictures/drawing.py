@@ -270,7 +270,7 @@ def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Lin
 
 def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | None:
     """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
-    if nlp.n == 0:
+    if nlp.is_fixed:
         return None
     x = close_equations(nlp, nlp.start)
     state = state_at_pose(nlp, x, pose)

@@ -165,14 +165,8 @@ class Panel:
                 key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))),
             )
             places = line[0] + np.outer(_ALONG_LINK, line[1] - line[0])
-            own = {
-                row: None for _, each in lines if each.limb == limb and (row := self.drawing.link_row(each)) is not None
-            }
-            text = (
-                f"limb {limb}"
-                if not rates
-                else f"limb {limb}\n{self._rates_text(list(own)) or self._rate_text(rates[limb])}"
-            )
+            words = f"\n{self._rates_text(limb) or self._rate_text(rates[limb])}" if rates else ""
+            text = f"limb {limb}{words}"
             self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
     def _paint_rails(self) -> None:

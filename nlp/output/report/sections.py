@@ -85,7 +85,7 @@ def _case(report: Report) -> Markup:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
     program = first.nlp.program
     level = None if program.places.epigraph is None else program.places.epigraph.level
-    names = [variable.name for k, variable in enumerate(program.variables) if k != level]
+    names = [variable.name for k, variable in enumerate(program.variables) if k != level and not first.nlp.is_fixed]
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
