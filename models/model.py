@@ -67,6 +67,7 @@ class Model(Whole, Shown):
         remarks: sentences for the user on what may be a mistake in a robot that is given joint by joint.
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
         structure: the structure of each path of joints; empty for a robot given by its rows.
+        length_unit: unit of the parameters' typical lengths, such as ``m``; empty for proportions in any unit.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -96,6 +97,7 @@ class Model(Whole, Shown):
     remarks: tuple[str, ...] = ()
     generic: GenericRanks | None = None
     structure: tuple[PathStructure, ...] = ()
+    length_unit: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))

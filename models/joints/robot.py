@@ -31,7 +31,7 @@ from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
 from .faults import examine_geometry
-from .forms import Expression, RobotError, VectorExpression
+from .forms import Expression, RobotError, VectorExpression, plain
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
 from .motion import AxisKind, Motion
@@ -56,6 +56,7 @@ def robot(
     dimensions: Mapping[str, Mapping[str, object]] | None = None,
     derived: Mapping[str, Expression] | None = None,
     description: str = "",
+    length_unit: str = "",
 ) -> Model:
     """Return a robot that is given joint by joint, at home; the arguments are the keys of a robot file.
 
@@ -68,6 +69,7 @@ def robot(
             ``"angle"`` or ``"number"``) and ``description``. The typical value of an angle is in degrees.
         derived: further numbers by name, as expressions of the dimensions and of earlier ones.
         description: one sentence for people.
+        length_unit: unit of the typical dimensions, such as ``"m"``; empty for proportions in any unit.
 
     Raises:
         RobotError: a key or value is not allowed, or the robot cannot be put together near home.
@@ -79,8 +81,9 @@ def robot(
         "dimensions": dimensions,
         "derived": derived,
         "description": description,
+        "length_unit": length_unit,
     }
-    definition = {key: value for key, value in tables.items() if value is not None and value != ""}
+    definition = {key: plain(value) for key, value in tables.items() if value is not None and value != ""}
     return _model(read_words(tables), definition)
 
 
@@ -132,6 +135,12 @@ class _Builder:
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
+        if driven and limb.name not in self.carrying:
+            fault = (
+                "has an actuated joint that drives nothing, because its passive joints alone leave the platform free; "
+                "remove actuated = true or a passive joint"
+            )
+            raise RobotError(limb.place, fault)
         several = len(driven) > 1
         for k, (joint, path, j) in enumerate(driven.values()):
             name = f"{limb.name}.{k + 1}" if several else limb.name
@@ -139,7 +148,7 @@ class _Builder:
             is_angle = axis.kind is AxisKind.ROTATION
             dimension = Dimension.ANGLE if is_angle else Dimension.LENGTH
             self.actuators.append(Actuator(name, limb.name, path.screws[j][0], dimension))
-            way = slide_length(path, self.frame) if j == path.cut.slide else known[id(joint), 0]
+            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[id(joint), 0])
             self.positions.append(SX(0) if way is None else way)
 
     @property
@@ -247,6 +256,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     model = Model(
         name=words.name,
         description=words.description,
+        length_unit=words.length_unit,
         options={"definition": definition},
         parameters=_parameters(at_home),
         pose=pose,

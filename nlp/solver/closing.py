@@ -1,8 +1,8 @@
 """Programs whose equations leave nothing to choose: they are closed by Newton's method, without a local solver.
 
 A case that fixes all dimensions and the pose leaves the robot's internal unknowns alone as variables, as many as its
-loops have independent equations. Where the loops cannot be closed, dependent equations cannot be told and all remain: an
-interior-point method refuses a program with more equations than variables.
+loops have independent equations. Where the loops cannot be closed, dependent equations cannot be told and all remain:
+an interior-point method refuses a program with more equations than variables.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from .interface import LocalSearch, SolverResult, StopReason
 def closed_point(nlp: Nlp, search: Search) -> FloatArray:
     """Return the point (n,) of a case that leaves nothing free, with its loops closed.
 
-    The assembly is that of home. Where the path from home does not reach the pose, loops are closed from sampled unknowns; where this fails too, the
-    point is where Newton's method ended from home.
+    The assembly is that of home. Where the path from home does not reach the pose, loops are closed from sampled
+    unknowns; where this fails too, the point is where Newton's method ended from home.
 
     Args:
         nlp: the program.

@@ -78,7 +78,7 @@ LINKS: dict[str, dict[str, tuple[int, int]]] = {
 }
 
 KEYS = {
-    "robot": {"name", "description", "home", "dimensions", "derived", "limb"},
+    "robot": {"name", "description", "length_unit", "home", "dimensions", "derived", "limb"},
     "dimension": {"typical", "kind", "description"},
     "limb": {"repeat", "points", "joints", "branch", "centre"},
     "repeat": {"count", "angles", "axis", "through"},

@@ -113,7 +113,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
     # Keys.
-    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, home, dimensions, derived, limb"),
+    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, length_unit, home, dimensions, derived, limb"),
     (LAST, 'at = "A", friction = 1 }', "limb 1, joint 3, friction: no such key; allowed: type, name, at, axis"),
     ("typical = 1.0", "typical = 1.0, min = 0", "dimensions, rb, min: no such key; allowed: typical, kind, description"),
     ("repeat =", "mirror = true\nrepeat =", "limb 1, mirror: no such key; allowed: name, repeat, points, joints, branch"),
