@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from screwsynth.models import constraint_rows, robot, robot_function
-from screwsynth.nlp import Case, Free, Nlp, Task, evaluate, formulate, result_of, solve
+from screwsynth.nlp import Case, Free, Nlp, Task, evaluate, formulate, report, result_of, solve
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.conventions import dependence_of
@@ -138,6 +138,13 @@ def test_members_of_which_f_says_little_are_named() -> None:
     ]
     (arm,) = [note for note in robot(name="arm", home=(2, 0, 1), limb=[{"joints": joints}]).remarks if "little" in note]
     assert arm.startswith("the robot has one member only")
+
+
+def test_the_page_shows_notes_and_parts_by_limb() -> None:
+    case = starter("five-bar")
+    page = report(solve(case, starts=1))
+    assert "Note: member 1 resists with 5 wrenches or more" in page
+    assert "Actuation and constraints in F, limb by limb" in page
 
 
 def test_rows_have_the_names_of_their_members() -> None:

@@ -218,7 +218,7 @@ class Panel:
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-            if not free:
+            if not free and len(motion.path) > 2:
                 self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
                 self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:

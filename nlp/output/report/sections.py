@@ -74,7 +74,7 @@ def answer(report: Report) -> Markup:
 def _case(report: Report) -> Markup:
     """Return the case in words."""
     case, first = report.case, report.parts[0]
-    lines = [f"{case.model.description}."]
+    lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
         lines.append(f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}.")
