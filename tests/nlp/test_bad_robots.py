@@ -250,11 +250,13 @@ REMARKS = [
 
 
 def test_axes_that_are_almost_parallel_and_idle_limbs_are_remarked_on(tmp_path: Path, cli: Run) -> None:
-    assert load_case(put(tmp_path, ROBOT)).model.remarks == ()
+    (alone,) = load_case(put(tmp_path, ROBOT)).model.remarks
+    assert alone.startswith("the robot has one member only, so F says little")
     for old, new, remark in REMARKS:
         name = put(tmp_path, ROBOT.replace(old, new, 1))
-        (found,) = load_case(name).model.remarks
+        found, *others = load_case(name).model.remarks
         assert found.startswith(remark)
+        assert others == [alone]
     status, out, _ = cli("evaluate", name, "--set", "p_z=1.1")
     assert status == 0
     assert "note  limb 1 carries nothing" in out
