@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -26,13 +27,15 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
         length = rate_unit(task.motion.twist, units)
         angle = f"rad{length.removeprefix(units.length)}"
         largest = max((abs(each.rate) for each in joints.actuators if each.rate is not None), default=1.0)
+        # Where the task moves no actuator, all rates are rounding of the platform's velocity.
+        reach = robot_size(robot)
+        speed = math.hypot(*task.motion.twist[3:]) + reach * math.hypot(*task.motion.twist[:3])
+        sizes = {"length": max(largest, speed), "angle": max(largest, speed / reach)}
+        units_of = {"length": length, "angle": angle}
         rates = (
-            f"{each.name}: "
-            + (
-                "none"
-                if each.rate is None
-                else f"{number(each.rate, largest, digits=6, signed=True)} {length if each.kind == 'length' else angle}"
-            )
+            f"{each.name}: none"
+            if each.rate is None
+            else f"{each.name}: {number(each.rate, sizes[each.kind], digits=6, signed=True)} {units_of[each.kind]}"
             for each in joints.actuators
         )
         yield Line(", ".join(rates), label="actuator rates")
