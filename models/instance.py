@@ -171,7 +171,9 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         replace(member, centre=centre, screws=screws)
         for member, centre, screws in zip(model.members, parts[::2], parts[1::2], strict=True)
     ]
-    rows = [Wrench(row.limb, row.kind, force[:, i], moment[:, i], square[i]) for i, row in enumerate(model.wrenches)]
+    rows = [
+        replace(row, force=force[:, i], moment=moment[:, i], square=square[i]) for i, row in enumerate(model.wrenches)
+    ]
     return RobotInstance(
         parameters=substitution.parameters,
         rotation=substitution.rotation,

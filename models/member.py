@@ -31,6 +31,9 @@ class Member:
         kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` of them, or
             ``3 - rank`` of a pinned member.
         is_pinned: whether a spherical joint at the centre leaves forces through the centre only.
+        slide: (3, 1) current unit axis along which the centre could as well lie elsewhere, because it is any point of
+            the last passive joint's; None for a centre that the joints or the user determine.
+        name: its name where the limb has several members; empty for the limb's.
     """
 
     limb: str
@@ -39,6 +42,13 @@ class Member:
     rank: int
     kinds: tuple[WrenchKind, ...]
     is_pinned: bool = False
+    slide: SX | None = None
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its name; that of the limb where the limb has no other member."""
+        return self.name or self.limb
 
     @property
     def size(self) -> int:

@@ -70,6 +70,7 @@ class Model(Whole, Shown):
         remarks: sentences for the user on what may be a mistake in a robot that is given joint by joint.
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
         structure: the structure of each path of joints; empty for a robot given by its rows.
+        length_unit: unit of the parameters' typical lengths, such as ``m``; empty for proportions in any unit.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -101,6 +102,7 @@ class Model(Whole, Shown):
     remarks: tuple[str, ...] = ()
     generic: GenericRanks | None = None
     structure: tuple[PathStructure, ...] = ()
+    length_unit: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
@@ -122,14 +124,14 @@ class Model(Whole, Shown):
     @property
     def rows(self) -> tuple[RowLabel, ...]:
         """Limb and kind of each row of the Jacobian as results state it: for a member, a basis of its wrenches."""
-        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
-        return (*own, *(RowLabel(each.limb, kind) for each in self.members for kind in each.kinds))
+        own = [row.label for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, kind, each.label) for each in self.members for kind in each.kinds))
 
     @property
     def frame_rows(self) -> tuple[RowLabel, ...]:
         """Limb and kind of each row of a :class:`~.instance.RobotInstance`: for a member, all rows of its projector."""
-        own = [RowLabel(row.limb, row.kind) for row in self.wrenches]
-        return (*own, *(RowLabel(each.limb, each.kind) for each in self.members for _ in range(each.size)))
+        own = [row.label for row in self.wrenches]
+        return (*own, *(RowLabel(each.limb, each.kind, each.label) for each in self.members for _ in range(each.size)))
 
     @property
     def has_couples(self) -> bool:
@@ -183,6 +185,7 @@ def _check_shapes(model: Model) -> None:
         expected += [
             (f"member {index} centre", member.centre, (3, 1)),
             (f"member {index} screws", member.screws, (6, member.screws.shape[1])),
+            *([] if member.slide is None else [(f"member {index} slide", member.slide, (3, 1))]),
         ]
     expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
@@ -211,9 +214,14 @@ def _check_symbols(model: Model) -> None:
         raise _model_error(model, "a symbol stands for two things")
     used: Iterable[SX] = [
         *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
-        *(part for member in model.members for part in (member.centre, member.screws)),
+        *(
+            part
+            for member in model.members
+            for part in (member.centre, member.screws, member.slide)
+            if part is not None
+        ),
         *(each.screw for each in model.actuators),
-        *(part for each in model.joint_screws for part in (each.passive, each.all)),
+        *(each.all for each in model.joint_screws),
         *(
             part
             for equation in (*model.closure, *model.loops, *model.distances)

@@ -202,14 +202,16 @@ class JointScrews:
 
     Attributes:
         limb: name of the limb.
-        passive: (6, n) screws of its passive joints as twists, the world's origin as reference.
-        all: (6, k) screws of all its joints.
-        passive_rank, all_rank: their ranks at almost all dimensions and poses.
+        joints: label of the joint of each column, such as ``2:3``.
+        all: (6, k) screws of all its joints from base to platform as twists, the world's origin as reference.
+        driven: indices of the columns of actuated joints.
+        passive_rank, all_rank: ranks of the passive joints' and of all screws at almost all dimensions and poses.
     """
 
     limb: str
-    passive: SX
+    joints: tuple[str, ...]
     all: SX
+    driven: tuple[int, ...]
     passive_rank: int
     all_rank: int
 

@@ -19,10 +19,17 @@ class WrenchKind(enum.Enum):
 
 
 class RowLabel(NamedTuple):
-    """Limb and kind of a row of the Jacobian."""
+    """Label of a row of the Jacobian.
+
+    Attributes:
+        limb: name of the limb that applies the wrench.
+        kind: of the wrench.
+        member: name of the limb's member that applies it: the limb's, with a number where the limb has several.
+    """
 
     limb: str
     kind: WrenchKind
+    member: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +46,7 @@ class Wrench:
         force: (3, 1) in world coordinates, of any length but zero; zero for a couple.
         moment: (3, 1) about the world origin; the direction of the couple for a couple.
         square: (1, 1) squared length of ``force``, or of ``moment`` for a couple.
+        member: name of the member that applies it, where the limb has several; empty for the limb itself.
     """
 
     limb: str
@@ -46,6 +54,12 @@ class Wrench:
     force: SX
     moment: SX
     square: SX
+    member: str = ""
+
+    @property
+    def label(self) -> RowLabel:
+        """Label of the row."""
+        return RowLabel(self.limb, self.kind, self.member or self.limb)
 
     def rate(self, twist: SX) -> SX:
         """Return the reciprocal product ``m . omega + f . v``, (1, 1), with a twist (6, 1).

@@ -86,9 +86,9 @@ from .solver.certified import certify as certify
 from .solver.interface import Solver as Solver
 from .solver.interface import SolverResult as SolverResult
 from .solver.interface import StopReason as StopReason
-from .solver.multistart import Optimum as Optimum
 from .solver.multistart import ProgramSolution as ProgramSolution
 from .solver.multistart import solve_program as solve_program
+from .solver.optima import Optimum as Optimum
 from .solver.solution import Combination as Combination
 from .solver.solution import Solution as Solution
 from .solver.solution import TaskOutcome as TaskOutcome

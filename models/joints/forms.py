@@ -32,6 +32,15 @@ class RobotError(ModelError):
         self.place, self.fault = place, fault
 
 
+def plain(value: object) -> object:
+    """Return a value with lists and dicts in the place of other sequences and mappings, as TOML has them."""
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(each) for each in value]
+    return value
+
+
 def check_names(names: Sequence[str] | Mapping[str, object], what: str, place: str = "") -> None:
     """Refuse names that are no words, or that expressions use for something else."""
     for name in names:

@@ -24,6 +24,9 @@ _HALVINGS = 8
 #: Singular values below this part of the largest, of columns of unit length, are zero: rounding leaves 1e-15, and a
 #: limb that is this near to a lower rank at every one of several random points has it.
 RANK_TOLERANCE = 1e-7
+#: Columns shorter than this part of the longest are zero, as the velocity of a rod's end by its spin is: rounding
+#: leaves 1e-16, and a slide's column is as short as the robot is large.
+_ZERO_COLUMN = 1e-12
 #: Axes are parallel or meet where their cross product, or their distance in parts of the robot's size, is below this.
 INCIDENT = 1e-9
 
@@ -82,7 +85,8 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
 def rank_of(columns: FloatArray) -> int:
     """Return the rank of columns, each taken with unit length."""
     lengths = np.linalg.norm(columns, axis=0)
-    unit = columns[:, lengths > 0] / lengths[lengths > 0]
+    nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)
+    unit = columns[:, nonzero] / lengths[nonzero]
     if not unit.size:
         return 0
     values = np.linalg.svd(unit, compute_uv=False)

@@ -88,6 +88,13 @@ class JointAxis:
             return Motion(SX.eye(3), SX.zeros(3), turn @ self.rod - self.rod)
         return Motion(turn, self.point, self.point + self.pitch * value * self.axis)
 
+    def way(self, value: SX) -> SX:
+        """Return the way (1, 1) from home whose rate goes with the unit screw: an angle in radians, or a length.
+
+        A parallelogram's variable is the angle of its rods; its way is that of its platform side along the circle.
+        """
+        return value * ca.norm_2(self.rod) if self.kind is AxisKind.PARALLELOGRAM else value
+
     def screw(self, value: SX, at: Motion) -> SX:
         """Return the current unit screw (6, 1).
 

@@ -35,10 +35,11 @@ class Ranks(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """A path's centre: a place at home (3, 1), length, on the body behind a joint."""
+    """A path's centre: a place at home (3, 1) on the body behind a joint, and whether it is any point of its axis."""
 
     point: SX
     behind: int
+    slides: bool = False
 
 
 def path_ranks(robot: HomeRobot, joints: Sequence[Joint], cut: Cut, samples: FloatArray) -> Ranks:
@@ -87,7 +88,20 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
     is_cut = centre.behind == path.cut.joint and centre.point is joint.point and joint.type in ("R", "U")
     # The point of the joint at the cut is the same on both sides where the loop is closed: one is shorter.
     place = path.points[centre.behind] if body is None or is_cut else body.point(centre.point)
-    return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, ())
+    slide = _axis(path, centre.behind) if centre.slides else None
+    return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, (), slide=slide)
+
+
+def _axis(path: OpenedPath, j: int) -> SX | None:
+    """Return the current unit axis (3, 1) of a joint; None for a parallelogram, whose point is that of its rods."""
+    axis, screw = path.joints[j].axes[-1], path.screws[j][-1]
+    match axis.kind:
+        case AxisKind.ROTATION:
+            return screw[:3]
+        case AxisKind.TRANSLATION:
+            return screw[3:]
+        case _:
+            return None
 
 
 def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Member | None]:
@@ -134,7 +148,7 @@ def _centre_of(joints: Sequence[Joint], given: SX | None) -> Centre:
     for j in reversed(passive):
         if joints[j].type == "U":  # two rotations that meet are a universal joint already
             return Centre(joints[j].point, j)
-    return Centre(joints[last].point, last)
+    return Centre(joints[last].point, last, slides=True)
 
 
 def _velocity(screw: SX, point: SX) -> SX:

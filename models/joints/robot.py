@@ -33,7 +33,7 @@ from .chain import HomeRobot, Joint, Limb, home_robot
 from .cut import choose_cut, simplified
 from .distances import distance_equations
 from .faults import examine_geometry
-from .forms import Expression, RobotError, VectorExpression
+from .forms import Expression, RobotError, VectorExpression, plain
 from .generic import sampled_dimensions
 from .loops import ClosedPoint, PoseOf, examine_loops
 from .modes import joint_signs, mode_signs
@@ -43,7 +43,7 @@ from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
-from .structure import structure_of, with_kept
+from .structure import joint_screws, member_remarks, structure_of, with_kept
 from .words import RobotWords, read_words
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -59,6 +59,7 @@ def robot(
     dimensions: Mapping[str, Mapping[str, object]] | None = None,
     derived: Mapping[str, Expression] | None = None,
     description: str = "",
+    length_unit: str = "",
 ) -> Model:
     """Return a robot that is given joint by joint, at home; the arguments are the keys of a robot file.
 
@@ -71,6 +72,7 @@ def robot(
             ``"angle"`` or ``"number"``) and ``description``. The typical value of an angle is in degrees.
         derived: further numbers by name, as expressions of the dimensions and of earlier ones.
         description: one sentence for people.
+        length_unit: unit of the typical dimensions, such as ``"m"``; empty for proportions in any unit.
 
     Raises:
         RobotError: a key or value is not allowed, or the robot cannot be put together near home.
@@ -82,8 +84,9 @@ def robot(
         "dimensions": dimensions,
         "derived": derived,
         "description": description,
+        "length_unit": length_unit,
     }
-    definition = {key: value for key, value in tables.items() if value is not None and value != ""}
+    definition = {key: plain(value) for key, value in tables.items() if value is not None and value != ""}
     return _model(read_words(tables), definition)
 
 
@@ -124,7 +127,7 @@ class _Builder:
         for index, joints in enumerate(limb.paths):
             new = _labels(limb, index, joints, labels)
             labels |= new
-            path = self._path(limb, index, joints, self._variables(limb, known))
+            path = self._path(limb, index, joints, self._variables(limb, known), labels)
             if path is None:
                 self._remark_idle(limb)
                 fault = "its limb neither resists nor drives the platform"
@@ -140,6 +143,12 @@ class _Builder:
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
                     driven.setdefault(id(joint), (joint, path, j))
+        if driven and limb.name not in self.carrying:
+            fault = (
+                "has an actuated joint that drives nothing, because its passive joints alone leave the platform free; "
+                "remove actuated = true or a passive joint"
+            )
+            raise RobotError(limb.place, fault)
         self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
         several = len(driven) > 1
         for k, (joint, path, j) in enumerate(driven.values()):
@@ -148,7 +157,7 @@ class _Builder:
             is_angle = axis.kind is AxisKind.ROTATION
             dimension = Dimension.ANGLE if is_angle else Dimension.LENGTH
             self.actuators.append(Actuator(name, limb.name, path.screws[j][0], dimension))
-            way = slide_length(path, self.frame) if j == path.cut.slide else known[id(joint), 0]
+            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[id(joint), 0])
             self.positions.append(SX(0) if way is None else way)
 
     @property
@@ -162,7 +171,9 @@ class _Builder:
         if remark not in self.remarks:
             self.remarks.append(remark)
 
-    def _path(self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables) -> OpenedPath | None:
+    def _path(
+        self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
+    ) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
         robot = self.robot
         joints = simplified(robot, joints, self.samples)
@@ -179,20 +190,18 @@ class _Builder:
         before = sum(row.limb == limb.name for row in self.wrenches)
         row = before if len(limb.branches) > 1 and len(rows) == 1 else None
         self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
-        self.wrenches += rows
-        self.members += [] if member is None else [member]
-        name = f"{limb.name}.{index + 1}" if len(limb.branches) > 1 else limb.name
+        several = len(limb.branches) > 1
+        name = f"{limb.name}.{index + 1}" if several else limb.name
+        self.wrenches += [replace(each, member=name) for each in rows] if several else rows
+        self.members += [] if member is None else [replace(member, name=name if several else "")]
         self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
         self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
         own = distance_equations(path, variables, self.frame)
         self.distances += [Closure(f"distance {name} ({k + 1})", *each) for k, each in enumerate(own)]
         self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
-        if all(len(own) == len(joint.axes) for joint, own in zip(joints, path.screws, strict=True)):
-            every = [screw for own in path.screws for screw in own]
-            passive = [s for joint, own in zip(joints, path.screws, strict=True) if not joint.actuated for s in own]
-            some, all_of_them = ca.horzcat(SX(6, 0), *passive), ca.horzcat(SX(6, 0), *every)
-            self.screws.append(JointScrews(limb.name, some, all_of_them, ranks.passive, ranks.all))
+        screws = joint_screws(limb.name, path, ranks, labels)
+        self.screws += [] if screws is None else [screws]
         return path
 
     def _variables(self, limb: Limb, known: dict[tuple[int, int], SX]) -> Variables:
@@ -257,6 +266,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     model = Model(
         name=words.name,
         description=words.description,
+        length_unit=words.length_unit,
         options={"definition": definition},
         parameters=_parameters(at_home),
         pose=pose,
@@ -275,7 +285,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         structure=with_kept(builder.structure, independent),
         joints=tuple(builder.joints),
         links=with_shared_places(builder.links, frame),
-        remarks=(*remarks, *builder.remarks),
+        remarks=(*remarks, *builder.remarks, *member_remarks(builder.structure)),
     )
     return replace(model, generic=_generic_ranks(model, at_home, loops.points))
 

@@ -87,9 +87,8 @@ class PathJoints:
         if joint.type == "S" and not joint.parts:
             return _Coordinates([])
         if joint.type != "S" and (id(joint), 0) in self._known:
-            return _Coordinates(
-                [JointCoordinate("", _dimension(axis), self._known[id(joint), a]) for a, axis in enumerate(joint.axes)]
-            )
+            values = [self._known[id(joint), a] for a in range(len(joint.axes))]
+            return _Coordinates([_coordinate(axis, value) for axis, value in zip(joint.axes, values, strict=True)])
         if path.cut.far is not None and j in (path.cut.joint, path.cut.far):
             return self._at_rod(j)
         return self._between(axes, self._before(j).rotation.T @ self._behind(j).rotation)
@@ -196,6 +195,8 @@ def _angle(angle: Angle) -> JointCoordinate:
     return JointCoordinate("", Dimension.ANGLE, angle.sine, angle.cosine)
 
 
-def _dimension(axis: JointAxis) -> Dimension:
-    """Return the dimension of an axis's variable: a parallelogram's is the angle of its rods."""
-    return Dimension.LENGTH if axis.kind is AxisKind.TRANSLATION else Dimension.ANGLE
+def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
+    """Return the coordinate of an axis: of a parallelogram the angle of its rods, or where it is driven its way."""
+    if axis.kind is AxisKind.PARALLELOGRAM and axis.actuated:
+        return JointCoordinate("", Dimension.LENGTH, axis.way(value))
+    return JointCoordinate("", Dimension.LENGTH if axis.kind is AxisKind.TRANSLATION else Dimension.ANGLE, value)

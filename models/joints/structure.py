@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from ..parts import Closure, PathStructure
+import casadi as ca
+from casadi import SX
+
+from ..parts import Closure, JointScrews, PathStructure
+from .chain import Joint
 from .opened import OpenedPath
 from .resistance import Ranks
+
+#: A member with so many wrenches resists nearly every motion alike.
+_MANY_WRENCHES = 5
 
 
 def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns: int) -> PathStructure:
@@ -35,6 +42,32 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
     )
 
 
+def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int, str]) -> JointScrews | None:
+    """Return the current screws of a path's joints; None where those of a joint are not known.
+
+    Args:
+        limb: name of the limb.
+        path: the path.
+        ranks: of its screws.
+        labels: of the joints as they are written, by identity.
+    """
+    if any(len(own) != len(joint.axes) for joint, own in zip(path.joints, path.screws, strict=True)):
+        return None
+    names = [name for joint in path.joints for name in _column_labels(joint, labels)]
+    driven = [joint.actuated for joint in path.joints for _ in joint.axes]
+    screws = ca.horzcat(SX(6, 0), *[screw for own in path.screws for screw in own])
+    indices = tuple(k for k, is_driven in enumerate(driven) if is_driven)
+    return JointScrews(limb, tuple(names), screws, indices, ranks.passive, ranks.all)
+
+
+def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
+    """Return the label of the joint of each axis; the three axes of a ball joint are along those of the world."""
+    written = joint.parts or (joint,)
+    if joint.type == "S" and len(written) > 1:
+        return [f"{labels[id(written[0])]} to {labels[id(written[-1])]}"] * len(joint.axes)
+    return [labels[id(part)] for part in written for _ in part.axes]
+
+
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
     """Return structures with the numbers of their loop equations among those that a program keeps."""
     names = {each.name for each in kept}
@@ -42,6 +75,25 @@ def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) ->
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
         for each in structures
     )
+
+
+def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
+    """Return remarks on members of so many wrenches, or so few members, that F says little about the robot.
+
+    F is a sum over members of orthonormal wrenches: within one member it has no conditioning.
+    """
+    members = [each for each in structures if each.wrenches > 0]
+    if len(members) == 1:
+        text = (
+            "the robot has one member only, so F says little: within a member F does not tell good directions from bad"
+        )
+        return [text]
+    names = [each.name for each in members if each.wrenches >= _MANY_WRENCHES]
+    if not names:
+        return []
+    who = f"member {names[0]} resists" if len(names) == 1 else f"members {', '.join(names)} resist"
+    words = f"{who} with {_MANY_WRENCHES} wrenches or more, so that part of F says little"
+    return [f"{words}: within a member F does not tell good directions from bad"]
 
 
 def _opened(path: OpenedPath) -> str:

@@ -105,18 +105,19 @@ class RobotWords:
     limbs: tuple[LimbWords, ...]
     dimensions: Mapping[str, DimensionWords] = field(default_factory=dict)
     derived: Mapping[str, Expression] = field(default_factory=dict)
+    length_unit: str = ""
 
 
 def read_words(tables: Mapping[str, object]) -> RobotWords:
     """Return a robot from its tables, as ``tomllib`` returns those of a robot file.
 
     Args:
-        tables: the keys ``name``, ``description``, ``home``, ``dimensions``, ``derived`` and ``limb``.
+        tables: the keys ``name``, ``description``, ``length_unit``, ``home``, ``dimensions``, ``derived`` and ``limb``.
 
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
     """
-    refuse_other_keys("", tables, ("name", "description", "home", "dimensions", "derived", "limb"))
+    refuse_other_keys("", tables, ("name", "description", "length_unit", "home", "dimensions", "derived", "limb"))
     name = tables.get("name")
     if not isinstance(name, str) or not name.strip():
         raise RobotError("name", "is missing: give the robot's name as a text")
@@ -152,6 +153,7 @@ def read_words(tables: Mapping[str, object]) -> RobotWords:
         limbs=tuple(read),
         dimensions=dimensions,
         derived=derived,
+        length_unit=name_of("length_unit", tables.get("length_unit", "")),
     )
 
 

@@ -37,13 +37,15 @@ def starter_case(model: Model) -> str:
     position = ", ".join(_free_number(value, reach) for value in model.home)
     options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
+    units = _units_of(model)
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     lines = [
         f'title = "My {model.name}"',
         "",
         "[units]",
-        f'length = "{_UNITS.length}"               # a label, carried to every output; nothing is converted',
-        f'angle = "{_UNITS.angle}"               # or "rad"',
+        f"length = {json.dumps(units.length, ensure_ascii=False)}".ljust(28)
+        + "# a label, carried to every output; nothing is converted",
+        f'angle = "{units.angle}"               # or "rad"',
         "",
         "[robot]",
         robot,
@@ -56,7 +58,7 @@ def starter_case(model: Model) -> str:
         "",
         "# A number is fixed; { min = a, max = b } is free between its bounds, with an optional start.",
         "[robot.parameters]",
-        *(_parameter_line(parameter, is_free=index == 0) for index, parameter in enumerate(model.parameters)),
+        *(_parameter_line(parameter, units, is_free=index == 0) for index, parameter in enumerate(model.parameters)),
         "",
         "[pose]                        # of the platform in the base's frame, z along the base's normal",
         f"position = [{position}]",
@@ -88,14 +90,20 @@ def starter_case(model: Model) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parameter_line(parameter: Parameter, *, is_free: bool) -> str:
+def _units_of(model: Model) -> Units:
+    """Return the units of a starter: that of a robot given joint by joint, where it states one, or plainly ``unit``."""
+    return _UNITS if not model.structure else Units(model.length_unit or "unit", "deg")
+
+
+def _parameter_line(parameter: Parameter, units: Units, *, is_free: bool) -> str:
     """Return the line of a parameter, free about its value in a starter or fixed there."""
-    values = [_UNITS.shown(value, parameter.dimension) for value in parameter.starter or parameter.typical]
+    values = [units.shown(value, parameter.dimension) for value in parameter.starter or parameter.typical]
     width = _SPREAD * max(abs(value) for value in values) or 1.0
-    domain = [_UNITS.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
+    domain = [units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
     texts = [_free_number(value, width, domain) if is_free else f"{value:.10g}" for value in values]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
-    return f"{parameter.name} = {text}   # {parameter.description}, {_unit_words(parameter.dimension)}"
+    unit = units.label(parameter.dimension) or "a plain number"
+    return f"{parameter.name} = {text}   # {parameter.description}, {unit}"
 
 
 def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
@@ -107,8 +115,3 @@ def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.i
 def toml_value(value: object) -> str:
     """Return the value of a robot's option as TOML writes it."""
     return repr(value) if isinstance(value, float) else json.dumps(value, default=str)
-
-
-def _unit_words(dimension: Dimension) -> str:
-    """Return the unit of a dimension in words."""
-    return _UNITS.label(dimension) or "a plain number"

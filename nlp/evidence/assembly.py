@@ -10,15 +10,26 @@ say how near the path comes to one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Dimension, FloatArray, Model, Substitution, matrix_from_axis_angle
+from ...models import (
+    Dimension,
+    FloatArray,
+    Model,
+    Substitution,
+    axis_angle_from_matrix,
+    matrix_from_axis_angle,
+)
+from ..program.kernel import Kernel, tuple_of
 from ..program.nlp import Nlp
 from .state import RobotState
+from .workingmode import Posture, names_of, turned_limbs
 
 #: First and shortest step of the path, as parts of its length, and largest number of Newton steps at each.
 _FIRST = 1 / 16
@@ -46,10 +57,22 @@ class Assembly:
         is_home: whether the path from home ends at the point's own unknowns.
         nearness: smallest singular value of the loop equations on the path, as a part of that at home; 0 where the path
             jumps or does not reach the point's pose.
+        turned: names of the limbs that are in another working mode: their joint positions are not those to which the
+            path leads, and their actuators drive the platform in the other sense than at home.
     """
 
     is_home: bool
     nearness: float
+    turned: tuple[str, ...] = ()
+
+    @property
+    def brief(self) -> str:
+        """A few words about an assembly that is not that of home, or that may not be; empty for home's."""
+        if self.turned:
+            return f"another working mode ({names_of(self.turned)})"
+        if not self.is_home:
+            return "another assembly" if self.nearness else "another operation mode or assembly"
+        return "" if self.nearness >= NEAR_SINGULAR else "an operation mode that is perhaps another one"
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -60,7 +83,10 @@ class Assembly:
             jump = "the straight path from there has a jump"
             reason = part if self.nearness else jump
             found.append(f"not reached from home without passing near a singularity: {reason}")
-        if not self.is_home:
+        if self.turned:
+            who = names_of(self.turned)
+            found.append(f"another working mode than at home: {who} bent the other way, driven in the other sense")
+        elif not self.is_home:
             found.append("another assembly than at home: the straight path from there ends at other joint positions")
         return tuple(found)
 
@@ -78,44 +104,69 @@ def assembly_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> As
     if model.generic is None or not model.unknowns:
         return None
     values = [state.parameters[item.name] for item in model.parameters]
-    turn = state.angle * state.axis
-    return assembly_at(
-        model,
-        np.concatenate([np.zeros(0), *values]),
-        np.concatenate([turn, state.position]),
-        x[list(nlp.program.places.unknowns[pose])],
+    unknowns = x[list(nlp.program.places.unknowns[pose])]
+    return assembly_at(model, Posture(np.concatenate([np.zeros(0), *values]), unknowns, state.rotation, state.position))
+
+
+def assembly_over_poses(nlp: Nlp, x: FloatArray) -> Assembly | None:
+    """Return the assembly at a point (n,), at all poses together; None as for :func:`assembly_of`."""
+    model = nlp.program.model
+    if model.generic is None or not model.unknowns:
+        return None
+    found = []
+    for kernel, places in zip(nlp.program.kernels.robot_states, nlp.program.places.unknowns, strict=True):
+        at = kernel(x, nlp.arguments)
+        posture = Posture(at.parameters.ravel(), x[list(places)], at.rotation, at.position.ravel())
+        found.append(assembly_at(model, posture))
+    return Assembly(
+        is_home=all(each.is_home for each in found),
+        nearness=min(each.nearness for each in found),
+        turned=tuple(dict.fromkeys(limb for each in found for limb in each.turned)),
     )
 
 
-def assembly_at(model: Model, parameters: FloatArray, pose: FloatArray, unknowns: FloatArray) -> Assembly:
+def assembly_at(model: Model, posture: Posture) -> Assembly:
     """Return the assembly of a robot given joint by joint.
 
     Args:
         model: the robot.
-        parameters: (k,) components of all parameters, radians for angles.
-        pose: (6,) rotation vector, radians, and position of the platform.
-        unknowns: (u,) internal unknowns.
+        posture: its joints.
     """
-    found, nearness = _follow(model, parameters, pose)
+    axis, angle = axis_angle_from_matrix(posture.rotation)
+    found, nearness = _follow(model, posture.parameters, np.concatenate([angle * axis, posture.position]))
     if found is None:
         return Assembly(is_home=False, nearness=0.0)
+    unknowns = posture.unknowns
     angles = np.array([item.dimension is Dimension.ANGLE for item in model.unknowns])
-    apart = np.abs(found - unknowns) / _sizes_of_unknowns(model, parameters)
+    apart = np.abs(found - unknowns) / _sizes_of_unknowns(model, posture.parameters)
     apart[angles] = np.abs(np.remainder(apart[angles] + np.pi, 2 * np.pi) - np.pi)
-    return Assembly(is_home=bool(apart.max(initial=0.0) <= _SAME), nearness=nearness)
+    if apart.max(initial=0.0) <= _SAME:
+        return Assembly(is_home=True, nearness=nearness)
+    # At the same pose, limbs are independent of each other: those whose own unknowns differ are assembled otherwise.
+    return Assembly(is_home=False, nearness=nearness, turned=_turned(model, posture, list(apart > _SAME)))
+
+
+def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str, ...]:
+    """Return the limbs driven in the other sense than at home, among those with an unknown that differs."""
+    owners = [each.limb for each in model.structure for _ in range(each.unknowns)]
+    own = {limb for limb, other in zip(owners, differ, strict=True) if other}
+    return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
 
 
 def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray) -> FloatArray | None:
     """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
 
-    The arguments are those of :func:`assembly_at`.
+    Args:
+        model: the robot.
+        parameters: (k,) components of all parameters, radians for angles.
+        pose: (6,) rotation vector, radians, and position of the platform.
     """
     return _follow(model, parameters, pose)[0]
 
 
 def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[FloatArray | None, float]:
     """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it."""
-    path = _Path(model)
+    path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
     start = np.concatenate([np.zeros(3), model.home])
     at = np.concatenate([start, np.zeros(len(model.unknowns))])
@@ -140,6 +191,12 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
         step = 2 * step if change < _LARGE / 4 else step
         nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
     return at[6:] * _sizes_of_unknowns(model, parameters), nearness
+
+
+@lru_cache(maxsize=4)
+def _path_of(model: Model) -> _Path:
+    """Return the loop equations of a robot; those of the last robots are kept, as a search asks for many points."""
+    return _Path(model)
 
 
 class _Path:
@@ -167,13 +224,13 @@ class _Path:
         )
         # About home, lengths of the robot's own size make the singular values those of equations of order 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
-        self._function = ca.Function("path", [z, own.parameters], outputs)
+        self._kernel = Kernel(ca.Function("path", [z, own.parameters], outputs), tuple_of)
         self.scale = np.ones(z.numel())
         self.scale[3:6] = _size(model)
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
         """Return the smallest singular values (2,) of the derivatives by unknowns alone, and with the pose."""
-        slopes = self._function(z, parameters)[1].full() * self.scale
+        slopes = self._kernel(z, parameters)[1] * self.scale
         both = (np.linalg.svd(part, compute_uv=False) for part in (slopes[:, 6:], slopes))
         return np.array([each[-1] for each in both])
 
@@ -186,7 +243,7 @@ class _Path:
             first: index of the first number that may move.
         """
         for _ in range(_STEPS):
-            residual, slopes = (each.full() for each in self._function(z, parameters))
+            residual, slopes = self._kernel(z, parameters)
             if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
                 return None
             if float(np.abs(residual).max()) <= _CLOSED:

@@ -27,6 +27,7 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
 from .linalg import echelon_basis
+from .singularities import is_passive_singular
 
 #: Multiplier, in scaled terms, below which an active side is weakly active.
 STRONG = 1e-9
@@ -55,6 +56,7 @@ class PointKind(enum.Enum):
     UNDECIDED = "stationary, and the second-order test does not decide"
     SADDLE = "saddle: stationary, but F improves along some direction"
     NOT_STATIONARY = "not stationary: F improves to first order"
+    LIMB_SINGULAR = "no optimum: passive joints of a limb are dependent there, so that F jumps"
     INFEASIBLE = "infeasible: a limit is violated"
     UNDEFINED = "undefined: the robot's equations have no finite value there"
 
@@ -134,6 +136,8 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
     flat: list[FloatArray] = []
     if feasibility <= FEASIBLE and stationarity <= STATIONARY:
         kind, eigenvalues, flat = _second_order_test(nlp, at, mu)
+        if kind.is_optimum and any(is_passive_singular(nlp, x, pose) for pose in range(len(nlp.program.robots))):
+            kind = PointKind.LIMB_SINGULAR
     return Evidence(
         kind=kind,
         stationarity=stationarity,

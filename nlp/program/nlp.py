@@ -134,6 +134,19 @@ class Nlp(Whole):
         """Number of free variables."""
         return len(self.program.variables)
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the case leaves nothing free: all variables are internal unknowns, or the level of a worst pose."""
+        places = self.program.places
+        own = {index for at_pose in places.unknowns for index in at_pose}
+        own |= set() if places.epigraph is None else {places.epigraph.level}
+        return len(own) == self.n
+
+    @property
+    def is_overdetermined(self) -> bool:
+        """Whether there are more equations than variables, so that no local solver has a step to choose."""
+        return int(np.count_nonzero(self.g_lower == self.g_upper)) > self.n
+
     @cached_property
     def scale(self) -> FloatArray:
         """(n,) half of each variable's range, so that scaled variables run from -1 to 1 between the bounds."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ...models import FloatArray, Model, RobotInstance
+from ...models import FloatArray, Model, RobotInstance, Substitution
 from ...models.whole import Whole
 from ..case.limits.constraint import Constraint
 from ..case.limits.form import Call
@@ -214,3 +214,10 @@ class Kernels:
         """``(x, p)`` to the robot's numbers, one kernel for each pose."""
         poses = range(len(self._program.robots))
         return tuple(Kernel(self._program.robot_state(pose), RobotNumbers.from_outputs) for pose in poses)
+
+    @cached_property
+    def joint_screws(self) -> ca.Function:
+        """Parameters, unknowns, rotation and position to the screws (6, k) of each of the model's paths of joints."""
+        model = self._program.model
+        outputs = [ca.densify(each.all) for each in model.joint_screws]
+        return ca.Function("joint_screws", Substitution.identity(model).all, outputs)

@@ -86,11 +86,14 @@ class OptimumData(JsonObject):
         F: objective.
         count: number of starts that ended there.
         spread: of the points along one variable, as a part of its range; 0 for an isolated optimum.
+        assembly: a few words about joints that are assembled in another way than at home, or perhaps; empty for home's,
+            absent for a robot without loops.
     """
 
     F: float
     count: int
     spread: float
+    assembly: Absent[str]
 
 
 class StartsData(JsonObject):

@@ -8,8 +8,9 @@ from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from .design import limits_data, margins_data
 from .jsondata import Inline, JsonObject, Vector, vector
-from .parts import HeadData, LimitData, MarginData, MotionData, RobotData, TaskData, VersionsData, ViolationData
-from .point import head_data, motion_data, objective, robot_data, task_data, versions, violations
+from .motiondata import MotionData, motion_data
+from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
+from .point import head_data, objective, robot_data, task_data, versions, violations
 
 
 class EvaluatedTaskData(JsonObject):

@@ -10,6 +10,7 @@ from ..case.pose import OverPoses
 from ..case.task import Sense
 from .jointdata import JointsData
 from .jsondata import Absent, Inline, JsonObject, Size, Vector, Vector3, Vector6
+from .motiondata import MotionData
 
 #: Version of the format.
 SCHEMA = 1
@@ -77,22 +78,6 @@ class PoseData(JsonObject):
     rotation_matrix: RotationMatrix
 
 
-class MotionData(JsonObject):
-    """An instantaneous motion of the platform.
-
-    Attributes:
-        twist: angular velocity, then velocity at the world origin.
-        axis: unit direction of the screw axis.
-        point: the axis's point nearest to the world origin; null for a translation.
-        pitch: length per radian; "inf" for a translation.
-    """
-
-    twist: Vector6
-    axis: Vector3
-    point: Vector3 | None
-    pitch: float | Literal["inf"]
-
-
 class TaskData(JsonObject):
     """A task of the case.
 
@@ -157,6 +142,7 @@ class RobotData(JsonObject):
         pose: of the platform; with several poses, the first that the case states.
         task: the task that the rates belong to; absent where there are several.
         limbs: limb of each row of the Jacobian.
+        members: member of its limb that applies each row: the limb, with a number where the limb has several.
         jacobian: unit wrenches as rows, force then moment about the world origin.
         rates: work rate of each row in the task's motion.
         rank: of the Jacobian.
@@ -167,6 +153,8 @@ class RobotData(JsonObject):
         quantities: leg lengths, joint angles and the like, by limb.
         limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
         characteristic_length: that relates couples to forces; absent for robots without constraint couples.
+        length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
+            where F is 0, and with several tasks.
         joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
         several: the robot at every pose; absent where there is one.
     """
@@ -175,6 +163,7 @@ class RobotData(JsonObject):
     pose: PoseData
     task: Absent[TaskData]
     limbs: tuple[str, ...]
+    members: tuple[str, ...]
     jacobian: Jacobian
     rates: Absent[Vector]
     rank: int
@@ -185,6 +174,7 @@ class RobotData(JsonObject):
     quantities: Mapping[str, ByOwner]
     limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
+    length_dependence: Absent[float]
     joints: Absent[JointsData]
     several: Inline[PosesData | None]
 

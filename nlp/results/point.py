@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -12,22 +11,21 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Quantity, axis_from_screw
+from ...models import Dimension, FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
-from ..evidence.assembly import assembly_of
+from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
-from ..evidence.mobility import mobility_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .jointdata import ActuatorData, JointsData
-from .jsondata import Vector, finite_or_none, matrix, vector
+from .jointpoint import joints_data
+from .jsondata import Vector, matrix, vector
+from .motiondata import motion_data
 from .parts import (
     SCHEMA,
     ByOwner,
     HeadData,
-    MotionData,
     PoseData,
     PosesData,
     PoseStateData,
@@ -39,7 +37,7 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    pass
 
 #: Violations of less than this part of the worst are left out: a failed solve leaves them beside the worst.
 _SMALL = 1e-3
@@ -77,11 +75,13 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
     case = nlp.case
     limited = _limited_quantities(nlp, x)
     several = _poses_data(nlp, x, limited)
+    dependence = None if task is None else dependence_of(nlp, x)
     return RobotData(
         parameters=parameters_data(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
         task=None if task is None else task_data(case, task),
         limbs=tuple(row.limb for row in case.model.rows),
+        members=tuple(row.member for row in case.model.rows),
         jacobian=matrix(state.jacobian),
         rates=None if task is None else vector(state.rates),
         rank=state.rank,
@@ -92,33 +92,9 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         quantities=_quantities(case, state),
         limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
-        joints=_joints_data(nlp, x, state, with_task=task is not None),
+        length_dependence=None if dependence is None else dependence.length,
+        joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
         several=several,
-    )
-
-
-def _joints_data(nlp: Nlp, x: FloatArray, state: RobotState, *, with_task: bool) -> JointsData | None:
-    """Return the joints of a robot given joint by joint; None for others."""
-    found = mobility_of(nlp, x, state)
-    if found is None:
-        return None
-    assembly = assembly_of(nlp, x, state)
-    actuators = (
-        ActuatorData(
-            name=each.name,
-            kind="angle" if each.dimension is Dimension.ANGLE else "length",
-            rate=finite_or_none(found.actuator_rates.get(each.name, math.inf)),
-        )
-        for each in nlp.program.model.actuators
-    )
-    return JointsData(
-        freedoms=found.freedoms,
-        actuators=tuple(actuators) if with_task else None,
-        constrained=found.constrained if with_task else None,
-        singularities=tuple(
-            f"{'' if each.limb is None else f'limb {each.limb}: '}{each.kind.value}" for each in found.singularities
-        ),
-        assembly=() if assembly is None else assembly.sentences,
     )
 
 
@@ -197,18 +173,6 @@ def task_data(case: Case, task: int) -> TaskData:
         sense=chosen.sense,
         motion=motion_data(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
-    )
-
-
-def motion_data(twist: ArrayLike) -> MotionData:
-    """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
-    screw = axis_from_screw(twist)
-    translation = math.isinf(screw.pitch)
-    return MotionData(
-        twist=vector(np.asarray(twist, dtype=np.float64)),
-        axis=vector(screw.axis),
-        point=None if translation else vector(screw.point),
-        pitch="inf" if translation else screw.pitch,
     )
 
 

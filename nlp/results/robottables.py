@@ -147,7 +147,7 @@ def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterato
         marks = ["worst" if worst else "" for worst in _worst(values, task)]
         couples = any(row.kind is not WrenchKind.FORCE for row in rows)
         unit = rate_unit(task.motion.twist, case.units)
-        labels = [f"{row.limb} {row.kind.value}\n{unit}" if couples else f"{row.limb}\n{unit}" for row in rows]
+        labels = [f"{row.member} {row.kind.value}\n{unit}" if couples else f"{row.member}\n{unit}" for row in rows]
         cells = []
         for k, pose in enumerate(several.poses):
             sizes = rate_sizes(pose.jacobian, task.motion.twist, pose.pose.position)
@@ -188,7 +188,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
     total = sum(rate**2 for rate in rates)
     rows = []
     for k, row in enumerate(model.rows):
-        cells = [row.limb, *([row.kind.value] if couples else [])]
+        cells = [row.member, *([row.kind.value] if couples else [])]
         if rates:
             part = 100 * rates[k] ** 2 / total if total > 0 else 0.0
             cells += [number(rates[k], digits=6, signed=True), Figure(f"{part:.1f}", part) if total > 0 else ""]
@@ -207,5 +207,5 @@ def jacobian_table(case: Case, robot: RobotData) -> TextTable:
     for row, values in zip(case.model.rows, robot.jacobian, strict=True):
         cells = [number(value, 1.0, digits=6, signed=True) for value in values[:3]]
         cells += [number(value, arm, digits=6, signed=True) for value in values[3:]]
-        rows.append((row.limb, *cells))
+        rows.append((row.member, *cells))
     return TextTable(("J", "f_x", "f_y", "f_z", "m_x", "m_y", "m_z"), tuple(rows), "jacobian")

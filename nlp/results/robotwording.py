@@ -44,11 +44,13 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     )
     if model.structure:
         yield from _structure_words(model)
-    rows = [(str(index + 1), row.limb, row.kind.value) for index, row in enumerate(model.rows)]
+    rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "measures", "what it is"), tuple(rows))
+    for remark in model.remarks:
+        yield Line(remark, label="note")
 
 
 def _structure_words(model: Model) -> Iterator[Line | TextTable]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from ..certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
+from ..solver.optima import Optimum
 from ..solver.starts import StartStatus
 from .data import OptimumData, ReachedData, SolveResult, StartsData
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
@@ -56,5 +57,12 @@ def starts_data(solution: ProgramSolution) -> StartsData:
         run=len(solution.starts),
         converged=ended[StartStatus.CONVERGED],
         failed=MappingProxyType({status.value: ended[status] for status in reasons}),
-        optima=tuple(OptimumData(F=found.F, count=found.count, spread=found.spread) for found in solution.optima),
+        optima=tuple(_optimum_data(found) for found in solution.optima),
     )
+
+
+def _optimum_data(found: Optimum) -> OptimumData:
+    """Return a distinct optimum."""
+    assembly = found.assembly
+    words = None if assembly is None else assembly.brief
+    return OptimumData(F=found.F, count=found.count, spread=found.spread, assembly=words)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from ..case.case import Case
 from .data import CombinedResult
 from .designtable import combined_design_table, design_table, solved_design_table
+from .jointwording import limb_part_table
 from .robottables import jacobian_table, robot_tables
 from .rounding import listed, number, robot_size, size_of_F
 from .tables import limit_table, outcome_table, principal_table
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from .certified import CertifiedResult
     from .data import CaseResult, SolveResult
     from .evaluation import EvaluationResult
+    from .parts import RobotData
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 
@@ -52,6 +54,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from evidence_lines(result)
     yield from starts_lines(result.starts, result.robot)
     if result.robot is not None and result.reached is None:
+        yield from _limb_parts(case, result.robot)
         yield from singularity_lines(result.robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
@@ -115,8 +118,16 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
     yield Line(listed(values), label="singular values")
     yield principal_table(result.principal_motions, case.units, robot_size(robot))
+    yield from _limb_parts(case, robot)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
+
+
+def _limb_parts(case: Case, robot: RobotData) -> Summary:
+    """Yield actuation and constraints by limb, where constraints carry a part of F."""
+    table = limb_part_table(case, robot)
+    if table is not None and robot.joints is not None and robot.joints.constrained:
+        yield table
 
 
 def _remark_lines(case: Case) -> Summary:

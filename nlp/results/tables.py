@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from ..evidence.kkt import ACTIVE
 from ..units import Units
 from .data import CombinedData
+from .motionwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
-from .wording import SET, counted, motion_words
+from .wording import SET, counted
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -168,7 +169,8 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
             for value, variable, width in zip(found.x, variables, widths, strict=True)
         ]
         F = number(task_F(robot, found.F))
-        rows.append((f"F = {F}, {counted(found.count, 'start')}{spread}", *at))
+        mode = f", {found.assembly.brief}" if found.assembly is not None and found.assembly.brief else ""
+        rows.append((f"F = {F}, {counted(found.count, 'start')}{spread}{mode}", *at))
     headers = ("", *(f"{name}, {unit}" if unit else name for name, unit in labels))
     return TextTable(headers, tuple(rows), "optima")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,13 +11,14 @@ from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import CURVED, PointKind
 from ..solver.status import Status
 from ..units import Units, objective_unit
-from .jointwording import joint_lines
+from .jointwording import convention_lines, joint_lines
+from .motionwording import motion_words, reach_of, screw_words, triple
 from .rounding import number, robot_size, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
     from .data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult, StartsData
-    from .parts import LimitData, MotionData, RelaxationData, RobotData, TaskData, ToleranceData, ViolationData
+    from .parts import LimitData, RelaxationData, RobotData, TaskData, ToleranceData, ViolationData
 
 #: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
@@ -43,7 +43,7 @@ def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
         yield Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
         return
     stated, nearest = points
-    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    screw = screw_words(task.motion, units, reach_of(task.motion, 0.0))
     yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
     yield Line(f"nearest to the origin at {nearest}", label="task's axis")
 
@@ -54,7 +54,7 @@ def task_words(task: TaskData, units: Units) -> str:
     if points is None:
         return motion_words(task.motion, units)
     stated, nearest = points
-    screw = _screw_words(task.motion, units, _reach(task.motion, 0.0))
+    screw = screw_words(task.motion, units, reach_of(task.motion, 0.0))
     return f"{screw} through {stated}, nearest to the origin at {nearest}"
 
 
@@ -69,40 +69,9 @@ def _stated_and_nearest(task: TaskData) -> _Points | None:
     """Return the points of a task's axis; None where its case states none, or the nearest one."""
     if task.stated_point is None or task.motion.point is None:
         return None
-    size = _reach(task.motion, 0.0)
-    points = _Points(_triple(task.stated_point, size), _triple(task.motion.point, size))
+    size = reach_of(task.motion, 0.0)
+    points = _Points(triple(task.stated_point, size), triple(task.motion.point, size))
     return None if points.stated == points.nearest else points
-
-
-def motion_words(motion: MotionData, units: Units, size: float = 0.0) -> str:
-    """Return a motion in words: its axis, point and pitch.
-
-    Args:
-        motion: of the platform.
-        units: of the case.
-        size: length that the motion was computed from, beside which its point and pitch have rounding error.
-    """
-    if motion.point is None or motion.pitch == "inf":
-        return f"translation along {_triple(motion.axis, 1.0)}"
-    reach = _reach(motion, size)
-    return f"{_screw_words(motion, units, reach)} through {_triple(motion.point, reach)}"
-
-
-def _screw_words(motion: MotionData, units: Units, size: float) -> str:
-    """Return pitch and axis of a motion that is no translation."""
-    pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size)
-    words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
-    return f"{words} about {_triple(motion.axis, 1.0)}"
-
-
-def _reach(motion: MotionData, size: float) -> float:
-    """Return the length beside which a motion's point and pitch have rounding error: |v| / |omega| at least."""
-    omega, v = math.hypot(*motion.twist[:3]), math.hypot(*motion.twist[3:])
-    return max(size, v / omega if omega else 0.0)
-
-
-def _triple(values: Sequence[float], size: float) -> str:
-    return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 
 def headline(result: SolveResult, case: Case) -> Line:
@@ -223,6 +192,7 @@ def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator
         F = number(task_F(robot, found.F))
         if index and number(task_F(robot, starts.optima[index - 1].F)) == F:
             note += ", at another point"
+        note += f", in {found.assembly}" if found.assembly else ""
         yield Line(f"  {found.count} at F = {F}{note}")
     worse = len(starts.optima) - _OPTIMA
     if worse > 0:
@@ -237,6 +207,7 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield Line(free, tone=Tone.CAUTION)
     if robot.joints is not None:
         yield from joint_lines(robot, robot.joints, units)
+    yield from convention_lines(robot)
     if not robot.singular:
         yield Line(f"{robot.rank}", label="rank of J")
         return

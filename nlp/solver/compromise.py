@@ -35,7 +35,8 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
-from .multistart import ProgramSolution, same_value, state_or_none
+from .multistart import ProgramSolution, state_or_none
+from .optima import same_value
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus
 from .status import Status

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,38 +27,18 @@ from ..program.relaxation import (
     unrelaxed_pairs,
 )
 from ..program.sampling import starting_points
+from .closing import closed_point, closing
 from .interface import Solver
 from .ipopt import ipopt
+from .optima import Optimum, distinct_optima
 from .phase import Phase, PhaseProgress, no_phase
-from .starts import SAME_POINT, Start, StartStatus, search_from
+from .starts import Start, StartStatus, search_from
 from .status import Status
 
-#: Two optima have the same F when it differs by less than this part of F's scale.
-SAME_VALUE = 1e-9
 #: A point better than the best optimum by more than this part of F's scale is better by more than rounding.
 _BETTER = 1e-6
 #: Starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """An optimum that starts converged to.
-
-    Attributes:
-        F: objective.
-        count: number of starts that ended there.
-        x: (n,) one of the points.
-        spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
-            isolated optimum, up to 1 for a set of them, which may have several pieces.
-        evidence: the evidence at ``x``.
-    """
-
-    F: float
-    count: int
-    x: FloatArray
-    spread: float
-    evidence: Evidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,8 +166,10 @@ def _search(
     ends violate; such starts are repeated until none is left.
     """
     began = time.perf_counter()
-    if nlp.n == 0:
-        return _evaluate_without_variables(nlp, search, began)
+    if nlp.is_fixed:
+        return _evaluate_fixed(nlp, search, began)
+    if nlp.is_overdetermined:
+        solver = closing
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
@@ -215,7 +196,7 @@ def _search(
     if not found:  # interrupted before the first start was done
         return _at_the_start(nlp, search, began)
     done = [found[k] for k in sorted(found)]
-    starts, optima = _distinct_optima(nlp, done, phase)
+    starts, optima = distinct_optima(nlp, done, phase)
     better = _find_better_start(nlp, starts, optima)
     if optima and better is None:
         x, evidence = optima[0].x, optima[0].evidence
@@ -248,13 +229,13 @@ def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
     return nlp.sign * min(values) if values else None
 
 
-def _evaluate_without_variables(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
-    """Evaluate a program without variables."""
-    x = frozen_array(nlp.start, (0,))
+def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
+    """Evaluate a program of a case that leaves nothing free, once: only the robot's loops are closed."""
+    x = closed_point(nlp, search)
     status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)
-    state = evaluate(nlp, x)
-    return ProgramSolution(status, nlp, x, state, evidence, (), (), search.seed, time.perf_counter() - began)
+    state, seconds = state_or_none(nlp, x), time.perf_counter() - began
+    return ProgramSolution(status, nlp, frozen_array(x, (nlp.n,)), state, evidence, (), (), search.seed, seconds)
 
 
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
@@ -277,12 +258,9 @@ def _status(evidence: Evidence, converged: bool) -> Status:
         return Status.OPTIMAL
     if evidence.kind is PointKind.INFEASIBLE:
         return Status.INFEASIBLE
+    if evidence.kind is PointKind.LIMB_SINGULAR:
+        return Status.LIMB_SINGULAR
     return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
-
-
-def same_value(nlp: Nlp) -> float:
-    """Return the largest difference of F between optima that have the same F."""
-    return max(SAME_VALUE, nlp.rounding) * nlp.objective_scale
 
 
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
@@ -291,57 +269,3 @@ def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
         return evaluate(nlp, x)
     except EvaluationError:
         return None
-
-
-class _Distinct(NamedTuple):
-    """Starts, saddles marked by their status, and the distinct optima among the others, best first."""
-
-    starts: list[Start]
-    optima: list[Optimum]
-
-
-def _distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> _Distinct:
-    """Group converged starts by value and point, and examine one point of each group, once.
-
-    Where an optimum is not isolated, all points of its F count as one set; it may have several pieces.
-    """
-    optima: list[Optimum] = []
-    saddles: list[Start] = []
-    converged = [start for start in done if start.status is StartStatus.CONVERGED]
-    remaining = sorted(converged, key=lambda start: nlp.sign * start.F)
-    while remaining:
-        phase(Phase.EVIDENCE, len(converged) - len(remaining), len(converged))
-        lead = remaining[0]
-        level = [start for start in remaining if abs(start.F - lead.F) <= same_value(nlp)]
-        evidence = examine(nlp, lead.x)
-        # The lead is the first start of the level, and so of the first group: its evidence serves that group.
-        isolated = evidence.kind is not PointKind.NOT_ISOLATED
-        groups = _group_by_point(nlp, level) if isolated else [level]
-        examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
-        for each, group in zip(examined, groups, strict=True):
-            if not each.kind.is_optimum:
-                saddles += group
-                continue
-            x = np.array([start.x for start in group])
-            spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))
-            optima.append(Optimum(group[0].F, len(group), group[0].x, spread, each))
-        remaining = [start for start in remaining if start not in level]
-    starts = [replace(start, status=StartStatus.SADDLE) if start in saddles else start for start in done]
-    return _Distinct(starts, optima)
-
-
-def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
-    """Group starts whose points count as the same, in the order of the first of each group."""
-    groups: list[list[Start]] = []
-    for start in starts:
-        same = next((group for group in groups if _largest_distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
-        if same is None:
-            groups.append([start])
-        else:
-            same.append(start)
-    return groups
-
-
-def _largest_distance(nlp: Nlp, one: FloatArray, other: FloatArray) -> float:
-    """Return the largest distance along one variable, in half ranges."""
-    return float(np.max(np.abs(one - other) / nlp.scale))

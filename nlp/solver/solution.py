@@ -15,7 +15,8 @@ from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
 from .answer import Answer
-from .multistart import Optimum, ProgramSolution
+from .multistart import ProgramSolution
+from .optima import Optimum
 from .starts import Start
 from .status import Status
 

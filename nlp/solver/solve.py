@@ -92,7 +92,7 @@ def solve_programs(
         after_start = None if progress is None else partial(progress, name)
         return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
-    if len(nlps) > 1 and nlps[0].n == 0:
+    if len(nlps) > 1 and nlps[0].is_fixed:
         raise CaseError("robot", "has nothing free, so there is nothing to bring together", source=case.source)
     own = [solve_one(task.name, nlp) for nlp, task in zip(nlps, case.tasks, strict=True)]
     if len(nlps) > 1:

@@ -55,6 +55,7 @@ class StartStatus(enum.Enum):
     SADDLE = "ended where F is stationary but neither largest nor smallest"
     UNDEFINED = "met a point where the robot's equations have no finite value"
     STALLED = "stopped before it was stationary"
+    LIMB_SINGULAR = "ended where passive joints of a limb are dependent, so that F jumps"
     OPEN = "ended where loops of the robot are open: another way to assemble its joints"
 
 

@@ -12,6 +12,7 @@ class Status(enum.Enum):
     AVERAGED = "averaged"
     EVALUATED = "evaluated"
     SADDLE = "saddle"
+    LIMB_SINGULAR = "singular limb"
     NOT_CONVERGED = "not converged"
     INFEASIBLE = "infeasible"
     INTERRUPTED = "interrupted"

@@ -8,8 +8,9 @@ import pytest
 from mujoco_robots import Oracle
 from numpy.typing import NDArray
 from robot_files import every_joint
+from robot_gallery import GALLERY, table
 from robot_mjcf import elementary
-from test_robot_gallery import GALLERY, RANKS, configurations, table
+from test_robot_gallery import RANKS, configurations
 
 from screwsynth.models import Body, JointKind, LinkKind, Model, robot
 from screwsynth.nlp import Case, Task, result_of, solve

@@ -41,8 +41,9 @@ def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
     found = assembly_of(nlp, other, evaluate(nlp, other))
     assert found is not None
     assert not found.is_home
+    assert found.turned == ("3",)
     assert found.nearness > NEAR_SINGULAR
-    assert [each.partition(":")[0] for each in found.sentences] == ["another assembly than at home"]
+    assert [each.partition(":")[0] for each in found.sentences] == ["another working mode than at home"]
 
 
 def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
@@ -90,7 +91,7 @@ def test_results_say_that_an_answer_is_in_another_assembly() -> None:
     moved = replace(own, x=other, state=evaluate(nlp, other))
     changed = replace(solution, outcomes=(replace(solution.outcomes[0], own=moved),))
     (sentence,) = result_of(changed).robot.joints.assembly
-    assert sentence.startswith("another assembly than at home")
+    assert sentence.startswith("another working mode than at home: limb 2 ")
 
 
 @pytest.mark.slow

@@ -114,7 +114,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
     # Keys.
-    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, home, dimensions, derived, limb"),
+    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, length_unit, home, dimensions, derived, limb"),
     (LAST, 'at = "A", friction = 1 }', "limb 1, joint 3, friction: no such key; allowed: type, name, at, axis"),
     ("typical = 1.0", "typical = 1.0, min = 0", "dimensions, rb, min: no such key; allowed: typical, kind, description"),
     ("repeat =", "mirror = true\nrepeat =", "limb 1, mirror: no such key; allowed: name, repeat, points, joints, branch"),
@@ -251,11 +251,13 @@ REMARKS = [
 
 
 def test_axes_that_are_almost_parallel_and_idle_limbs_are_remarked_on(tmp_path: Path, cli: Run) -> None:
-    assert load_case(put(tmp_path, ROBOT)).model.remarks == ()
+    (alone,) = load_case(put(tmp_path, ROBOT)).model.remarks
+    assert alone.startswith("the robot has one member only, so F says little")
     for old, new, remark in REMARKS:
         name = put(tmp_path, ROBOT.replace(old, new, 1))
-        (found,) = load_case(name).model.remarks
+        found, *others = load_case(name).model.remarks
         assert found.startswith(remark)
+        assert others == [alone]
     status, out, _ = cli("evaluate", name, "--set", "p_z=1.1")
     assert status == 0
     assert "note  limb 1 carries nothing" in out

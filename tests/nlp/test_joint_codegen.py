@@ -1,9 +1,11 @@
 """Generated C of robots given joint by joint: with limits on joints, with members, and at several poses."""
 
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -57,6 +59,39 @@ def test_limits_on_joints_can_be_set_within_their_ranges() -> None:
     assert found["joint.1:1.min"].default == -math.pi
     assert (found["joint.2:3.cone"].above, found["joint.2:3.cone"].most) == (0.0, math.pi)
     assert found["actuator_rate.max"].above == 0.0
+
+
+def test_the_page_of_limits_names_what_can_be_set() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
+    table = page.split("| allowed at run time |")[1].split("Not covered:")[0]
+    rows = [line.split("|")[1:4] for line in table.splitlines() if line.startswith("| `")]
+    stated = {name: allowed.strip() for _, names, allowed in rows for name in re.findall(r"`([A-Z_0-9]+)`", names)}
+    motions = (
+        JointMotion("1:1", min=-1, max=1.4),
+        JointMotion("1:2", min=-3.0, max=3.0),
+        JointCone("2:3", 1.0),
+        ActuatorRate(20.0),
+        LinkClearance(0.05),
+    )
+    second = JointMotion("1:3", part="first", min=-1, max=1.2)
+    found = {
+        each.name: each
+        for nlp in (formulate(starter("3-rps", *motions)), formulate(starter("3-upu", second)))
+        for each in run_time_limits(nlp, "c").limits
+    }
+    ranges = {
+        "within half a turn to either side": (-math.pi, math.pi),
+        "any": (-math.inf, math.inf),
+        "above 0, up to half a turn": (0.0, math.pi),
+        "above 0": (0.0, math.inf),
+        "above 0, up to 1.8 times the case's own": (0.0, 1.8 * 0.05),
+    }
+    assert len(stated) == 8
+    for name, allowed in stated.items():
+        assert (found[name].above, found[name].most) == pytest.approx(ranges[allowed]), name
+    # A side that the case does not state is not there.
+    one_sided = run_time_limits(formulate(starter("3-rps", JointMotion("1:1", max=1.4))), "c").limits
+    assert [each.name for each in one_sided if "JOINT" in each.name] == ["JOINT_1_1_MAX"]
 
 
 def test_links_at_several_poses_are_loops_and_no_value_needs_itself() -> None:

@@ -30,7 +30,8 @@ from screwsynth.nlp import (
 )
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.mobility import Mobility, SingularityKind, mobility_of
+from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
+from screwsynth.nlp.evidence.singularities import SingularityKind
 from screwsynth.nlp.evidence.state import loops_are_closed
 
 Run = Callable[..., tuple[int, str, str]]
@@ -273,8 +274,8 @@ def test_kinds_of_singularity_are_told_apart() -> None:
         assert found is not None
         return [each.kind for each in found.singularities]
 
-    # All links radial: every limb is stretched.
-    assert kinds(planar(0.0)) == [SingularityKind.SERIAL] * 3
+    # All links radial: every limb is stretched, and the lines of the distal links meet.
+    assert kinds(planar(0.0)) == [*[SingularityKind.SERIAL] * 3, SingularityKind.ACTUATION]
     # Park's 3-UPU of Seoul: three constraints of rank one.
     text = tomllib.loads("""
         name = "snu"

@@ -89,6 +89,7 @@ class RobotFile(Table):
 
     name: Name = Field(description="its name")
     description: str = Field(default="", description="one sentence")
+    length_unit: str = Field(default="", description="unit of the typical lengths, such as m; empty for proportions")
     home: VectorExpression = Field(default="0*x", description="origin of the platform at home")
     dimensions: dict[str, DimensionTable] = Field(default_factory=dict, description="dimensions by name")
     derived: dict[str, Expression] = Field(default_factory=dict, description="further numbers by name")

@@ -50,6 +50,7 @@ class LimbRate:
     Attributes:
         limb: name of the limb that applies the wrench.
         kind: a force, or a couple.
+        member: name of the limb's member that applies it.
         rate: work rate ``L_i ^ chi``.
         share: part of F, ``rate^2 / F``; nan where F is 0.
         driving: its work rate in an actuated joint of the limb at unit rate; 0 for a constraint.
@@ -57,6 +58,7 @@ class LimbRate:
 
     limb: str
     kind: WrenchKind
+    member: str
     rate: float
     share: float
     driving: float = 0.0
@@ -149,6 +151,11 @@ class Drawing:
         own = [k for k, row in enumerate(self.rows) if row.limb == link.limb]
         return None if link.row is None or link.row >= len(own) else own[link.row]
 
+    def own_rows(self, limb: str) -> list[LimbRate]:
+        """Return the rows that links of a limb carry alone, such as rods, in order."""
+        found = (self.link_row(link) for _, _, link in self.links if link.limb == limb)
+        return [self.rows[k] for k in sorted({k for k in found if k is not None})]
+
     def attachment(self, limb: str) -> int | None:
         """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
         for start, end, link in self.links:
@@ -214,7 +221,7 @@ def drawing_of(
     return replace(
         drawing,
         rows=tuple(
-            LimbRate(row.limb, row.kind, float(rate), float(share), float(driving))
+            LimbRate(row.limb, row.kind, row.member, float(rate), float(share), float(driving))
             for row, rate, share, driving in zip(model.rows, rates, shares, posture.driving, strict=True)
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name),
@@ -263,7 +270,7 @@ def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Lin
 
 def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | None:
     """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
-    if nlp.n == 0:
+    if nlp.is_fixed:
         return None
     x = close_equations(nlp, nlp.start)
     state = state_at_pose(nlp, x, pose)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -165,8 +165,8 @@ class Panel:
                 key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))),
             )
             places = line[0] + np.outer(_ALONG_LINK, line[1] - line[0])
-            own = list(dict.fromkeys(rate for _, each in lines if each.limb == limb and (rate := self._own_rate(each))))
-            text = f"limb {limb}" if not rates else f"limb {limb}\n{self._rates_text(own or [rates[limb]])}"
+            words = f"\n{self._rates_text(limb) or self._rate_text(rates[limb])}" if rates else ""
+            text = f"limb {limb}{words}"
             self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
     def _paint_rails(self) -> None:
@@ -218,7 +218,7 @@ class Panel:
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-            if not free:
+            if not free and len(motion.path) > 2:
                 self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
                 self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:
@@ -329,10 +329,11 @@ class Panel:
         row = self.drawing.link_row(link)
         return None if row is None else self.drawing.rows[row].rate
 
-    def _rates_text(self, rates: Sequence[float]) -> str:
-        """Return rates with their unit, those of a limb's rods side by side."""
-        unit = self._rate_unit()
-        return " and ".join(self._rate_text(each).removesuffix(unit).strip() for each in rates) + f" {unit}".rstrip()
+    def _rates_text(self, limb: str) -> str:
+        """Return the rates of a limb's rods side by side, with their unit; empty for a limb without such rods."""
+        unit, rows = self._rate_unit(), self.drawing.own_rows(limb)
+        texts = [f"{row.member}: {self._rate_text(row.rate).removesuffix(unit).strip()}" for row in rows]
+        return " and ".join(texts) + f" {unit}".rstrip() if texts else ""
 
     def _rate_text(self, rate: float) -> str:
         """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""

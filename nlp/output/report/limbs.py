@@ -38,9 +38,10 @@ class MeasureData(TypedDict):
 
 
 class RowData(TypedDict):
-    """A row of the Jacobian, and the index of the point that joins its limb to the platform."""
+    """A row of the Jacobian: its limb and member, and the index of the point that joins the limb to the platform."""
 
     limb: str
+    member: str
     kind: str
     at: int | None
 
@@ -63,6 +64,7 @@ def row_data(drawing: Drawing) -> list[RowData]:
     return [
         {
             "limb": row.limb,
+            "member": row.member,
             "kind": row.kind.value,
             "at": None if couples.count(row.limb) > 1 else drawing.attachment(row.limb),
         }

@@ -8,6 +8,7 @@ from ...case.case import Case
 from ...case.pose import sizes_of_turn
 from ...results.data import CombinedResult, SolveResult
 from ...results.designtable import combined_design_table, solved_design_table
+from ...results.jointwording import limb_part_table
 from ...results.parts import LimitData, MarginData, RobotData
 from ...results.point import task_data
 from ...results.robottables import robot_tables
@@ -73,7 +74,7 @@ def answer(report: Report) -> Markup:
 def _case(report: Report) -> Markup:
     """Return the case in words."""
     case, first = report.case, report.parts[0]
-    lines = [f"{case.model.description}."]
+    lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
         lines.append(f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}.")
@@ -84,7 +85,7 @@ def _case(report: Report) -> Markup:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
     program = first.nlp.program
     level = None if program.places.epigraph is None else program.places.epigraph.level
-    names = [variable.name for k, variable in enumerate(program.variables) if k != level]
+    names = [variable.name for k, variable in enumerate(program.variables) if k != level and not first.nlp.is_fixed]
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
@@ -212,7 +213,7 @@ def _rates(view: ViewData) -> Markup:
         body.append(
             tag(
                 "tr",
-                tag("th", row["limb"], scope="row"),
+                tag("th", row["member"], scope="row"),
                 tag("td", row["kind"]) if couples else None,
                 *(tag("td", cell, class_=kind) for cell, kind in zip(cells, kinds, strict=True)),
             )
@@ -271,6 +272,11 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
     for table in others:
         caption = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
         parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
+    parts_by_limb = limb_part_table(case, robot)
+    if parts_by_limb is not None:
+        parts.append(
+            html_table(parts_by_limb, "Actuation and constraints in F, limb by limb", id=f"{anchor}-actuation")
+        )
     if not reached:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts

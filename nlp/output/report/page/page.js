@@ -49,7 +49,7 @@
     for (const [row, k] of rows) {
       const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
       const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value));
-      text.push(`${row.kind}: rate ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
+      text.push(`${row.member === limb ? "" : `${plain(row.member)}, `}${row.kind}: rate ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
       text.push(`wrench (${wrench.slice(0, 3).join(", ")}; ${wrench.slice(3).join(", ")})`);
     }
     return text.join("<br>");

@@ -1,0 +1,85 @@
+"""Dependence of F on two conventions: the characteristic length, and centres that the joints do not determine.
+
+F of a motion that the platform can make with free actuators depends on neither for almost every robot. For other
+motions the constraints count too: their couples are weighed by the characteristic length, and the couple of a wrench by
+the point about which it is taken. Where a limb has neither a ball joint nor two hinges that meet, this point is that of
+its last passive joint, whose place on the joint's axis is free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray, Model, Substitution, objective
+from ..program.nlp import Nlp
+
+#: Dependence below this part of F is rounding: F is a sum of squares whose rates are known to 1e-9.
+_NEGLIGIBLE = 1e-7
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Dependence of F on conventions, as parts of F.
+
+    Attributes:
+        length: relative derivative ``(l / F) dF/dl`` by the characteristic length; 0 where F does not depend on it.
+        centre: largest relative change of F where all centres that may slide along an axis move by the characteristic
+            length, to either side; None where there is no such centre.
+    """
+
+    length: float
+    centre: float | None
+
+
+def dependence_of(nlp: Nlp, x: FloatArray) -> Dependence | None:
+    """Return the dependence of the sum of F over the poses on conventions; None for a robot without couples, or F = 0.
+
+    Args:
+        nlp: the program of one task, or of several, of which the first counts.
+        x: (n,) the point.
+    """
+    model, program = nlp.program.model, nlp.program
+    if not model.has_couples:
+        return None
+    function = _objective_function(model)
+    length = nlp.case.characteristic_length
+    twist = nlp.arguments[list(program.places.twists[0])]
+    totals = np.zeros(4)
+    size = 0.0
+    for pose, kernel in enumerate(program.kernels.robot_states):
+        numbers = kernel(x, nlp.arguments)
+        at = [numbers.parameters, x[list(program.places.unknowns[pose])], numbers.rotation, numbers.position]
+        here = [np.array(each).item() for each in function.call([*at, length, 0.0, twist])]
+        moved = [function.call([*at, length, side * length, twist])[0] for side in (1.0, -1.0)]
+        totals += [*here, *(np.array(each).item() for each in moved)]
+        size += float(numbers.magnitude[0, 0])
+    F, slope, *others = totals.tolist()
+    if not np.isfinite(totals).all() or size * _NEGLIGIBLE**2 >= F:
+        return None
+    may_slide = any(member.slide is not None for member in model.members)
+    largest = max((abs(each - F) / F for each in others), default=0.0)
+    return Dependence(_settled(length * slope / F), _settled(largest) if may_slide else None)
+
+
+def _settled(value: float) -> float:
+    """Return a part of F, 0 where it is rounding."""
+    return 0.0 if abs(value) <= _NEGLIGIBLE else value
+
+
+def _objective_function(model: Model) -> ca.Function:
+    """Return the function to F and its derivative by the characteristic length.
+
+    Its arguments are parameters, unknowns, rotation and position, the characteristic length, the way by which centres
+    slide, and the twist.
+    """
+    length, way, twist = SX.sym("length"), SX.sym("way"), SX.sym("twist", 6)
+    members = [
+        each if each.slide is None else replace(each, centre=each.centre + way * each.slide) for each in model.members
+    ]
+    F = objective(model.wrenches, twist, length, members)
+    outputs = [ca.densify(F), ca.densify(ca.jacobian(F, length))]
+    return ca.Function("conventions", [*Substitution.identity(model).all, length, way, twist], outputs)

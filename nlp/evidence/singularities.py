@@ -1,0 +1,316 @@
+"""Kinds of singularity of a robot given joint by joint, with the motions gained or the wrenches that lock them.
+
+Ranks at the point are compared with those at almost all dimensions and closed configurations:
+
+* passive: the passive screws of a limb have a smaller rank, so that its wrenches ``W`` gain a dimension and F jumps;
+* serial: all screws of a limb have a smaller rank, so that an actuator does no work in any wrench of the limb, and the
+  platform loses a freedom;
+* constraint: all wrenches that do no work in the actuated joints have a smaller rank;
+* actuation: all wrenches have a smaller rank, so that the platform moves with every actuator locked.
+
+A limb whose screws become dependent resists wrenches more than at almost all points near by. The wrenches near by are
+known to first order: with rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` of the point is also one near by
+where ``w`` does no work in the change ``sum n_j ds_j``, and ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` by the motions
+``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from ...models import FloatArray, JointScrews, frozen_array
+from ..program.nlp import Nlp
+from .linalg import echelon_basis
+from .state import RobotState
+
+#: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
+DEPENDENT = 1e-7
+#: Rates of dependent joints below this part of the largest are zero: such a joint takes no part.
+_TAKES_PART = 1e-6
+
+
+#: Keys of kinds in results as JSON.
+SingularityKey: TypeAlias = Literal["passive", "serial", "constraint", "actuation", "architecture"]
+
+
+class SingularityKind(enum.Enum):
+    """Kind of a singularity; each value is a clause for people."""
+
+    PASSIVE = "passive joints are dependent: F jumps here, and the point is no optimum to build"
+    SERIAL = "joints are dependent: its actuator cannot drive the platform, which loses a freedom"
+    CONSTRAINT = "the constraints are dependent: the platform gains a freedom even with free actuators"
+    ACTUATION = "the platform can move with every actuator locked"
+    ARCHITECTURE = "the rank is below six at all dimensions and poses: the platform can always move"
+
+    @property
+    def key(self) -> SingularityKey:
+        """The kind's key in results as JSON."""
+        return _KEYS[self]
+
+
+_KEYS: dict[SingularityKind, SingularityKey] = {
+    SingularityKind.PASSIVE: "passive",
+    SingularityKind.SERIAL: "serial",
+    SingularityKind.CONSTRAINT: "constraint",
+    SingularityKind.ACTUATION: "actuation",
+    SingularityKind.ARCHITECTURE: "architecture",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Singularity:
+    """A singularity.
+
+    Attributes:
+        kind: the kind.
+        limb: name of the limb that it belongs to; None for one of the whole robot.
+        joints: labels of the limb's dependent joints.
+        gained: (k, 6) twists that the platform gains: angular velocity, then velocity at the world's origin. They span
+            the motions that no wrench resists; of a constraint singularity that leaves other motions to resist or not,
+            all that no constraint resists.
+        locking: (k, 6) wrenches that a limb resists with in addition: force, then moment about the world's origin; each
+            is of unit force, or a unit couple. The platform loses the motions in which they do work. Of more than one,
+            it depends on the way to the point which combinations are additional.
+    """
+
+    kind: SingularityKind
+    limb: str | None = None
+    joints: tuple[str, ...] = ()
+    gained: FloatArray | None = None
+    locking: FloatArray | None = None
+
+
+def limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> list[Singularity]:
+    """Return the singularities of limbs: screws of their joints with a smaller rank than at almost all other points.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        state: the robot there.
+        pose: index of the pose.
+    """
+    model = nlp.program.model
+    if not model.joint_screws:
+        return []
+    rows = [row.limb for row in model.rows]
+    found: list[Singularity] = []
+    parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
+    values = _screws_at(nlp, x, pose, parameters, state.rotation, state.position)
+    for each, screws in zip(model.joint_screws, values, strict=True):
+        own = state.jacobian[[k for k, limb in enumerate(rows) if limb == each.limb]]
+        singular = _singularity_of(each, screws, own, state.position)
+        same = next((k for k, other in enumerate(found) if _are_alike(singular, other)), None)
+        if singular is not None and same is None:
+            found.append(singular)
+        elif singular is not None and same is not None:
+            found[same] = _together(found[same], singular)
+    return found
+
+
+def is_passive_singular(nlp: Nlp, x: FloatArray, pose: int = 0) -> bool:
+    """Return whether passive joints of a limb are dependent at a point (n,), at one of the poses, so that F jumps."""
+    if not nlp.program.model.joint_screws:
+        return False
+    numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    values = _screws_at(nlp, x, pose, numbers.parameters, numbers.rotation, numbers.position)
+    for each, screws in zip(nlp.program.model.joint_screws, values, strict=True):
+        passive = [k for k in range(screws.shape[1]) if k not in each.driven]
+        if not np.isfinite(screws[:, passive]).all():
+            return True
+        if _rank(_unit_columns(screws[:, passive], numbers.position.ravel())[0]) < each.passive_rank:
+            return True
+    return False
+
+
+def platform_singularities(
+    state: RobotState, constraints: FloatArray, ranks: tuple[int, int], generic: tuple[int, int]
+) -> list[Singularity]:
+    """Return the constraint and actuation singularities at a point.
+
+    A constraint singularity is mostly one of actuation too: then both have the same motions, and it is listed once.
+
+    Args:
+        state: the robot there.
+        constraints: (k, 6) wrenches that do no work in the actuated joints.
+        ranks: of the constraints and of J, at the point.
+        generic: the same at almost all points.
+    """
+    found = []
+    lost = generic[0] - ranks[0]
+    if lost > 0:
+        alone = len(state.free_twists) == lost
+        gained = state.free_twists if alone else _null_twists(constraints, state.position)
+        found.append(Singularity(SingularityKind.CONSTRAINT, gained=gained))
+        if alone:
+            return found
+    if ranks[1] < generic[1]:
+        found.append(Singularity(SingularityKind.ACTUATION, gained=state.free_twists))
+    return found
+
+
+def _screws_at(
+    nlp: Nlp, x: FloatArray, pose: int, parameters: FloatArray, rotation: FloatArray, position: FloatArray
+) -> list[FloatArray]:
+    """Return the screws (6, k) of each path of joints whose screws are known, at a point."""
+    unknowns = x[list(nlp.program.places.unknowns[pose])]
+    values = nlp.program.kernels.joint_screws.call([parameters, unknowns, rotation, position])
+    return [np.array(each) for each in values]
+
+
+def _singularity_of(each: JointScrews, screws: FloatArray, own: FloatArray, centre: FloatArray) -> Singularity | None:
+    """Return the singularity of one path of joints; None without one.
+
+    Args:
+        each: the path.
+        screws: (6, k) its screws; not finite for a joint whose axis has no direction at the point.
+        own: (m, 6) rows of its limb in J.
+        centre: (3,) the platform's origin, length.
+    """
+    every = list(range(screws.shape[1]))
+    passive = [k for k in every if k not in each.driven]
+    for kind, columns, generic in (
+        (SingularityKind.PASSIVE, passive, each.passive_rank),
+        (SingularityKind.SERIAL, every, each.all_rank),
+    ):
+        known = [k for k in columns if np.isfinite(screws[:, k]).all()]
+        unit, reach = _unit_columns(screws[:, known], centre)
+        rank = _rank(unit)
+        if len(known) == len(columns) and rank >= generic:
+            continue
+        before = [k for k in every if np.isfinite(screws[:, k]).all()]
+        changes, kernel = _changes(screws, before, known, unit, reach, centre)
+        cokernel = np.linalg.svd(unit)[0][:, rank:]
+        wrenches = _span_of(cokernel @ (cokernel.T @ changes))
+        if not wrenches.shape[1]:
+            resisted = _dual(own, centre, reach)
+            wrenches = _span_of(cokernel - resisted @ (resisted.T @ cokernel))
+        taking_part = np.abs(kernel).max(axis=1, initial=0.0)
+        part = [known[k] for k in np.flatnonzero(taking_part > _TAKES_PART * taking_part.max(initial=0.0))]
+        part += [k for k in columns if k not in known]
+        joints = tuple(dict.fromkeys(each.joints[k] for k in sorted(part)))
+        return Singularity(kind, each.limb, joints, locking=_unit_wrenches(wrenches.T, centre, reach))
+    return None
+
+
+def _changes(
+    screws: FloatArray,
+    before: Sequence[int],
+    columns: Sequence[int],
+    unit: FloatArray,
+    reach: float,
+    centre: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the changes (6, c) of dependent combinations of screws by motions of joints, and their rates (n, k).
+
+    Rates whose combination has no change are left out where others have one: such a combination is zero near by too, as
+    the spin of a rod between two ball joints is.
+    """
+    rank = _rank(unit)
+    kernel = np.linalg.svd(unit)[2][rank:].T
+    lengths = np.linalg.norm(_homogeneous(screws[:, list(columns)], centre, reach), axis=0)
+    by_rate = np.zeros((0, kernel.shape[1]))
+    changes = [np.zeros((6, 0))]
+    for i in before:
+        moved = np.zeros((6, len(columns)))
+        for k, j in enumerate(columns):
+            if i < j and lengths[k] > 0:
+                bracket = _bracket(screws[:, i], screws[:, j])[:, None]
+                moved[:, k] = _homogeneous(bracket, centre, reach)[:, 0] / lengths[k]
+        moved = moved @ kernel
+        left = np.linalg.svd(unit)[0][:, rank:].T @ moved
+        by_rate = np.vstack([by_rate, left])
+        changes.append(moved)
+    directions = np.linalg.svd(by_rate)[2][: _rank(by_rate)].T if by_rate.size else np.zeros((kernel.shape[1], 0))
+    return np.hstack(changes), kernel @ directions if directions.shape[1] else kernel
+
+
+def _bracket(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the change of a twist (6,) for unit motion along another (6,): their Lie bracket."""
+    (w, v), (omega, velocity) = np.split(first, 2), np.split(second, 2)
+    return np.concatenate([np.cross(w, omega), np.cross(w, velocity) + np.cross(v, omega)])
+
+
+def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
+    """Return twists (6, n) with velocities of a centre (3,) in parts of a length."""
+    return np.vstack([screws[:3], (screws[3:] + np.cross(screws[:3].T, centre).T) / reach])
+
+
+def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
+    """Return twists (6, n), velocities of a centre in parts of the largest, each of unit size; and this largest."""
+    velocities = _homogeneous(screws, centre, 1.0)[3:]
+    turning = np.linalg.norm(screws[:3], axis=0) > 0
+    reach = float(np.linalg.norm(velocities[:, turning], axis=0).max(initial=0.0)) or 1.0
+    scaled = _homogeneous(screws, centre, reach)
+    lengths = np.linalg.norm(scaled, axis=0)
+    return scaled / np.where(lengths > 0, lengths, 1.0), reach
+
+
+def _rank(columns: FloatArray) -> int:
+    """Return the rank of columns of size 1 at most."""
+    if not columns.size:
+        return 0
+    values = np.linalg.svd(columns, compute_uv=False)
+    return int(np.count_nonzero(values > DEPENDENT * values.max(initial=1.0)))
+
+
+def _span_of(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (6, r) of the span of columns (6, n) of order 1."""
+    left, values, _ = np.linalg.svd(columns)
+    return np.asarray(left[:, : int(np.count_nonzero(values > _TAKES_PART * values.max(initial=1.0)))])
+
+
+def _dual(wrenches: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
+    """Return an orthonormal basis (6, r) of wrenches (m, 6): moments in parts of a length, then forces."""
+    moments = wrenches[:, 3:] - np.cross(centre, wrenches[:, :3])
+    rows = np.hstack([moments / reach, wrenches[:, :3]])
+    return _span_of(rows.T) if len(rows) else np.zeros((6, 0))
+
+
+def _unit_wrenches(duals: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
+    """Return wrenches (k, 6) of unit force, or unit couples, from a basis (k, 6) as :func:`_dual` has it."""
+    if not len(duals):
+        return np.zeros((0, 6))
+    rows = echelon_basis(duals)
+    forces = rows[:, 3:]
+    wrenches = np.hstack([forces, rows[:, :3] * reach + np.cross(centre, forces)])
+    sizes = np.linalg.norm(forces, axis=1)
+    couples = np.linalg.norm(wrenches[:, 3:], axis=1)
+    wrenches = wrenches / np.where(sizes > 0, sizes, couples)[:, None]
+    return frozen_array(wrenches, wrenches.shape)
+
+
+def _null_twists(wrenches: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return a basis (k, 6) of the twists in which wrenches (m, 6) do no work, in reduced echelon form."""
+    moments = wrenches[:, 3:] - np.cross(centre, wrenches[:, :3])
+    reach = float(np.abs(moments).max(initial=0.0)) or 1.0
+    rows = np.hstack([moments / reach, wrenches[:, :3]])
+    null = np.linalg.svd(rows)[2][_rank(rows) :] * np.array([1 / reach] * 3 + [1.0] * 3)
+    null[:, 3:] -= np.cross(null[:, :3], centre)
+    found = echelon_basis(null)
+    return frozen_array(found, found.shape)
+
+
+def _are_alike(one: Singularity | None, other: Singularity) -> bool:
+    return one is not None and (one.kind, one.limb) == (other.kind, other.limb)
+
+
+def _together(one: Singularity, other: Singularity) -> Singularity:
+    """Return one singularity for two paths of a limb."""
+    rows = [each.locking for each in (one, other) if each.locking is not None]
+    wrenches = np.vstack([np.zeros((0, 6)), *rows])
+    joints = tuple(dict.fromkeys([*one.joints, *other.joints]))
+    return Singularity(one.kind, one.limb, joints, locking=frozen_array(wrenches, wrenches.shape))
+
+
+def clause_of(kind: SingularityKind, limb: str | None, joints: Sequence[str]) -> str:
+    """Return a singularity as a clause for people."""
+    if limb is None:
+        return kind.value
+    named = f" {', '.join(joints)}" if joints else ""
+    first, _, rest = kind.value.partition(" are dependent")
+    return f"limb {limb}: its {first}{named} are dependent{rest}"
