@@ -181,8 +181,8 @@ class _Path:
         if not _is_closed(residual):
             return None, np.array([float(np.abs(residual).max())])
         count = 6 * len(self._motions.tree.chords) + len(self._couplings)
-        values = np.linalg.svd(slopes[:count, self._free], compute_uv=False)
-        return found, np.asarray(values, dtype=np.float64)
+        singular = np.linalg.svd(slopes[:count, self._free], compute_uv=False)
+        return found, np.asarray(singular, dtype=np.float64)
 
     def _reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
         """Return the coordinates of least residual near others, with the residual and its derivatives."""
