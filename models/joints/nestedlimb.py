@@ -123,7 +123,7 @@ def resisting(
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     driven = [k for k in network.joints if network.joint(k).actuated and k in screws]
     for k in driven:
-        name = network.graph.joints[k].name
+        name = network.graph.joints[k].name if len(driven) > 1 else limb.name
         slides = network.joint(k).axes[0].kind is AxisKind.TRANSLATION
         dimension = Dimension.LENGTH if slides else Dimension.ANGLE
         found.actuators.append(Actuator(name, limb.name, screws[k], dimension))
