@@ -15,11 +15,11 @@ import casadi as ca
 import numpy as np
 import pytest
 from mechanism_robots import Engine, four_bar_delta, geared, projector, turn, without
-from mujoco_robots import Oracle
+from mujoco_robots import Oracle, scaled_twists
 from robot_files import robot_of
 
 import screwsynth.models
-from screwsynth.models import Substitution, instantiate, robot
+from screwsynth.models import Model, Substitution, axis_angle_from_matrix, instantiate, robot
 from screwsynth.models.mechanism import (
     Coupling,
     Mechanism,
@@ -37,6 +37,7 @@ from screwsynth.models.mechanism import (
     singularities_of,
     wrenches_of,
 )
+from screwsynth.nlp.evidence.assembly import unknowns_from_home
 
 GALLERY = Path(screwsynth.models.__file__).parent / "robots"
 NAMES = sorted(path.stem for path in GALLERY.glob("*.toml"))
@@ -61,6 +62,20 @@ def value_at_home(tables: dict[str, Any]) -> float:
     F = instantiate(model, own, ca.SX(LENGTH), [ca.SX(CHI)]).F
     typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
     return float(ca.Function("F", own.all, [F])(typical, np.zeros(len(model.unknowns)), np.eye(3), model.home))
+
+
+def values_of(model: Model, plate: MechanismLink) -> tuple[list[float], list[Any]]:
+    """F and the actuators' screws (6, a) of the symbolic model at home, and at a pose along the path from there."""
+    own = Substitution.identity(model)
+    instance = instantiate(model, own, ca.SX(LENGTH), [ca.SX(CHI)])
+    function = ca.Function("F", own.all, [instance.F, ca.densify(instance.actuators)])
+    typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
+    axis, angle = axis_angle_from_matrix(plate.rotation)
+    unknowns = unknowns_from_home(model, typical, np.concatenate([angle * axis, plate.position]))
+    assert unknowns is not None
+    home = function(typical, np.zeros(len(model.unknowns)), np.eye(3), model.home)
+    there = function(typical, unknowns, plate.rotation, plate.position)
+    return [float(home[0]), float(there[0])], [home[1].full(), there[1].full()]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -150,7 +165,17 @@ def test_the_symbolic_form_of_nested_loops_has_the_numbers_of_the_mechanism() ->
         mechanism = mechanism_of(tables)
         found = wrenches_of(mechanism, LENGTH)
         model = robot(**tables)
-        assert value_at_home(tables) == pytest.approx(found.objective(CHI), rel=1e-9)
+        there = close(mechanism, actuators=driven(mechanism, 2)).mechanism
+        plate = next(link for link in there.links if link.name == there.platform)
+        for configuration, F, actuators in zip((mechanism, there), *values_of(model, plate), strict=True):
+            own = wrenches_of(configuration, LENGTH)
+            assert pytest.approx(own.objective(CHI), rel=1e-9) == F
+            # Screws of actuators may differ by what the members allow.
+            driving = list(own.actuators)
+            for member in own.members:
+                columns = [driving.index(name) for name in member.actuators]
+                scaled = scaled_twists(member.centre, LENGTH) @ actuators[:, columns]
+                np.testing.assert_allclose(member.projector @ scaled, member.actuation, rtol=0, atol=1e-9)
         assert model.generic is not None
         assert (model.generic.jacobian, model.generic.constraints) == (found.ranks.jacobian, found.ranks.constraints)
         assert [each.wrenches for each in model.structure] == [each.wrenches for each in found.members]
