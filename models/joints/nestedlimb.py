@@ -21,7 +21,7 @@ from .opened import PathFrame, Variables
 
 #: Names of the coordinates of a joint that has two.
 _PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
-_CUT = "a nested loop is opened at it"
+_CUT = "it is part of nested loops, which give it no coordinate of its own"
 
 
 @dataclass(eq=False)

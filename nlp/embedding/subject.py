@@ -66,7 +66,7 @@ def find_subject(case: Case) -> Subject:
 
 
 def _refuse_nested_loops(case: Case) -> None:
-    """Refuse a robot with nested loops: three of them make 20 MB of C, which no compiler ends within minutes."""
+    """Refuse a robot with nested loops: three made 20 MB of C, which a compiler did not end within four minutes."""
     for each in case.model.structure:
         if each.nested:
             shown = ", ".join(each.nested[:_MOST_SHOWN]) + (", ..." if len(each.nested) > _MOST_SHOWN else "")
