@@ -1,0 +1,1 @@
+"""Descriptions of robots in other programs' formats: ``reading`` takes them in."""
