@@ -93,8 +93,8 @@ class _Reader:
         waiting = [(roots[0], Frame())]
         while waiting:
             link, place = waiting.pop()
-            for name, child in children.get(link, []):
-                waiting.append((child, self._add(name, link, child, place)))
+            found = [(child, self._add(name, link, child, place)) for name, child in children.get(link, [])]
+            waiting += reversed(found)
         if len(self.bodies) < len(self.links):
             lost = sorted(self.links - {body.name for body in self.bodies})
             raise InputError(f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root")
