@@ -3,7 +3,9 @@
 The modules in order, each of which imports only those before it: ``graph`` (links, joints and couplings), ``topology``
 (connected parts, bridges, spanning trees), ``checks`` (a mechanism that contradicts itself), ``motions`` (links and
 screws at any coordinates), ``closing`` (closed loops at a pose or at positions of the actuators), ``decomposition``
-(limbs and branches in the graph), ``limbs`` (tables of a robot file), ``definition`` (mechanisms from robot files).
+(limbs and branches in the graph), ``limbs`` (tables of a robot file), ``members`` (parts that resist the platform),
+``freedoms`` (twists that joints allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates and ranks),
+``singularities`` (ranks against generic ones), ``definition`` (mechanisms from robot files).
 """
 
 from importlib import import_module
@@ -13,6 +15,8 @@ from .checks import check_mechanism
 from .closing import ClosedMechanism, close
 from .graph import Coupling, Mechanism, MechanismError, MechanismJoint, MechanismLink
 from .limbs import limbs_of, links_of, robot_tables
+from .singularities import MechanismSingularity, SingularityType, generic_ranks, singularities_of
+from .wrenches import MemberWrenches, RobotRanks, RobotWrenches, wrenches_of
 
 if TYPE_CHECKING:
     from .definition import mechanism_of
@@ -24,12 +28,20 @@ __all__ = [
     "MechanismError",
     "MechanismJoint",
     "MechanismLink",
+    "MechanismSingularity",
+    "MemberWrenches",
+    "RobotRanks",
+    "RobotWrenches",
+    "SingularityType",
     "check_mechanism",
     "close",
+    "generic_ranks",
     "limbs_of",
     "links_of",
     "mechanism_of",
     "robot_tables",
+    "singularities_of",
+    "wrenches_of",
 ]
 
 
