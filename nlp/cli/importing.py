@@ -11,13 +11,13 @@ from typer.core import TyperCommand
 from .options import console
 
 if TYPE_CHECKING:
-    import click
+    from click import Context
 
 
 class SeveralValues(TyperCommand):
     """A command whose options ``--actuated`` and ``--free`` take every value up to the next option."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
         """Write the option again before each further value, and read the arguments."""
         written: list[str] = []
         option, is_first = "", False
@@ -55,10 +55,12 @@ def import_(
 
     The robot file has the model's numbers; its joints have the model's names. FILE stands before --actuated and --free.
     """
-    from ..errors import InputError
+    from ..errors import InputError, one_line
     from ..exchange.reading.importing import Request, import_robot
     from ..exchange.reading.reduction import Ends
-    from ..exchange.reading.words import summary_lines
+    from ..exchange.reading.robotfile import robot_file
+    from ..exchange.reading.symmetry import offers_of
+    from ..exchange.reading.words import offer_lines, summary_lines
     from ..output.files import check_outputs, write_text
     from ..output.terminal import show
     from ..results.text import Line, Tone
@@ -69,9 +71,18 @@ def import_(
         raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
     inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}
     check_outputs(inputs, {"--out": out})
-    request = Request(Path(file), Ends(platform, base, tuple(actuated or ())), close, None if loops is None else Path(loops))
-    found = import_robot(request)
-    lines: list[object] = [Line(found.mechanism.name, tone=Tone.TITLE)]
-    lines += [Line(text, label=label) for label, text in summary_lines(found)]
+    ends = Ends(platform, base, tuple(actuated or ()))
+    found = import_robot(Request(Path(file), ends, close, None if loops is None else Path(loops)))
+    lines = list(summary_lines(found))
+    offers = offers_of(found.tables, found.size) if suggest or free else None
+    if suggest and offers is not None:
+        lines += offer_lines(offers, found.size)
+    if out is not None:
+        written = robot_file(found, Path(file).name, free or [], offers)
+        lines += written.lines
+        write_text(out, written.text)
     if out != "-":
-        show(console(), lines)
+        title = Line(found.mechanism.name, tone=Tone.TITLE)
+        show(console(), [title, *(Line(text, label=label) for label, text in lines)])
+        if out is not None:
+            typer.echo(f"{one_line(out)} has the robot: [robot] file = \"{one_line(Path(out).name)}\" in a case reads it")

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from ....models.arrays import FloatArray
+from ....models.mechanism import wrenches_of
 from ...errors import listing
 from .importing import OPEN, Imported, gap_share
 from .newton import Gap
@@ -28,6 +29,16 @@ def summary_lines(found: Imported) -> Iterator[tuple[str, str]]:
     yield "actuators", f"{len(driven)}: {listing(driven[:_MOST_NAMES])}"
     if mechanism.couplings:
         yield "couplings", f"{len(mechanism.couplings)}: {listing(each.name for each in mechanism.couplings)}"
+    wrenches = wrenches_of(mechanism, found.size)
+    driven_names = set(driven)
+    for number, member in enumerate(wrenches.members, 1):
+        own = {*member.joints, *member.actuators}
+        joints = [joint for joint in mechanism.joints if joint.name in own]
+        shown = listing(f"{joint.name} {joint.kind}{'*' * (joint.name in driven_names)}" for joint in joints[:_MOST_NAMES])
+        yield f"member {number}", f"dim W {member.wrenches}, dim C {member.constraints}: {shown}"
+    ranks = wrenches.ranks
+    yield "freedoms", f"{ranks.freedoms} with free actuators, {ranks.locked} with locked ones, as the model stands"
+    yield "ranks", f"{ranks.jacobian} of all wrenches, {ranks.constraints} of the constraints"
     yield "size", f"{found.size:.6g}, the largest distance of two joints"
     yield "loops", _loops(found)
     for note in found.notes:
