@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
 from .options import console
 
-if TYPE_CHECKING:
-    from click import Context
-
 
 class SeveralValues(TyperCommand):
     """A command whose options ``--actuated`` and ``--free`` take every value up to the next option."""
 
-    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
         """Write the option again before each further value, and read the arguments."""
         written: list[str] = []
         option, is_first = "", False
@@ -85,4 +82,4 @@ def import_(
         title = Line(found.mechanism.name, tone=Tone.TITLE)
         show(console(), [title, *(Line(text, label=label) for label, text in lines)])
         if out is not None:
-            typer.echo(f"{one_line(out)} has the robot: [robot] file = \"{one_line(Path(out).name)}\" in a case reads it")
+            typer.echo(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -134,3 +134,12 @@ def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
     while name in taken:
         name, number = f"{wanted}_{number}", number + 1
     return name
+
+
+def common_name(names: Sequence[str]) -> str:
+    """Return the common beginning of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
+    common = names[0]
+    for name in names[1:]:
+        common = common[: next((k for k, (a, b) in enumerate(zip(common, name, strict=False)) if a != b), len(common))]
+        common = common[: len(name)]
+    return common.rstrip("_-. ")

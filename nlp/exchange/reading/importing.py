@@ -85,7 +85,7 @@ def import_robot(request: Request) -> Imported:
     except MechanismError as error:
         raise InputError(f"{given.source}: {error}") from None
     tables = _without_rounding(with_universal_joints(tables, reduced.size), reduced.size)
-    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, tuple([*notes, *met.notes]))
+    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, (*notes, *met.notes))
 
 
 def _read(request: Request) -> Description:

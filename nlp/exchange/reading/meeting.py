@@ -14,6 +14,7 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
 from ...errors import listing
+from .description import common_name
 from .elements import SAME_POINT
 
 #: Axes whose distance, in parts of the robot's size, or whose sine is below this almost meet or are almost parallel:
@@ -129,13 +130,20 @@ def _same_axis(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
 def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
     """Return the mechanism with three hinges through one point as a ball; None where there are none."""
     for run in _runs(given, 3):
-        one, two, three = run
+        one, two, _ = run
         if abs(float(np.linalg.det(np.array([each.axis for each in run])))) < _FLAT:
             continue
         point = meeting_point(one, two)
         off = [np.linalg.norm(np.cross(each.axis, point - each.point)) for each in run]
         if max(off) < SAME_POINT * size:
-            ball = replace(one, name=_common(run), kind="S", point=point, axis=np.zeros(3), range=None)
+            ball = replace(
+                one,
+                name=common_name([each.name for each in run]) or run[0].name,
+                kind="S",
+                point=point,
+                axis=np.zeros(3),
+                range=None,
+            )
             names = listing(each.name for each in run)
             return _replaced(given, run, ball), f"{names} meet in one point and were read as the ball joint {ball.name}"
     return None
@@ -163,16 +171,6 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
             new if each.name == first else each for each in given.joints if each.name == first or each.name not in names
         ),
     )
-
-
-def _common(run: list[MechanismJoint]) -> str:
-    """Return the common beginning of the joints' names, such as ``ankle`` of ``ankle_x``, or the first name."""
-    names = [each.name for each in run]
-    common = names[0]
-    for name in names[1:]:
-        common = common[: next((k for k, (a, b) in enumerate(zip(common, name, strict=False)) if a != b), len(common))]
-    common = common.rstrip("_-. ")
-    return common if common else names[0]
 
 
 def _almost(given: Mechanism, size: float) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ....models.mechanism import Coupling
 from ...errors import InputError
-from .description import Body, Closing, Description, LoopClosure, TreeJoint, unique_name
+from .description import Body, Closing, Description, LoopClosure, TreeJoint, common_name, unique_name
 from .extra import required
 from .frames import Frame, rotation_from_quaternion
 from .includes import with_includes
@@ -133,12 +133,16 @@ class _Reader:
             return
         if not numbers:
             self.joints.append(
-                TreeJoint(unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3))
+                TreeJoint(
+                    unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3)
+                )
             )
             self.bodies.append(Body(name, parent, place))
             return
         for j in numbers:
-            moved = name if j == numbers[-1] else unique_name(f"{name} behind {self.joint_names[j]}", set(self.body_names))
+            moved = (
+                name if j == numbers[-1] else unique_name(f"{name} behind {self.joint_names[j]}", set(self.body_names))
+            )
             kind = kinds[int(model.jnt_type[j])]
             axis = np.zeros(3) if kind == "S" else data.xaxis[j].copy()
             limits = None
@@ -186,7 +190,7 @@ class _Reader:
         if given or self.model.eq_objtype[k] != int(self.mujoco.mjtObj.mjOBJ_SITE):
             return given or f"equality_{k + 1}"
         names = [str(self.model.site(each).name) for each in (self.model.eq_obj1id[k], self.model.eq_obj2id[k])]
-        return _common_name(*names) or f"equality_{k + 1}"
+        return common_name(names) or f"equality_{k + 1}"
 
     def _closure(self, k: int, name: str) -> LoopClosure:
         """Return the joint of a connect or weld."""
@@ -216,8 +220,3 @@ class _Reader:
         if second < 0:
             return Coupling(name, (driven,))
         return Coupling(name, (driven, (self.joint_names[second], -factors[0])))
-
-
-def _common_name(first: str, second: str) -> str:
-    """Return the common beginning of two names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
-    return os.path.commonprefix([first, second]).rstrip("_-. ")

@@ -137,7 +137,9 @@ class _Mover:
         self.count = count
         places = {body.name: body.place for body in given.bodies}
         self.cosines = {
-            c.name: float((places[c.first] @ c.first_frame).rotation[:, 2] @ (places[c.second] @ c.second_frame).rotation[:, 2])
+            c.name: float(
+                (places[c.first] @ c.first_frame).rotation[:, 2] @ (places[c.second] @ c.second_frame).rotation[:, 2]
+            )
             for c in given.closures
         }
         #: Displacement of each body relative to its parent, and coordinates of hinges and slides.
@@ -152,7 +154,7 @@ class _Mover:
         return found
 
     def state(self) -> tuple[FloatArray, FloatArray]:
-        """Return equations (m,) and their derivatives (m, n) by the joints' coordinates, lengths in parts of the size."""
+        """Return equations (m,) and their derivatives (m, n) by coordinates, lengths in parts of the size."""
         moved = self.moved()
         screws = self._screws(moved)
         values: list[FloatArray] = []

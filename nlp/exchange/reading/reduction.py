@@ -80,8 +80,8 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     platform, origin = _platform(given, ends.platform)
     base = ends.base or given.root
     if base not in {body.name for body in given.bodies}:
-        names = [body.name for body in given.bodies]
-        raise InputError(f"{given.source}: --base {base}: no such body; {nearest(base, names[:_MOST_NAMES])}")
+        every = [body.name for body in given.bodies]
+        raise InputError(f"{given.source}: --base {base}: no such body; {nearest(base, every[:_MOST_NAMES])}")
     elements = elements_of(given, size_of(given))
     leader = rigid_groups(elements, bodies_of(given, elements))
     moving = [each for each in elements if leader[each.first] != leader[each.second]]
@@ -91,7 +91,7 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     edges = [(leader[each.first], leader[each.second]) for each in moving]
     kept = [moving[k] for k in between(edges, start, end)]
     _refuse_open(given, ends, kept, leader, (start, end))
-    driven, notes = _driven(given, ends, kept, moving)
+    driven, notes = _driven(given, ends, kept)
     names = _link_names(given, kept, leader, {start: base, end: ends.platform})
     joints = _oriented(kept, leader, start, driven, names)
     couplings, driven, more = _couplings(given, kept, driven)
@@ -107,7 +107,11 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     )
     bodies = {body.name: body.place for body in given.bodies}
     own = {each.name for each in kept}
-    gaps = [gap_of(each, bodies) for each in given.closures if _closes(each.name, own) or _merges(given, each.name, leader, names)]
+    gaps = [
+        gap_of(each, bodies)
+        for each in given.closures
+        if _closes(each.name, own) or _merges(given, each.name, leader, names)
+    ]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
 
 
@@ -130,7 +134,7 @@ def check_names(given: Description) -> None:
     """
     for kind, names in {
         "body": [each.name for each in given.bodies],
-        "joint": [each.name for each in (*given.joints, *given.closures)],
+        "joint": [*(each.name for each in given.joints), *(each.name for each in given.closures)],
         "frame": list(given.frames),
         "robot": [given.name],
     }.items():
@@ -162,10 +166,12 @@ def _refuse_open(
     links = {leader[name] for each in kept for name in (each.first, each.second)} | set(nodes)
     if len(kept) < len(links):
         fault = "is at the end of an open chain"
-        raise InputError(f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more")
+        raise InputError(
+            f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more"
+        )
 
 
-def _driven(given: Description, ends: Ends, kept: list[Element], moving: list[Element]) -> tuple[set[str], list[str]]:
+def _driven(given: Description, ends: Ends, kept: list[Element]) -> tuple[set[str], list[str]]:
     """Return the actuated joints of the mechanism, and notes about actuators elsewhere."""
     own = [each.name for each in kept]
     if ends.actuated:
@@ -177,7 +183,9 @@ def _driven(given: Description, ends: Ends, kept: list[Element], moving: list[El
     wanted = set(ends.actuated) or set(given.driven)
     for each in kept:
         if each.name in wanted and each.kind == "S":
-            raise InputError(f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one")
+            raise InputError(
+                f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one"
+            )
     outside = sorted(wanted - set(own) - _leading(given, own))
     notes = [f"actuators outside the mechanism were left out: {listing(outside[:_MOST_NAMES])}"] if outside else []
     driven = wanted & set(own)
@@ -216,13 +224,17 @@ def _couplings(
         within, without = sorted(own & set(names)), sorted(set(names) - own)
         if set(without) & given.driven:
             driven |= set(within)
-            notes.append(f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself")
+            notes.append(
+                f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself"
+            )
         else:
             notes.append(f"the coupling of {listing(within)} with {listing(without)} was left out")
     return tuple(inside), driven, notes
 
 
-def _link_names(given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]) -> dict[str, str]:
+def _link_names(
+    given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]
+) -> dict[str, str]:
     """Return the name of each rigid link by its first body, in the order of the bodies."""
     order = {name: k for k, name in enumerate(bodies_of(given, kept))}
     keys = {leader[name] for each in kept for name in (each.first, each.second)} | set(given_names)

@@ -1,7 +1,8 @@
 """The three ways in which URDF files state closed loops.
 
 - a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the driven joints
-  ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type`` (github.com/Gepetto/example-parallel-robots),
+  ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
+  (github.com/Gepetto/example-parallel-robots),
 - frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair ``closing_NAME_1_z`` for a hinge
   (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
 - elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the same for ``child``, as
@@ -19,7 +20,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ...errors import InputError, listing
-from .description import Closing, LoopClosure, axis_frame, unique_name
+from .description import Closing, LoopClosure, axis_frame, common_name, unique_name
 from .extra import required
 from .frames import Frame
 from .urdfelements import axis_of, link_of, name_of, origin_of
@@ -124,15 +125,11 @@ def closures_of_pairs(loops: LoopFile, frames: Mapping[str, tuple[str, Frame]]) 
             if name not in frames:
                 raise InputError(f'{loops.path}: closed_loop = "{name[:60]}": is no link or joint of the URDF')
         (one, one_frame), (other, other_frame) = frames[first], frames[second]
-        name = unique_name(_pair_name(first, second), {each.name for each in found} | set(frames))
+        name = unique_name(
+            common_name([first, second]) or f"{first} {second}", {each.name for each in found} | set(frames)
+        )
         found.append(LoopClosure(name, closing, one, other, one_frame, other_frame))
     return found
-
-
-def _pair_name(first: str, second: str) -> str:
-    """Return the common part of two names such as ``closedloop1_A`` and ``closedloop1_B``."""
-    common = next((k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second)))
-    return first[:common].rstrip("_-. ") or f"{first} {second}"
 
 
 def closures_of_frames(
@@ -152,16 +149,16 @@ def closures_of_frames(
         if match is None or f"{match[1]}_2" not in frames:
             continue
         other, other_frame = frames[f"{match[1]}_2"]
-        closing = Closing.BALL
+        closing, first_frame, second_frame = Closing.BALL, one_frame, other_frame
         if {f"{name}_z", f"{match[1]}_2_z"} <= set(frames):
             # The second pair lies on the hinge's axis.
             closing = Closing.HINGE
-            one_frame = _towards(one_frame, one, frames[f"{name}_z"], places)
-            other_frame = _towards(other_frame, other, frames[f"{match[1]}_2_z"], places)
+            first_frame = _towards(one_frame, one, frames[f"{name}_z"], places)
+            second_frame = _towards(other_frame, other, frames[f"{match[1]}_2_z"], places)
         else:
             notes.append(f"{match[1]} is taken for a ball joint: its two frames do not say its kind")
         chosen = unique_name(match[1], {*taken, *(each.name for each in found)})
-        found.append(LoopClosure(chosen, closing, one, other, one_frame, other_frame))
+        found.append(LoopClosure(chosen, closing, one, other, first_frame, second_frame))
     return found, notes
 
 
@@ -195,5 +192,7 @@ def closures_of_constraints(root: Element, links: set[str], taken: set[str], sou
         closing = _CONSTRAINTS[kind]
         if closing is Closing.WELD:
             frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
-        found.append(LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames))
+        found.append(
+            LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames)
+        )
     return found

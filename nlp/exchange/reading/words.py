@@ -30,11 +30,10 @@ def summary_lines(found: Imported) -> Iterator[tuple[str, str]]:
     if mechanism.couplings:
         yield "couplings", f"{len(mechanism.couplings)}: {listing(each.name for each in mechanism.couplings)}"
     wrenches = wrenches_of(mechanism, found.size)
-    driven_names = set(driven)
     for number, member in enumerate(wrenches.members, 1):
         own = {*member.joints, *member.actuators}
-        joints = [joint for joint in mechanism.joints if joint.name in own]
-        shown = listing(f"{joint.name} {joint.kind}{'*' * (joint.name in driven_names)}" for joint in joints[:_MOST_NAMES])
+        path = [joint for joint in mechanism.joints if joint.name in own][:_MOST_NAMES]
+        shown = listing(f"{joint.name} {joint.kind}{'*' * joint.actuated}" for joint in path)
         yield f"member {number}", f"dim W {member.wrenches}, dim C {member.constraints}: {shown}"
     ranks = wrenches.ranks
     yield "freedoms", f"{ranks.freedoms} with free actuators, {ranks.locked} with locked ones, as the model stands"
@@ -51,7 +50,8 @@ def _loops(found: Imported) -> str:
         return "closed by the description's own joints"
     worst = max(found.gaps, key=lambda gap: gap_share(gap, found.size))
     share = gap_share(worst, found.size)
-    return f"{len(found.gaps)} closing joints, open by {_gap(worst)} at most ({share:.2g} of the size; {OPEN:g} is allowed)"
+    most = f"{share:.2g} of the size, where {OPEN:g} is allowed"
+    return f"{len(found.gaps)} closing joints, which the file leaves open by up to {_gap(worst)} ({most})"
 
 
 def _gap(gap: Gap) -> str:

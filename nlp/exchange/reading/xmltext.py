@@ -53,7 +53,7 @@ def read_xml(path: Path) -> Element:
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
-        parser.Parse(content, True)  # noqa: FBT003 - positional only
+        parser.Parse(content, True)
         return builder.close()
     except _RefusedError as refused:
         raise InputError(f"{path}: cannot be read: {refused}") from None
