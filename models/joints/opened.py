@@ -122,7 +122,7 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     if cut.far is not None:
         _join_rod(path, base, platform, frame)
     elif cut.type:
-        _join_joint(path, base, platform, frame)
+        join_joint(path, base, platform, frame)
     else:
         turn = base.rotation.T @ platform.rotation
         place = joints[min(cut.first, count - 1)].point
@@ -132,8 +132,8 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     return path
 
 
-def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
-    """Add screws and equations of a joint at the cut."""
+def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
+    """Add screws and equations of a joint at the cut, between displacements of its two sides."""
     joints, j = path.joints, path.cut.joint
     joint = joints[j]
     ends = base.point(joint.point), platform.point(joint.point)
@@ -142,7 +142,7 @@ def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFra
     path.points[j] = ends[0] if shorter_base else ends[1]
     path.behind[j] = platform
     if joint.type == "S":
-        path.screws[j] = _rotations_about(path.points[j])
+        path.screws[j] = rotations_about(path.points[j])
         return
     if joint.type == "U":
         first, second = joint.axes
@@ -152,7 +152,7 @@ def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFra
         return
     (axis,) = joint.axes
     path.screws[j] = [axis.screw(SX(0), base)]
-    across, turned = _normals(axis.axis, frame), platform.rotation @ axis.axis
+    across, turned = normals_of(axis.axis, frame), platform.rotation @ axis.axis
     path.equations += [ca.dot(base.rotation @ normal, turned) for normal in across]
     path.checks.append(1 - ca.dot(base.rotation @ axis.axis, turned))
 
@@ -168,9 +168,9 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     path.points[far] = sides[0].point(joints[far].point)
     path.points[j] = sides[1].point(joints[j].point)
     path.rod = path.points[j] - path.points[far]
-    path.screws[j] = _rotations_about(path.points[j])
+    path.screws[j] = rotations_about(path.points[j])
     if joints[far].type == "S":
-        path.screws[far] = _rotations_about(path.points[far])
+        path.screws[far] = rotations_about(path.points[far])
     square = ca.sumsqr(home)
     is_straight = True
     if slide is not None:
@@ -238,13 +238,13 @@ def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
     return -1.0 if along < 0 else 1.0
 
 
-def _rotations_about(point: SX) -> list[SX]:
+def rotations_about(point: SX) -> list[SX]:
     """Return three rotations (6, 1) about a point."""
     directions = (SX(np.eye(3)[k].tolist()) for k in range(3))
     return [ca.vertcat(each, ca.cross(point, each)) for each in directions]
 
 
-def _normals(axis: SX, frame: PathFrame) -> list[SX]:
+def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
     """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
     first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))

@@ -242,11 +242,13 @@ def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, floa
         return replace(each, position=moved(there, each.position), rotation=there[:3, :3] @ each.rotation)
 
     def joint(each: MechanismJoint) -> MechanismJoint:
-        there = placed.displacements[each.inner]
+        # A slide or screw carries its point on the outer link, which is the platform's side of limbs.
+        there = placed.displacements[each.outer]
         limits = each.range
         if limits is not None:
             limits = limits[0] - coordinates.get(each.name, 0.0), limits[1] - coordinates.get(each.name, 0.0)
-        point, axis = moved(there, each.point), there[:3, :3] @ each.axis
+        outer = each.point if each.outer_point is None else each.outer_point
+        point, axis = moved(there, outer), there[:3, :3] @ each.axis
         return replace(each, point=point, axis=axis, range=limits, outer_point=None)
 
     return replace(

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..joints.chain import HomeRobot, Joint, home_robot
-from ..joints.words import read_words
+from ..joints.chain import HomeGraph, HomeRobot, Joint
+from ..joints.graphwords import read_robot
+from ..joints.linkgraph import home_of
 from ..parts import Dimension
-from .graph import ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
+from .graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
 _APART = 0.25
@@ -41,8 +42,14 @@ def mechanism_of(tables: Mapping[str, object], dimensions: Mapping[str, float] |
         RobotError: the tables have a fault.
         MechanismError: a dimension is unknown, or a place has no finite value.
     """
-    robot = home_robot(read_words(tables))
+    return mechanism_at_home(home_of(read_robot(tables)), dimensions)
+
+
+def mechanism_at_home(robot: HomeRobot, dimensions: Mapping[str, float] | None = None) -> Mechanism:
+    """Return the mechanism of a robot at home; the arguments and errors are those of :func:`mechanism_of`."""
     values = _values(robot, dimensions or {})
+    if robot.graph is not None:
+        return _mechanism_of_graph(robot, robot.graph, values)
     parts = Parts(["base", "platform"], values)
     for limb in robot.limbs:
         known: dict[int, str] = {}
@@ -60,6 +67,25 @@ def mechanism_of(tables: Mapping[str, object], dimensions: Mapping[str, float] |
                     parts.add(label, joint, at, target)
                 at = target
     return parts.mechanism(robot.words.name, values(robot.home))
+
+
+def _mechanism_of_graph(robot: HomeRobot, graph: HomeGraph, values: Values) -> Mechanism:
+    """Return the mechanism of a robot that is given by links and joints, which keep their names."""
+    parts = Parts(list(graph.links), values)
+    for each in graph.joints:
+        if each.joint is None:
+            parts.joints.append(MechanismJoint(each.name, "weld", each.inner, each.outer, np.zeros(3)))
+        else:
+            parts.add(each.name, each.joint, each.inner, each.outer)
+    couplings = tuple(
+        Coupling(
+            f"coupling {number + 1}",
+            tuple((graph.joints[k].name, float(values(factor)[0])) for k, factor in coupling),
+        )
+        for number, coupling in enumerate(graph.couplings)
+    )
+    found = parts.mechanism(robot.words.name, values(robot.home), (graph.base, graph.platform))
+    return replace(found, couplings=couplings)
 
 
 def _values(robot: HomeRobot, dimensions: Mapping[str, float]) -> Values:

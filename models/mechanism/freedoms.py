@@ -67,7 +67,7 @@ class Freedoms:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.size = mechanism, size_of(mechanism)
         joints = mechanism.joints
-        self.middle = np.mean([joint.point for joint in joints], axis=0)
+        self.middle = np.mean([joint.point for joint in joints if joint.kind != "weld"], axis=0)
         still = np.eye(3)
         self._screws = [self.scaled(joint_screws(joint, still, joint.point)) for joint in joints]
         self._units = [self.size if joint.kind == "P" else 1.0 for joint in joints]

@@ -39,8 +39,8 @@ def rotation_vector(matrix: FloatArray) -> FloatArray:
 
 def size_of(mechanism: Mechanism) -> float:
     """Return a length of the order of a mechanism's: the largest extent of its joints; 1 where all are at one point."""
-    points = np.array([joint.point for joint in mechanism.joints]).reshape(-1, 3)
-    return float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
+    points = np.array([joint.point for joint in mechanism.joints if joint.kind != "weld"]).reshape(-1, 3)
+    return float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0 if len(points) else 1.0
 
 
 def about(rotation: FloatArray, point: FloatArray, shift: FloatArray) -> FloatArray:

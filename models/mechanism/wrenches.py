@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..basis import basis_of_member
 from ..wrench import WrenchKind
-from .centre import centre_of
+from .centre import centre_of, centre_rule
 from .checks import check_mechanism
 from .freedoms import RANK_TOLERANCE, AllowedTwists, Freedoms, rank_of
 from .graph import Mechanism
@@ -193,7 +193,7 @@ def _reciprocal(freedoms: Freedoms, twists: FloatArray) -> FloatArray:
 
 def _member(mechanism: Mechanism, freedoms: Freedoms, graph: MemberGraph, length: float) -> MemberWrenches:
     """Return the wrenches of a member."""
-    centre = centre_of(mechanism, graph)
+    centre = centre_of(mechanism, centre_rule(mechanism, graph))
     locked = freedoms.allowed(graph.joints, graph.passive)
     free = freedoms.allowed(graph.joints, graph.joints)
     scaled = scaled_twists(locked.twists, centre, length)
