@@ -7,7 +7,8 @@ import tomllib
 import numpy as np
 
 from ....models.arrays import FloatArray
-from ....models.mechanism import Mechanism, mechanism_of, wrenches_of
+from ....models.joints import RobotError
+from ....models.mechanism import Mechanism, MechanismError, mechanism_of, wrenches_of
 from ...case.robotfile.reader import model_of_definition
 from ...case.robotfile.schema import check_form
 from ...errors import CaseError, InputError
@@ -22,7 +23,8 @@ _MOST_BUILT = 40
 def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SAME_ROBOT) -> float:
     """Read the text of a robot file, and return the difference of its work rates from those of a mechanism.
 
-    The difference is that of ``J'J``, from which F of every motion follows, in parts of its largest entry.
+    The difference is that of ``J'J``, from which F of every motion follows, and of ``Q'Q``, with ``Q`` the actuators'
+    rates for six motions, in parts of their largest entries.
 
     Args:
         text: of the robot file.
@@ -39,10 +41,10 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
         if len(mechanism.joints) <= _MOST_BUILT:
             model_of_definition(tables, "robot file")
         again = mechanism_of(tables)
-    except CaseError as error:
+    except (CaseError, RobotError, MechanismError) as error:
         raise InputError(f"the robot file would not be read: {error}") from None
-    found, expected = (_work_rates(each, size) for each in (again, mechanism))
-    difference = float(np.abs(found - expected).max() / np.abs(expected).max())
+    pairs = zip(_measures(again, size), _measures(mechanism, size), strict=True)
+    difference = max(float(np.abs(found - expected).max() / np.abs(expected).max()) for found, expected in pairs)
     if not difference <= allowed:
         fault = (
             f"the robot file would state another robot: work rates differ by {difference:.2g}, {allowed:.2g} is allowed"
@@ -51,10 +53,18 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
     return difference
 
 
-def _work_rates(mechanism: Mechanism, size: float) -> FloatArray:
-    """Return ``J'J`` (6, 6) with twists about the platform's origin, in which its entries are of one order."""
+def _measures(mechanism: Mechanism, size: float) -> tuple[FloatArray, FloatArray]:
+    """Return ``J'J`` and ``Q'Q`` (6, 6), with twists about the platform's origin and lengths in parts of the size.
+
+    Neither depends on the order of members and actuators. An actuator that cannot drive the platform has no rate.
+    """
     (platform,) = (link for link in mechanism.links if link.name == mechanism.platform)
-    J = wrenches_of(mechanism, size).jacobian
-    forces, moments = J[:, :3], J[:, 3:] - np.cross(platform.position, J[:, :3])
-    rows = np.hstack([forces, moments / size])
-    return np.asarray(rows.T @ rows)
+    wrenches = wrenches_of(mechanism, size)
+    forces, moments = wrenches.jacobian[:, :3], wrenches.jacobian[:, 3:]
+    rows = np.hstack([forces, (moments - np.cross(platform.position, forces)) / size])
+    rates = []
+    for w, v in ((each[:3] / size, each[3:]) for each in np.eye(6)):
+        found = wrenches.rates(np.concatenate([w, v + np.cross(platform.position, w)]))
+        rates.append([value if np.isfinite(value) else 0.0 for value in found.values()])
+    Q = np.array(rates)
+    return np.asarray(rows.T @ rows), np.asarray(Q @ Q.T)

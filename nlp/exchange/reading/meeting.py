@@ -23,6 +23,8 @@ ALMOST = 1e-3
 #: Smallest volume that three unit axes span as a ball joint. Below it they are nearly in one plane, and the stated
 #: configuration is the singular one of a wrist.
 _FLAT = 1e-3
+#: Most names that a note lists.
+_MOST_NAMES = 12
 
 
 class Met(NamedTuple):
@@ -46,14 +48,22 @@ def with_meeting_joints(given: Mechanism, size: float) -> Met:
         given: the mechanism.
         size: of the robot.
     """
-    notes: list[str] = []
+    hinges: list[str] = []
     while (joined := _same_axis(given, size)) is not None:
-        given, note = joined
-        notes.append(note)
+        given, words = joined
+        hinges.append(words)
+    balls: list[str] = []
     while (joined := _ball(given, size)) is not None:
-        given, note = joined
-        notes.append(note)
+        given, words = joined
+        balls.append(words)
+    notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
+    notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
     return Met(given, (*notes, *_almost(given, size)))
+
+
+def _some(words: list[str]) -> str:
+    """Return the first of many words as a list."""
+    return listing(words[:_MOST_NAMES]) + (f" and {len(words) - _MOST_NAMES} more" if len(words) > _MOST_NAMES else "")
 
 
 def chains_of(given: Mechanism) -> list[list[MechanismJoint]]:
@@ -123,7 +133,7 @@ def _same_axis(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
         distance, sine = axes_gap(one, other)
         if sine < SAME_POINT and distance < SAME_POINT * size:
             merged = _replaced(given, [one, other], replace(one, range=None))
-            return merged, f"{one.name} and {other.name} turn about one axis and were read as one hinge"
+            return merged, f"{one.name} with {other.name}"
     return None
 
 
@@ -144,8 +154,7 @@ def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
                 axis=np.zeros(3),
                 range=None,
             )
-            names = listing(each.name for each in run)
-            return _replaced(given, run, ball), f"{names} meet in one point and were read as the ball joint {ball.name}"
+            return _replaced(given, run, ball), ball.name
     return None
 
 
