@@ -44,7 +44,7 @@ def read_urdf(root: Element, path: Path, loops: Path | None = None) -> Descripti
     Raises:
         InputError: the file states no tree of links, or a value in it is not allowed.
     """
-    if any(element.tag.startswith("{") and "xacro" in element.tag for element in root.iter()):
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
         raise InputError(f"{path}: has elements of xacro: write it out as plain URDF first")
     if loops is None:
         loops = next((each for each in (path.with_suffix(".yaml"), path.with_suffix(".yml")) if each.is_file()), None)
