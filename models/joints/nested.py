@@ -3,7 +3,8 @@
 With the rates ``q`` of a member's passive joints along a spanning tree from the base, its loops demand ``L q = 0``, and
 the platform's twist is ``S q``. The member allows the twists ``S N`` with the projector ``N`` on the null space of
 ``L``, and the twist ``s - S L^+ l`` for a unit rate of an actuator with the columns ``s`` and ``l``. Projector and
-pseudo-inverse follow from the rank of ``L`` for almost all configurations, without a choice of columns.
+pseudo-inverse follow from the ranks of the loops for almost all configurations, without a choice of columns. Loops are
+taken one after the other: a recursion for all at once would lose half of the digits.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..mechanism.centre import CentreRule, centre_rule
-from ..mechanism.definition import mechanism_at_home
 from ..mechanism.members import robot_graph
 from ..mechanism.topology import spanning_tree
-from ..member import Member, resisted_parts
+from ..member import Member
 from .chain import HomeRobot
 from .generic import RANK_TOLERANCE
 from .loops import ClosedPoint
+from .mechanisms import mechanism_at_home
 from .motion import AxisKind
 from .network import OpenNetwork
 from .opened import PathFrame
@@ -52,20 +53,20 @@ class Motions(NamedTuple):
     """Motions of a member with some of its joints free.
 
     Attributes:
-        loops: (m, n) ``L``, in angles and parts of the robot's size.
+        loops: (m, n) each, the rows of ``L`` for each loop or coupling, in angles and parts of the robot's size.
         platform: (6, n) ``S``, the platform's twists for the same rates.
         columns: index of the joint of each column.
     """
 
-    loops: SX
+    loops: tuple[SX, ...]
     platform: SX
     columns: tuple[int, ...]
 
 
 class MotionRanks(NamedTuple):
-    """Ranks of the loops, and of the platform's twists in their null space, for almost all configurations."""
+    """Ranks of each loop among the rates that close those before it, and of the twists that all leave the platform."""
 
-    loops: int
+    loops: tuple[int, ...]
     twists: int
 
 
@@ -112,14 +113,14 @@ def motions_of(network: OpenNetwork, frame: PathFrame, joints: Collection[int], 
     for i, parent, child in tree.branches:
         sign = 1 if edges[i][0] == parent else -1
         twists[child] = twists[parent] + sign * block(own[i])
-    rows = [_coupling_rows(network, frame, own, start, count)]
+    rows = _coupling_rows(network, frame, own, start, count)
     for i in tree.chords:
         relative = twists[edges[i][1]] - twists[edges[i][0]] - block(own[i])
         place = network.points[own[i]]
         velocities = [relative[3:, k] + ca.cross(relative[:3, k], place) for k in range(count)]
         rows.append(ca.vertcat(relative[:3, :], ca.horzcat(SX(3, 0), *velocities) / frame.size))
-    loops = ca.simplify(ca.vertcat(*rows))
-    return Motions(ca.sparsify(loops), ca.densify(twists.get(network.platform, SX(6, count))), columns)
+    loops = tuple(ca.sparsify(row) for row in rows)
+    return Motions(loops, ca.densify(twists.get(network.platform, SX(6, count))), columns)
 
 
 def _is_slide(network: OpenNetwork, k: int) -> bool:
@@ -127,11 +128,13 @@ def _is_slide(network: OpenNetwork, k: int) -> bool:
     return network.joint(k).axes[0].kind is AxisKind.TRANSLATION
 
 
-def _coupling_rows(network: OpenNetwork, frame: PathFrame, own: Sequence[int], start: dict[int, int], count: int) -> SX:
-    """Return the equations (c, n) of the couplings all of whose joints are among some."""
-    rows = [SX(0, count)]
+def _coupling_rows(
+    network: OpenNetwork, frame: PathFrame, own: Sequence[int], start: dict[int, int], count: int
+) -> list[SX]:
+    """Return the equation (1, n) of each coupling all of whose joints are among some."""
+    rows = []
     for coupling in network.graph.couplings:
-        if any(k in start for k, _ in coupling) and all(k in own for k, _ in coupling):
+        if all(k in own for k, _ in coupling):
             row = SX(1, count)
             first, scale = coupling[0]
             scale = scale * frame.size if _is_slide(network, first) else scale
@@ -139,7 +142,7 @@ def _coupling_rows(network: OpenNetwork, frame: PathFrame, own: Sequence[int], s
                 if k in start:
                     row[0, start[k]] = factor * (frame.size if _is_slide(network, k) else 1) / scale
             rows.append(row)
-    return ca.vertcat(*rows)
+    return rows
 
 
 def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX) -> MotionRanks:
@@ -151,51 +154,72 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
         points: closed configurations.
         size: (1, 1) the robot's size.
     """
-    function = ca.Function("nested", list(symbols), [ca.densify(motions.loops), motions.platform, size])
+    outputs = [motions.platform, size, *[ca.densify(loop) for loop in motions.loops]]
+    function = ca.Function("nested", list(symbols), outputs)
     found: Counter[MotionRanks] = Counter()
     for point in points:
         values = function(point.dimensions, point.unknowns, point.rotation, point.position)
-        loops, platform, length = (np.asarray(each.full(), dtype=np.float64) for each in values)
-        if not (np.isfinite(loops).all() and np.isfinite(platform).all()):
+        platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in values)
+        if not all(np.isfinite(each).all() for each in (platform, *loops)):
             continue
         about = np.vstack([platform[:3], (platform[3:] + np.cross(platform[:3].T, point.position).T) / length])
-        rank = 0
-        null = np.eye(platform.shape[1])
-        if loops.size:
-            _, singular, right = np.linalg.svd(loops)
-            rank = _rank(singular)
-            null = right[rank:].T
+        ranks, null = [], np.eye(platform.shape[1])
+        for loop in loops:
+            _, singular, right = np.linalg.svd(loop @ null)
+            ranks.append(_rank(singular))
+            null = null @ right[ranks[-1] :].T
         twists = _rank(np.linalg.svd(about @ null)[1]) if null.size else 0
-        found[MotionRanks(rank, twists)] += 1
+        found[MotionRanks(tuple(ranks), twists)] += 1
     return max(found, key=lambda ranks: (found[ranks], ranks))
 
 
 def _rank(values: FloatArray) -> int:
-    return int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
+    """Return the rank of screws of order 1: a loop that others close already leaves rounding errors alone."""
+    return int(np.count_nonzero(values > RANK_TOLERANCE))
 
 
-def allowed_screws(motions: Motions, ranks: MotionRanks) -> SX:
-    """Return the twists (6, n) of the platform that free joints allow, as many as there are rates."""
-    if ranks.loops == 0:
-        return motions.platform
-    count = motions.platform.shape[1]
-    return motions.platform @ resisted_parts(ca.densify(motions.loops).T, ranks.loops, SX.eye(count))
+@dataclass(frozen=True, eq=False)
+class NullSpace:
+    """The null space of a member's loops, loop after loop: a loop with the rates that all before it leave free.
 
-
-def driven_screw(motions: Motions, ranks: MotionRanks, all_motions: Motions, joint: int) -> SX:
-    """Return the twist (6, 1) of the platform for a unit rate of an actuated joint, up to those that the member allows.
-
-    Args:
-        motions: of the passive joints.
-        ranks: of these.
-        all_motions: of the same joints with actuated ones free.
-        joint: index of the actuated joint.
+    Attributes:
+        projector: (n, n) on the rates that close all loops.
+        inverses: pseudo-inverse (n, m) of each loop's equations, among the rates that close those before it.
+        motions: loops and platform's twists.
     """
-    k = all_motions.columns.index(joint)
-    screw, loops = all_motions.platform[:, k], ca.densify(all_motions.loops[:, k])
-    if ranks.loops == 0 or loops.is_zero():
-        return screw
-    return screw - motions.platform @ pseudo_inverse(ca.densify(motions.loops), ranks.loops) @ loops
+
+    projector: SX
+    inverses: tuple[SX, ...]
+    motions: Motions
+
+    @property
+    def screws(self) -> SX:
+        """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
+        return self.motions.platform @ self.projector
+
+    def driven_screw(self, screw: SX, loops: Sequence[SX]) -> SX:
+        """Return the twist (6, 1) of the platform for a unit rate of an actuated joint, up to those that are allowed.
+
+        Args:
+            screw: (6, 1) of the joint in the platform's twist.
+            loops: (m, 1) of the joint in each loop.
+        """
+        rates = SX(self.projector.shape[0], 1)
+        for own, inverse, loop in zip(loops, self.inverses, self.motions.loops, strict=True):
+            rates -= inverse @ (own + loop @ rates)
+        return screw + self.motions.platform @ rates
+
+
+def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
+    """Return the null space of a member's loops from their ranks."""
+    projector = SX.eye(motions.platform.shape[1])
+    inverses = []
+    for loop, rank in zip(motions.loops, ranks.loops, strict=True):
+        left = ca.densify(loop @ projector)
+        inverse = pseudo_inverse(left, rank)
+        inverses.append(inverse)
+        projector -= inverse @ left
+    return NullSpace(projector, tuple(inverses), motions)
 
 
 def pseudo_inverse(matrix: SX, rank: int) -> SX:
@@ -203,7 +227,10 @@ def pseudo_inverse(matrix: SX, rank: int) -> SX:
 
     It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
     Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
+    One step ``X (2 I - A X)`` of Newton's method squares its relative error.
     """
+    if rank == 0:
+        return SX(matrix.shape[1], matrix.shape[0])
     gram = matrix @ matrix.T
     scale = ca.trace(gram)  # keeps the coefficients of order 1
     gram = gram / scale
@@ -214,7 +241,8 @@ def pseudo_inverse(matrix: SX, rank: int) -> SX:
         product = gram @ power
         coefficient = -ca.trace(product) / k
         power = product + coefficient * SX.eye(size)
-    return -matrix.T @ before / (coefficient * scale)
+    found = -matrix.T @ before / (coefficient * scale)
+    return 2 * found - found @ (matrix @ found)
 
 
 def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:

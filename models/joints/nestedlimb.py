@@ -15,7 +15,7 @@ from .angles import rotation_angle
 from .chain import HomeRobot, Joint
 from .loops import ClosedPoint
 from .motion import AxisKind
-from .nested import NestedMember, allowed_screws, driven_screw, measured_ranks, member_of, motions_of, nested_members
+from .nested import NestedMember, measured_ranks, member_of, motions_of, nested_members, null_space
 from .network import OpenNetwork, open_network
 from .opened import PathFrame, Variables
 
@@ -109,13 +109,16 @@ def resisting(
         ranks = measured_ranks(locked, symbols, points, robot.size)
         free = motions_of(network, frame, each.joints, each.joints)
         free_ranks = measured_ranks(free, symbols, points, robot.size)
-        allowed = allowed_screws(locked, ranks)
+        null = null_space(locked, ranks)
+        allowed = null.screws
         for k in each.joints:
             if network.joint(k).actuated and k not in screws:
-                screws[k] = _plain(network, k, driven_screw(locked, ranks, free, k), robot)
+                column = free.columns.index(k)
+                own = [loop[:, column] for loop in free.loops]
+                screws[k] = _plain(network, k, null.driven_screw(free.platform[:, column], own), robot)
         if ranks.twists < 6:
             found.members.append(member_of(limb.name, network, each, allowed, ranks.twists))
-        every = allowed_screws(free, free_ranks)
+        every = null_space(free, free_ranks).screws
         found.screws.append(JointScrews(limb.name, allowed, every, ranks.twists, free_ranks.twists))
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     driven = [k for k in network.joints if network.joint(k).actuated and k in screws]

@@ -78,9 +78,7 @@ def network_drawing(name: str, network: OpenNetwork, *, carries: bool) -> Networ
         )
     for own in ends.values():
         is_rod = len(own) == 2 and all(kind in _ROD_ENDS for _, kind in own)
-        pairs = (
-            list(zip(own, [*own[1:], own[0]], strict=True)) if len(own) > 2 else list(pairwise(own))
-        )
+        pairs = list(zip(own, [*own[1:], own[0]], strict=True)) if len(own) > 2 else list(pairwise(own))
         found.links.extend(
             Link(one[0], other[0], Body.LIMB, limb, LinkKind.ROD if is_rod else LinkKind.BAR) for one, other in pairs
         )

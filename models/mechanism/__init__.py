@@ -5,7 +5,8 @@ The modules in order, each of which imports only those before it: ``graph`` (lin
 screws at any coordinates), ``closing`` (closed loops at a pose or at positions of the actuators), ``decomposition``
 (limbs and branches in the graph), ``limbs`` (tables of a robot file), ``members`` (parts that resist the platform),
 ``freedoms`` (twists that joints allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates and ranks),
-``singularities`` (ranks against generic ones), ``definition`` (mechanisms from robot files).
+``singularities`` (ranks against generic ones). Mechanisms from robot files are made where these are read, in
+:mod:`screwsynth.models.joints.mechanisms`.
 """
 
 from importlib import import_module
@@ -19,7 +20,7 @@ from .singularities import MechanismSingularity, SingularityType, generic_ranks,
 from .wrenches import MemberWrenches, RobotRanks, RobotWrenches, wrenches_of
 
 if TYPE_CHECKING:
-    from .definition import mechanism_of
+    from ..joints.mechanisms import mechanism_of
 
 __all__ = [
     "ClosedMechanism",
@@ -46,8 +47,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Return ``mechanism_of``, whose module needs symbols, when it is first used."""
+    """Return ``mechanism_of``, which reads robot files and needs symbols, when it is first used."""
     if name != "mechanism_of":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = import_module(".definition", __name__).mechanism_of
+    found: object = import_module("..joints.mechanisms", __name__).mechanism_of
     return found

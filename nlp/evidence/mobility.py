@@ -23,6 +23,8 @@ from .state import RobotState
 _FEASIBLE = 1e-12
 #: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
 _DEPENDENT = 1e-7
+#: Screws below this part of the largest are rounding errors of projected ones, and must not be scaled up.
+_NEGLIGIBLE = 1e-9
 
 
 class SingularityKind(enum.Enum):
@@ -146,5 +148,6 @@ def _rank(screws: FloatArray, centre: FloatArray) -> int:
     reach = float(np.linalg.norm(velocities[:, turning], axis=0).max(initial=0.0)) or 1.0
     scaled = np.vstack([screws[:3], velocities / reach])
     lengths = np.linalg.norm(scaled, axis=0)
-    values = np.linalg.svd(scaled[:, lengths > 0] / lengths[lengths > 0], compute_uv=False)
+    moving = lengths > _NEGLIGIBLE * lengths.max(initial=0.0)
+    values = np.linalg.svd(scaled[:, moving] / lengths[moving], compute_uv=False)
     return int(np.count_nonzero(values > _DEPENDENT * values.max(initial=1.0)))

@@ -15,11 +15,11 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..joints.chain import HomeGraph, HomeRobot, Joint
-from ..joints.graphwords import read_robot
-from ..joints.linkgraph import home_of
+from ..mechanism.graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
 from ..parts import Dimension
-from .graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
+from .chain import HomeGraph, HomeRobot, Joint
+from .graphwords import read_robot
+from .linkgraph import home_of
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
 _APART = 0.25
