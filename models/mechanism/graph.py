@@ -59,7 +59,8 @@ class MechanismJoint:
         axis: (3,) unit direction of its axis in the world; zero for ``S`` and ``weld``.
         pitch: way per radian of an ``H``.
         actuated: whether an actuator drives it.
-        range: smallest and largest coordinate, counted from the stated configuration, radians or length; None for no limit.
+        range: smallest and largest coordinate, counted from the stated configuration, radians or length; None for no
+            limit.
         outer_point: (3,) the joint's point as the outer link has it, where the description leaves the loop open; the
             same as ``point`` in a closed one.
     """

@@ -1,12 +1,12 @@
 """Chains of elementary joints from the base to the platform, in numbers, at the configuration in which they are stated.
 
-A universal joint is two hinges, a cylindrical joint a hinge and a slide, and a parallelogram two hinges of which the
-second turns back by the angle of the first.
+A universal joint is two hinges, a cylindrical joint a hinge and a slide. A parallelogram is the two hinges of a rod in
+its middle, of which the second turns back by the angle of the first; its two rods are at equal distances from that one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,7 @@ class Step:
         actuator: name of that actuator; empty for none.
         coordinate: its coordinate from home, where it is known: radians or length.
         follows: whether it turns back by the angle of the step before it, as a parallelogram does.
+        side: (3,) from the middle of a parallelogram to one of its two rods, length; None for other joints.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Step:
     actuator: str = ""
     coordinate: float | None = None
     follows: bool = False
+    side: FloatArray | None = None
 
 
 class Chain(NamedTuple):
@@ -126,3 +128,19 @@ def step_motion(step: Step, value: float | FloatArray) -> Moved:
         return Moved(np.eye(3), value * step.axis)
     R = rotation_by(value * step.axis)
     return Moved(R, step.point - R @ step.point + step.pitch * value * step.axis)
+
+
+def with_unique_names(chains: Chains) -> Chains:
+    """Return chains in which no two joints have one name: a name that is taken gets an underscore."""
+    taken: set[str] = set()
+    renamed: dict[int, Step] = {}
+    for chain in chains.chains:
+        for step in chain.steps:
+            if id(step) not in renamed:
+                name = step.name
+                while name in taken:
+                    name += "_"
+                taken.add(name)
+                renamed[id(step)] = replace(step, name=name)
+    found = (chain._replace(steps=tuple(renamed[id(step)] for step in chain.steps)) for chain in chains.chains)
+    return chains._replace(chains=tuple(found))

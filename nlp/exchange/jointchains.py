@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -20,6 +19,8 @@ from .chains import Chain, Chains, Step
 
 #: Names of the elementary joints of a joint that has several, and the suffix of each.
 _PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
+#: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
+_APART = 0.1
 
 
 def is_given_by_joints(model: Model) -> bool:
@@ -93,14 +94,17 @@ def _label(limb: Limb, index: int, j: int) -> str:
 
 
 def _notes(chains: Sequence[Chain]) -> tuple[str, ...]:
-    """Return notes on parallelograms, which are ideal."""
+    """Return notes on parallelograms."""
     steps = {step.name: step for chain in chains for step in chain.steps}.values()
     if not any(step.follows for step in steps):
         return ()
-    ideal = "A parallelogram is two hinges of which the second turns back by the angle of the first: it is ideal."
-    driven = "The rate of a driven one in results is a length; that of its hinge is an angle, the length over the rod's."
-    is_driven = any(step.actuated and other.follows for step, other in pairwise(steps))
-    return (ideal, driven) if is_driven else (ideal,)
+    rods = "A parallelogram is two rods with a hinge at each end. Their distance, a fifth of a rod, is our choice: the"
+    rods += " robot has no such number, and the motion of its platform does not depend on it."
+    driven = (
+        "The rate of a driven one in results is a length; that of its hinge is an angle, the length over the rod's."
+    )
+    is_driven = any(step.actuated and step.side is not None for step in steps)
+    return (rods, driven) if is_driven else (rods,)
 
 
 def _steps(
@@ -112,7 +116,7 @@ def _steps(
     if joint.type == "S":
         return [Step(name, label, joint.name, "", "S", points[0], np.zeros(3))]
     axes = [numbers.of(each.axis) for each in joint.axes]
-    pitch = 0.0
+    pitch, side = 0.0, None
     parts: Sequence[str] = _PARTS.get(joint.type, ("",))
     kinds: list[ElementaryKind]
     match joint.type:
@@ -126,7 +130,9 @@ def _steps(
             kinds, pitch = ["H"], float(numbers.of(joint.axes[0].pitch)[0])
         case "Pa":
             kinds, parts, axes = ["R", "R"], ("", "back"), axes * 2
-            points = [points[0], points[0] + numbers.of(joint.axes[0].rod)]
+            rod = numbers.of(joint.axes[0].rod)
+            points = [points[0], points[0] + rod]
+            side = _APART * np.cross(axes[0], rod)
         case _:
             kinds = ["R"]
     found = []
@@ -147,6 +153,7 @@ def _steps(
                 "" if follows else actuator,
                 coordinate=-value if follows and value is not None else value,
                 follows=follows,
+                side=side,
             )
         )
     return found

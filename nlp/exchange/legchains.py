@@ -4,8 +4,8 @@ A leg with a force alone is a universal joint at the base, a slide along the leg
 Its row does not depend on the axes of the universal joint. Our choice: the first axis is fixed to the base, normal to
 the leg and to the base's z axis; the second is normal to it and to the leg.
 
-A leg with a force and a couple (a limb of a 3-UPU) is U, P and U. The axes on the platform are those of the robot. Those
-on the base are parallel to them at this pose, which makes the couple a pure one.
+A leg with a force and a couple (a limb of a 3-UPU) is U, P and U. The axes on the platform are those of the robot.
+Those on the base are parallel to them at this pose, which makes the couple a pure one.
 """
 
 from __future__ import annotations

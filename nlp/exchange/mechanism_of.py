@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from ...models import FloatArray
 from ...models.limbjoints import LimbJoint
-from ...models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
+from ...models.mechanism import Mechanism
 from ..case.case import Case
-from ..errors import EvaluationError
 from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
-from .chains import STILL, Chain, Chains, Moved, Step
+from .assembled import BASE, PLATFORM, assembled
+from .chains import Chains, Step, with_unique_names
 from .jointchains import is_given_by_joints, joint_chains
 from .legchains import PosedLeg, axes_of, check_legs, leg_chains
-from .linkframes import link_rotation
-from .placing import Values, displacements, place
+from .placing import Values, place
 from .ranges import joint_range, joints_by_label
-
-#: Names of the two links that every robot has.
-BASE, PLATFORM = "base", "platform"
 
 
 @dataclass(frozen=True)
@@ -91,6 +87,7 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         legs = _legs(nlp, x, pose - 1, state)
         chains = leg_chains(legs, state.rotation, state.position)
         lengths = {leg.name: float(np.linalg.norm(leg.platform - leg.base)) for leg in legs}
+    chains = with_unique_names(chains)
     size = _size(chains)
     values, moved = place(chains, state.rotation, state.position, size)
     ranges = {
@@ -98,13 +95,23 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         for chain in chains.chains
         for step in chain.steps
     }
-    mechanism = _assembled(model.name, chains, values, moved, ranges, size)
-    steps = {step.name: step for chain in chains.chains for step in chain.steps}
+    placed = assembled(chains, values, moved, size)
     joints = tuple(
-        ExportedJoint(name, step.label, step.part, step.actuator, None if lengths else _coordinate(values, step))
-        for name, step in steps.items()
+        replace(joint, range=ranges[step.name] if joint.actuated or step.side is None else None)
+        for joint, step in placed.joints
     )
-    return Exported(nlp.case, pose, mechanism, joints, size, chains.notes)
+    words = tuple(
+        ExportedJoint(
+            joint.name,
+            step.label,
+            step.part,
+            step.actuator if joint.actuated else "",
+            None if lengths else _coordinate(values, step),
+        )
+        for joint, step in placed.joints
+    )
+    mechanism = Mechanism(model.name, placed.links, joints, BASE, PLATFORM)
+    return Exported(nlp.case, pose, mechanism, words, size, chains.notes)
 
 
 def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
@@ -155,64 +162,3 @@ def _number(values: Values, step: Step) -> float:
 def _coordinate(values: Values, step: Step) -> float | None:
     """Return the coordinate of a joint; None for a ball."""
     return None if step.kind == "S" else _number(values, step)
-
-
-def _assembled(
-    name: str,
-    chains: Chains,
-    values: Values,
-    moved: Moved,
-    ranges: Mapping[str, tuple[float, float] | None],
-    size: float,
-) -> Mechanism:
-    """Return the mechanism of chains at a configuration."""
-    links: dict[str, MechanismLink] = {BASE: MechanismLink(BASE)}
-    joints: dict[str, MechanismJoint] = {}
-    couplings: list[Coupling] = []
-    for chain in chains.chains:
-        bodies = displacements(chain, values)
-        for k, step in enumerate(chain.steps):
-            if step.name in joints:
-                continue
-            before = bodies[k - 1] if k else STILL
-            inner = _link_behind(chain, k - 1) if k else BASE
-            outer = _link_behind(chain, k)
-            joints[step.name] = _joint(step, inner, outer, before, ranges[step.name])
-            if step.follows:
-                leader = chain.steps[k - 1].name
-                couplings.append(Coupling(f"{leader}_coupling", ((leader, 1.0), (step.name, 1.0))))
-    for chain in chains.chains:
-        bodies = displacements(chain, values)
-        for k, step in enumerate(chain.steps[:-1]):
-            link = _link_behind(chain, k)
-            if link not in links:
-                origin = bodies[k].point(step.point)
-                links[link] = MechanismLink(link, origin, _frame(origin, step, link, joints.values(), bodies[k], size))
-    position, rotation = moved.point(chains.origin), moved.R @ chains.rotation
-    links[PLATFORM] = MechanismLink(PLATFORM, position, rotation)
-    found = tuple(joints.values())
-    return Mechanism(name, tuple(links.values()), found, BASE, PLATFORM, tuple(couplings))
-
-
-def _link_behind(chain: Chain, k: int) -> str:
-    """Return the name of the link behind a joint of a chain."""
-    last = k == len(chain.steps) - 1
-    return PLATFORM if last else chain.steps[k].name.replace("joint_", "link_", 1)
-
-
-def _joint(
-    step: Step, inner: str, outer: str, before: Moved, limits: tuple[float, float] | None
-) -> MechanismJoint:
-    """Return a joint at its place, carried by the body before it."""
-    point = before.point(step.point)
-    axis = before.R @ step.axis
-    return MechanismJoint(step.name, step.kind, inner, outer, point, axis, step.pitch, step.actuated, limits)
-
-
-def _frame(
-    origin: FloatArray, step: Step, link: str, joints: Sequence[MechanismJoint], body: Moved, size: float
-) -> FloatArray:
-    """Return the axes of a link's frame."""
-    others = [joint for joint in joints if joint.inner == link]
-    points = [origin, *(joint.point for joint in others)]
-    return link_rotation(points, [body.R @ step.axis, *(joint.axis for joint in others)], size)

@@ -169,9 +169,9 @@ def _newton(
             _move(chains, values, step, change[at : at + width], size)
             at += width
         if move_pose:
-            target = Moved(rotation_by(_POSE_WEIGHT * change[at : at + 3]), _POSE_WEIGHT * size * change[at + 3 :]).after(
-                target
-            )
+            target = Moved(
+                rotation_by(_POSE_WEIGHT * change[at : at + 3]), _POSE_WEIGHT * size * change[at + 3 :]
+            ).after(target)
     return target
 
 

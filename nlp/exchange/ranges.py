@@ -1,7 +1,7 @@
 """Ranges of joints from the limits of a case, counted from the pose that is exported.
 
-Ranges come from ``leg_length``, from ``actuator_angle`` and ``actuator_length``, and from ranges of joints. Other limits
-(cones, strokes, clearances, rates) are no ranges of one joint.
+Ranges come from ``leg_length``, from ``actuator_angle`` and ``actuator_length``, and from ranges of joints. Other
+limits (cones, strokes, clearances, rates) are no ranges of one joint.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from .numbers import direction, number, numbers, quaternion
 from .shapes import MARK, PIN, ROD, extent, shape_of
-from .tree import Edge, Tree, spanning_tree
+from .tree import Edge, spanning_tree
 
 #: Time step, and time constant of the constraints, seconds: constraints need at least two steps.
 _STEP, _TIME_CONSTANT = 0.001, 0.002
@@ -129,9 +129,7 @@ class _Writer:
         place = child.rotation.T @ (joint.point - child.position)
         colour = _DRIVEN if joint.actuated else _JOINT
         if joint.kind == "S":
-            ET.SubElement(
-                body, "geom", type="sphere", pos=numbers(place), size=number(MARK * self._size), rgba=colour
-            )
+            ET.SubElement(body, "geom", type="sphere", pos=numbers(place), size=number(MARK * self._size), rgba=colour)
         elif joint.kind in ("R", "H", "P"):
             half = PIN * self._size * (child.rotation.T @ edge.axis)
             line = numbers(np.concatenate([place - half, place + half]))
@@ -145,15 +143,11 @@ class _Writer:
             if each.kind == "connect":
                 body = links[each.first]
                 anchor = numbers(body.rotation.T @ (each.point - body.position))
-                ET.SubElement(
-                    equality, "connect", name=each.name, body1=each.first, body2=each.second, anchor=anchor
-                )
+                ET.SubElement(equality, "connect", name=each.name, body1=each.first, body2=each.second, anchor=anchor)
             else:
                 # Rotations count as lengths of the robot's size, so that the rows of the weld are of one order.
                 scale = number(self._size)
-                ET.SubElement(
-                    equality, "weld", name=each.name, body1=each.first, body2=each.second, torquescale=scale
-                )
+                ET.SubElement(equality, "weld", name=each.name, body1=each.first, body2=each.second, torquescale=scale)
         for joint in self._mechanism.joints:
             if joint.kind == "H":
                 _couple(equality, f"{joint.name}_pitch", (joint.name, -joint.pitch), (_slide_name(joint), 1.0))
@@ -192,9 +186,7 @@ class _Writer:
 def _couple(equality: ET.Element, name: str, one: tuple[str, float], other: tuple[str, float]) -> None:
     """Add a constraint by which the sum of factors times the coordinates of two joints stays as it is."""
     factor = number(-one[1] / other[1])
-    ET.SubElement(
-        equality, "joint", name=name, joint1=other[0], joint2=one[0], polycoef=f"0 {factor} 0 0 0"
-    )
+    ET.SubElement(equality, "joint", name=name, joint1=other[0], joint2=one[0], polycoef=f"0 {factor} 0 0 0")
 
 
 def _slide_name(joint: MechanismJoint) -> str:

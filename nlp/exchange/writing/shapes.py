@@ -55,7 +55,9 @@ def shape_of(mechanism: Mechanism, link: str, size: float) -> Shape:
     """
     points: list[FloatArray] = []
     for joint in mechanism.joints:
-        if link in (joint.inner, joint.outer) and all(np.linalg.norm(joint.point - one) > _NEAR * size for one in points):
+        if link in (joint.inner, joint.outer) and all(
+            np.linalg.norm(joint.point - one) > _NEAR * size for one in points
+        ):
             points.append(joint.point)
     lines = _lines(points)
     mass = MASS if lines else SMALL_MASS

@@ -1,8 +1,8 @@
 """A spanning tree of a mechanism from its base, and the constraints that close its loops.
 
-Joints with one coordinate come into the tree first, balls where no other way reaches a link. A ball that is left closes
-a loop as a point that two links share. Any other joint that is left comes into the tree as well, with a copy of its outer
-link, and the copy is welded to the link: so every coordinate of the mechanism is one of the tree.
+Joints with one coordinate come into the tree first, balls where no other way reaches a link. A ball that is left
+closes a loop as a point that two links share. Any other joint that is left comes into the tree as well, with a copy of
+its outer link, and the copy is welded to the link: so every coordinate of the mechanism is one of the tree.
 """
 
 from __future__ import annotations
