@@ -32,17 +32,16 @@ def link_rotation(points: Sequence[FloatArray], axes: Sequence[FloatArray], size
     world = [np.eye(3)[k] for k in (2, 0, 1)]
     if float(np.linalg.norm(far)) > _NEAR * size:
         x = far / np.linalg.norm(far)
-        z = next(filter(None.__ne__, (_across(axis, x) for axis in (*known, *world))))
+        z = _across((*known, *world), x)
     else:
         z = known[0] if known else world[0]
-        x = next(filter(None.__ne__, (_across(axis, z) for axis in (*known, *world[1:], world[0]))))
-    if z is None or x is None:  # three directions of the world are never all parallel to a fourth
-        return np.eye(3)
+        x = _across((*known, *world[1:], world[0]), z)
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _across(direction: FloatArray, axis: FloatArray) -> FloatArray | None:
-    """Return the unit vector (3,) of a direction's part normal to a unit axis; None where they are parallel."""
-    part = direction - axis * float(direction @ axis)
-    sine = float(np.linalg.norm(part))
-    return None if sine < _PARALLEL else part / sine
+def _across(directions: Sequence[FloatArray], axis: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) of the part normal to a unit axis of the first direction that is not along it."""
+    parts = (direction - axis * float(direction @ axis) for direction in directions)
+    # Of the world's three directions, which are among them, one at least is not along the axis.
+    part = next(part for part in parts if float(np.linalg.norm(part)) > _PARALLEL)
+    return np.asarray(part / np.linalg.norm(part))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from importlib import import_module
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -38,9 +40,9 @@ def dxf_text(plate: Plate, unit: str) -> str:
         InputError: ezdxf is not installed.
     """
     check_dxf()
-    import ezdxf  # noqa: PLC0415 - only drawings need it
-    from ezdxf.enums import TextEntityAlignment  # noqa: PLC0415
-
+    # Only drawings need the library, whose names are not exported for type checkers.
+    ezdxf: Any = import_module("ezdxf")
+    alignment: Any = import_module("ezdxf.enums").TextEntityAlignment
     # Dates and identifiers of the document would make two drawings of one plate differ.
     fixed = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True
@@ -60,11 +62,11 @@ def dxf_text(plate: Plate, unit: str) -> str:
             space.add_circle((x, y), _CIRCLE * extent, dxfattribs={"layer": "JOINTS"})
             space.add_point((x, y), dxfattribs={"layer": "JOINTS"})
             label = space.add_text(" ".join(names), height=_LETTERS * extent, dxfattribs={"layer": "NAMES"})
-            label.set_placement((x + 1.5 * _CIRCLE * extent, y), align=TextEntityAlignment.MIDDLE_LEFT)
+            label.set_placement((x + 1.5 * _CIRCLE * extent, y), align=alignment.MIDDLE_LEFT)
         for end, name in (((0.15 * extent, 0.0), "x"), ((0.0, 0.15 * extent), "y")):
             space.add_line((0.0, 0.0), end, dxfattribs={"layer": "FRAME"})
             letter = space.add_text(name, height=_LETTERS * extent, dxfattribs={"layer": "FRAME"})
-            letter.set_placement(end, align=TextEntityAlignment.BOTTOM_LEFT)
+            letter.set_placement(end, align=alignment.BOTTOM_LEFT)
         stream = io.StringIO()
         document.write(stream)
     finally:

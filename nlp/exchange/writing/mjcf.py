@@ -70,7 +70,7 @@ class _Writer:
         world = ET.SubElement(root, "worldbody")
         ET.SubElement(world, "light", pos=numbers([0.0, 0.0, 4 * self._size]), dir="0 0 -1")
         base = self._tree.base
-        body = ET.SubElement(world, "body", name=base.name, **_placed(base, None))
+        body = ET.SubElement(world, "body", {"name": base.name} | _placed(base, None))
         self._shape(body, base, _BASE)
         self._children(body, base)
         self._equalities(root)
@@ -84,7 +84,7 @@ class _Writer:
         """Add the bodies behind a link, one inside the other."""
         for edge in self._tree.below(link.name):
             child = edge.child
-            inner = ET.SubElement(body, "body", name=child.name, **_placed(child, link))
+            inner = ET.SubElement(body, "body", {"name": child.name} | _placed(child, link))
             self._joint(inner, edge)
             shape = shape_of(self._mechanism, child.name, self._size)
             middle = np.mean(shape.points, axis=0) if shape.points else edge.joint.point

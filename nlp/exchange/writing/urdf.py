@@ -156,7 +156,8 @@ class _Writer:
         joint, own = edge.joint, frame.rotation.T @ edge.axis
         origin = _origin(frame, parent)
         if joint.kind == "S":
-            at, before = origin, parent.name
+            at: Mapping[str, str] = origin
+            before = parent.name
             for k, axis in enumerate("xyz"):
                 behind = frame.name if k == 2 else f"{joint.name}_{axis}_link"
                 if k < 2:
@@ -226,7 +227,9 @@ class _Writer:
         ET.SubElement(inertial, "mass", value=number(shape.mass))
         moments = {"ixx": shape.inertia, "iyy": shape.inertia, "izz": shape.inertia, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
         ET.SubElement(inertial, "inertia", {key: number(value) for key, value in moments.items()})
-        for start, end in () if frame is None else shape.lines:
+        for start, end in shape.lines:
+            if frame is None:
+                break
             one, other = (frame.rotation.T @ (shape.points[k] - frame.position) for k in (start, end))
             visual = ET.SubElement(element, "visual")
             turn = numbers(roll_pitch_yaw(_turn_to(other - one)))
