@@ -14,7 +14,7 @@ from ..evidence.closing import closed_start
 from ..evidence.state import loops_are_closed
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from .mechanism_of import mechanism_of
+from .solved.mechanism_of import mechanism_of
 from .writing.folder import check_formats, exported_files
 
 if TYPE_CHECKING:

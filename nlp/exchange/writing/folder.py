@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from ....models import Dimension
 from ...errors import InputError, nearest
-from ..mechanism_of import Exported
+from ..solved.mechanism_of import Exported
 from .dxf import check_dxf, dxf_text
 from .mjcf import mjcf_text
 from .plates import Plate, plate_of, plates_csv

@@ -12,8 +12,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...models import FloatArray
-from ..errors import EvaluationError
+from ....models import FloatArray
+from ...errors import EvaluationError
 from .chains import STILL, Chain, Chains, Moved, Step, cross_matrix, rotation_by, step_motion
 
 #: Largest difference of a chain's end from the platform, radians and parts of the robot's size: rounding leaves 1e-15

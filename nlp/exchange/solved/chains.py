@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models import FloatArray
-from ...models.mechanism.graph import ElementaryKind
+from ....models import FloatArray
+from ....models.mechanism.graph import ElementaryKind
 
 #: Angle of a rotation vector below which its matrix is that of a first-order rotation: the next term is below rounding.
 _SMALL = 1e-9

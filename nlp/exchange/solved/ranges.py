@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ...models import Dimension
-from ...models.limbjoints import LimbJoint
-from ..case.case import Case
+from ....models import Dimension
+from ....models.limbjoints import LimbJoint
+from ...case.case import Case
 from .chains import Step
 
 if TYPE_CHECKING:
@@ -37,9 +37,9 @@ def joint_range(
     if not case.limits or step.kind == "S" or step.follows:
         return None
     # The classes of limits need pydantic, which a case without limits does not load.
-    from ..case.limits.legs import LegLength  # noqa: PLC0415
-    from ..case.limits.motions import JointMotion  # noqa: PLC0415
-    from ..case.limits.quantity import QuantityLimit  # noqa: PLC0415
+    from ...case.limits.legs import LegLength  # noqa: PLC0415
+    from ...case.limits.motions import JointMotion  # noqa: PLC0415
+    from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
 
     is_slide = step.kind == "P"
     lower, upper = -math.inf, math.inf

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...models import FloatArray
+from ....models import FloatArray
 
 #: Distance, in parts of the robot's size, below which two joints are at one place; and sine of the angle between two
 #: directions below which they are parallel.

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...models import Body, FloatArray, Model, WrenchKind
-from ..errors import InputError
+from ....models import Body, FloatArray, Model, WrenchKind
+from ...errors import InputError
 from .chains import Chain, Chains, Step
 from .jointchains import clean_name
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from ...models import FloatArray
-from ...models.mechanism import MechanismJoint, MechanismLink
+from ....models import FloatArray
+from ....models.mechanism import MechanismJoint, MechanismLink
 from .chains import STILL, Chain, Chains, Moved, Step
 from .linkframes import link_rotation
 from .placing import Values, displacements

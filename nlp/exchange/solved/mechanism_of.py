@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from ...models import FloatArray
-from ...models.limbjoints import LimbJoint
-from ...models.mechanism import Mechanism
-from ..case.case import Case
-from ..evidence.state import RobotState, evaluate
-from ..program.nlp import Nlp
+from ....models import FloatArray
+from ....models.limbjoints import LimbJoint
+from ....models.mechanism import Mechanism
+from ...case.case import Case
+from ...evidence.state import RobotState, evaluate
+from ...program.nlp import Nlp
 from .assembled import BASE, PLATFORM, assembled
 from .chains import Chains, Step, with_unique_names
 from .jointchains import is_given_by_joints, joint_chains

@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, Model
-from ...models.catalog import gallery_names, gallery_tables
-from ...models.joints.chain import HomeRobot, Joint, Limb, home_robot
-from ...models.joints.words import read_words
-from ...models.mechanism.graph import ElementaryKind
-from ..case.plain import plain_value
+from ....models import FloatArray, Model
+from ....models.catalog import gallery_names, gallery_tables
+from ....models.joints.chain import HomeRobot, Joint, Limb, home_robot
+from ....models.joints.words import read_words
+from ....models.mechanism.graph import ElementaryKind
+from ...case.plain import plain_value
 from .chains import Chain, Chains, Step
 
 #: Names of the elementary joints of a joint that has several, and the suffix of each.
