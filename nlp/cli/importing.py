@@ -85,4 +85,4 @@ def import_(
         title = Line(found.mechanism.name, tone=Tone.TITLE)
         show(console(), [title, *(Line(text, label=label) for label, text in lines)])
         if out is not None:
-            typer.echo(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')
+            typer.echo(f"{one_line(out)} has the robot: [robot] file = \"{one_line(Path(out).name)}\" in a case reads it")

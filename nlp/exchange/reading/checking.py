@@ -43,9 +43,7 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
     found, expected = (_work_rates(each, size) for each in (again, mechanism))
     difference = float(np.abs(found - expected).max() / np.abs(expected).max())
     if not difference <= allowed:
-        fault = (
-            f"the robot file would state another robot: work rates differ by {difference:.2g}, {allowed:.2g} is allowed"
-        )
+        fault = f"the robot file would state another robot: work rates differ by {difference:.2g}, {allowed:.2g} is allowed"
         raise InputError(fault)
     return difference
 

@@ -144,8 +144,7 @@ def _joined(balls: list[Element], size: float) -> Element:
         return first
     axis = longest / length
     straight = all(
-        float(np.linalg.norm(np.cross(one - other, axis))) <= SAME_POINT * size
-        for one, other in combinations([np.zeros(3), *apart], 2)
+        float(np.linalg.norm(np.cross(one - other, axis))) <= SAME_POINT * size for one, other in combinations([np.zeros(3), *apart], 2)
     )
     kind: ElementaryKind = "R" if straight else "weld"
     direction = axis if straight else np.zeros(3)

@@ -133,16 +133,12 @@ class _Reader:
             return
         if not numbers:
             self.joints.append(
-                TreeJoint(
-                    unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3)
-                )
+                TreeJoint(unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3))
             )
             self.bodies.append(Body(name, parent, place))
             return
         for j in numbers:
-            moved = (
-                name if j == numbers[-1] else unique_name(f"{name} behind {self.joint_names[j]}", set(self.body_names))
-            )
+            moved = name if j == numbers[-1] else unique_name(f"{name} behind {self.joint_names[j]}", set(self.body_names))
             kind = kinds[int(model.jnt_type[j])]
             axis = np.zeros(3) if kind == "S" else data.xaxis[j].copy()
             limits = None

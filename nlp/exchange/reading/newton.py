@@ -137,9 +137,7 @@ class _Mover:
         self.count = count
         places = {body.name: body.place for body in given.bodies}
         self.cosines = {
-            c.name: float(
-                (places[c.first] @ c.first_frame).rotation[:, 2] @ (places[c.second] @ c.second_frame).rotation[:, 2]
-            )
+            c.name: float((places[c.first] @ c.first_frame).rotation[:, 2] @ (places[c.second] @ c.second_frame).rotation[:, 2])
             for c in given.closures
         }
         #: Displacement of each body relative to its parent, and coordinates of hinges and slides.

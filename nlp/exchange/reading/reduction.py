@@ -107,11 +107,7 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     )
     bodies = {body.name: body.place for body in given.bodies}
     own = {each.name for each in kept}
-    gaps = [
-        gap_of(each, bodies)
-        for each in given.closures
-        if _closes(each.name, own) or _merges(given, each.name, leader, names)
-    ]
+    gaps = [gap_of(each, bodies) for each in given.closures if _closes(each.name, own) or _merges(given, each.name, leader, names)]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
 
 
@@ -166,9 +162,7 @@ def _refuse_open(
     links = {leader[name] for each in kept for name in (each.first, each.second)} | set(nodes)
     if len(kept) < len(links):
         fault = "is at the end of an open chain"
-        raise InputError(
-            f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more"
-        )
+        raise InputError(f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more")
 
 
 def _driven(given: Description, ends: Ends, kept: list[Element], moving: list[Element]) -> tuple[set[str], list[str]]:
@@ -183,9 +177,7 @@ def _driven(given: Description, ends: Ends, kept: list[Element], moving: list[El
     wanted = set(ends.actuated) or set(given.driven)
     for each in kept:
         if each.name in wanted and each.kind == "S":
-            raise InputError(
-                f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one"
-            )
+            raise InputError(f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one")
     outside = sorted(wanted - set(own) - _leading(given, own))
     notes = [f"actuators outside the mechanism were left out: {listing(outside[:_MOST_NAMES])}"] if outside else []
     driven = wanted & set(own)
@@ -224,17 +216,13 @@ def _couplings(
         within, without = sorted(own & set(names)), sorted(set(names) - own)
         if set(without) & given.driven:
             driven |= set(within)
-            notes.append(
-                f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself"
-            )
+            notes.append(f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself")
         else:
             notes.append(f"the coupling of {listing(within)} with {listing(without)} was left out")
     return tuple(inside), driven, notes
 
 
-def _link_names(
-    given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]
-) -> dict[str, str]:
+def _link_names(given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]) -> dict[str, str]:
     """Return the name of each rigid link by its first body, in the order of the bodies."""
     order = {name: k for k, name in enumerate(bodies_of(given, kept))}
     keys = {leader[name] for each in kept for name in (each.first, each.second)} | set(given_names)

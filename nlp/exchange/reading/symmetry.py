@@ -107,9 +107,7 @@ def _circles(limbs: list[LimbNumbers], size: float) -> list[CircleOffer]:
     for group in _groups(limbs):
         for k in range(len(group[0].names)):
             points = np.array([limb.points[k] for limb in group])
-            known = any(
-                len(each.points) == len(points) and np.allclose(each.points, points, rtol=0, atol=0) for each in found
-            )
+            known = any(len(each.points) == len(points) and np.allclose(each.points, points, rtol=0, atol=0) for each in found)
             circle = None if known or len(points) < 3 else _circle_through(points, size)
             if circle is None:
                 continue
@@ -227,3 +225,4 @@ def _mirrors(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> list
         if max(gaps) < SAME * size:
             found.append(Mirror(circle.centre, normal, max(gaps)))
     return found
+

@@ -86,11 +86,7 @@ class _Reader:
                 raise InputError(f"{place}: its child {child!r} is the child of the joint {parents[child]} already")
             parents[child] = name
             children.setdefault(parent, []).append((name, child))
-        roots = [
-            name
-            for name in dict.fromkeys(name_of(e, self.source) for e in self.root.findall("link"))
-            if name not in parents
-        ]
+        roots = [name for name in dict.fromkeys(name_of(e, self.source) for e in self.root.findall("link")) if name not in parents]
         if len(roots) != 1:
             raise InputError(f"{self.source}: must have one root link; it has {listing(roots[:10])}")
         self.bodies.append(Body(roots[0], "", Frame()))
@@ -101,9 +97,7 @@ class _Reader:
             waiting += reversed(found)
         if len(self.bodies) < len(self.links):
             lost = sorted(self.links - {body.name for body in self.bodies})
-            raise InputError(
-                f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root"
-            )
+            raise InputError(f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root")
         closures, notes = self._closures()
         return Description(
             name=self.name,

@@ -131,9 +131,7 @@ def closures_of_pairs(loops: LoopFile, frames: Mapping[str, tuple[str, Frame]]) 
 
 def _pair_name(first: str, second: str) -> str:
     """Return the common part of two names such as ``closedloop1_A`` and ``closedloop1_B``."""
-    common = next(
-        (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second))
-    )
+    common = next((k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second)))
     return first[:common].rstrip("_-. ") or f"{first} {second}"
 
 
@@ -197,7 +195,5 @@ def closures_of_constraints(root: Element, links: set[str], taken: set[str], sou
         closing = _CONSTRAINTS[kind]
         if closing is Closing.WELD:
             frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
-        found.append(
-            LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames)
-        )
+        found.append(LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames))
     return found

@@ -34,9 +34,7 @@ def summary_lines(found: Imported) -> Iterator[tuple[str, str]]:
     for number, member in enumerate(wrenches.members, 1):
         own = {*member.joints, *member.actuators}
         joints = [joint for joint in mechanism.joints if joint.name in own]
-        shown = listing(
-            f"{joint.name} {joint.kind}{'*' * (joint.name in driven_names)}" for joint in joints[:_MOST_NAMES]
-        )
+        shown = listing(f"{joint.name} {joint.kind}{'*' * (joint.name in driven_names)}" for joint in joints[:_MOST_NAMES])
         yield f"member {number}", f"dim W {member.wrenches}, dim C {member.constraints}: {shown}"
     ranks = wrenches.ranks
     yield "freedoms", f"{ranks.freedoms} with free actuators, {ranks.locked} with locked ones, as the model stands"
