@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import NamedTuple
 
 from ....models import FloatArray
@@ -45,16 +44,18 @@ def assembled(chains: Chains, values: Values, moved: Moved, size: float) -> Asse
         bodies = displacements(chain, values)
         for k, step in enumerate(chain.steps):
             before = bodies[k - 1] if k else STILL
+            # The short sides of a parallelogram do not turn with its rods.
+            carrier = bodies[k] if step.follows else before
             for name, inner, outer, side in _joints_of(chain, k):
+                at = step.point if side is None else step.point + side
                 if name not in joints:
-                    at = replace(step, point=step.point + side) if side is not None else step
-                    joints[name] = (
-                        _joint(name, at, inner, outer, before, is_driven=side is None or name.endswith("_a")),
-                        step,
-                    )
+                    is_driven = step.actuated and (side is None or name.endswith(_RODS[0]))
+                    point, axis = carrier.point(at), before.R @ step.axis
+                    joint = MechanismJoint(name, step.kind, inner, outer, point, axis, step.pitch, is_driven)
+                    joints[name] = joint, step
                 if outer not in (PLATFORM, *places):
-                    point = step.point if side is None else step.point + side
-                    places[outer] = bodies[k].point(point), bodies[k].R @ step.axis
+                    origin = bodies[k].point(at) if side is None else carrier.point(at)
+                    places[outer] = origin, bodies[k].R @ step.axis
     found = [joint for joint, _ in joints.values()]
     links = [MechanismLink(BASE)]
     links += [MechanismLink(name, place[0], _frame(name, *place, found, size)) for name, place in places.items()]
@@ -80,13 +81,6 @@ def _link_behind(chain: Chain, k: int) -> str:
     """Return the name of the link behind a step of a chain."""
     last = k == len(chain.steps) - 1
     return PLATFORM if last else chain.steps[k].name.replace("joint_", "link_", 1)
-
-
-def _joint(name: str, step: Step, inner: str, outer: str, before: Moved, *, is_driven: bool) -> MechanismJoint:
-    """Return a joint at its place, carried by the body before it."""
-    point = before.point(step.point)
-    actuated = step.actuated and is_driven
-    return MechanismJoint(name, step.kind, inner, outer, point, before.R @ step.axis, step.pitch, actuated)
 
 
 def _frame(
