@@ -54,6 +54,8 @@ class _Writer:
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism, self._tree, self._size = mechanism, spanning_tree(mechanism), extent(mechanism)
         self._home: list[str] = []
+        #: Names of the balls that close a loop.
+        self._shared = {each.name for each in self._tree.closings if each.kind == "connect"}
 
     def text(self) -> str:
         """Return the file."""
@@ -65,8 +67,10 @@ class _Writer:
         default = ET.SubElement(root, "default")
         ET.SubElement(default, "geom", contype="0", conaffinity="0", mass="0", group="1")
         ET.SubElement(default, "equality", solref=f"{number(_TIME_CONSTANT)} 1")
-        visual = ET.SubElement(root, "statistic", extent=number(self._size))
-        visual.set("center", numbers(np.mean([joint.point for joint in self._mechanism.joints], axis=0)))
+        visual = ET.SubElement(root, "visual")
+        ET.SubElement(visual, "headlight", ambient=".4 .4 .4", diffuse=".5 .5 .5")
+        statistic = ET.SubElement(root, "statistic", extent=number(self._size))
+        statistic.set("center", numbers(np.mean([joint.point for joint in self._mechanism.joints], axis=0)))
         world = ET.SubElement(root, "worldbody")
         ET.SubElement(world, "light", pos=numbers([0.0, 0.0, 4 * self._size]), dir="0 0 -1")
         base = self._tree.base
@@ -93,7 +97,10 @@ class _Writer:
             ET.SubElement(inner, "inertial", pos=place, mass=number(shape.mass), diaginertia=inertia)
             if not edge.is_copy:
                 self._shape(inner, child, _PLATFORM if child.name == self._mechanism.platform else _LIMB)
-            self._mark(inner, edge)
+            self._mark(inner, child, edge.joint, edge.axis)
+            for joint in self._mechanism.joints:
+                if joint.name in self._shared and joint.outer == child.name:
+                    self._mark(inner, child, joint, joint.axis)
             self._children(inner, child)
 
     def _joint(self, body: ET.Element, edge: Edge) -> None:
@@ -123,15 +130,14 @@ class _Writer:
             line = numbers(np.concatenate(ends))
             ET.SubElement(body, "geom", type="capsule", fromto=line, size=number(ROD * self._size), rgba=colour)
 
-    def _mark(self, body: ET.Element, edge: Edge) -> None:
-        """Add the mark of a joint: a ball, or a pin along the axis."""
-        joint, child = edge.joint, edge.child
-        place = child.rotation.T @ (joint.point - child.position)
+    def _mark(self, body: ET.Element, link: MechanismLink, joint: MechanismJoint, axis: FloatArray) -> None:
+        """Add the mark of a joint to a link: a ball, or a pin along the axis (3,)."""
+        place = link.rotation.T @ (joint.point - link.position)
         colour = _DRIVEN if joint.actuated else _JOINT
         if joint.kind == "S":
             ET.SubElement(body, "geom", type="sphere", pos=numbers(place), size=number(MARK * self._size), rgba=colour)
         elif joint.kind in ("R", "H", "P"):
-            half = PIN * self._size * (child.rotation.T @ edge.axis)
+            half = PIN * self._size * (link.rotation.T @ axis)
             line = numbers(np.concatenate([place - half, place + half]))
             ET.SubElement(body, "geom", type="cylinder", fromto=line, size=number(MARK * self._size), rgba=colour)
 
