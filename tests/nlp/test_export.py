@@ -26,10 +26,7 @@ from screwsynth.nlp import (
     Task,
     case_from_tables,
     evaluate,
-    export_robot,
     formulate,
-    load_case,
-    solve,
 )
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
@@ -336,80 +333,3 @@ def _about(axis: int, angle: float) -> Array:
 
 def _pitched(yaw: float) -> Array:
     return _about(2, yaw) @ _about(1, np.pi / 2)
-
-
-def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
-    out = tmp_path / "robot"
-    words = ("export", "paper-4.4-max", "--starts", "2", "--format", "mjcf", "--format", "csv", "--out", str(out))
-    status, said, wrong = cli(*words)
-    assert (status, wrong) == (0, "")
-    assert said.startswith("5 files in ")
-    files = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert set(files) == {"README.md", "robot.xml", "joints.csv", "links.csv", "plates.csv", "screwsynth-files.txt"}
-    assert cli(*words)[0] == 0
-    assert files == {path.name: path.read_bytes() for path in out.iterdir()}
-    solution = solve(load_case("paper-4.4-max"), starts=2)
-    again = export_robot(solution, ["mjcf"])
-    assert again["robot.xml"].encode() == files["robot.xml"]
-    tree = Tree(again["robot.xml"], 50.0)
-    assert tree.open <= 1e-9
-
-
-@pytest.mark.parametrize("name", ["paper-4.2", "free-wrist", "drilling-spindle"])
-def test_shipped_cases_at_their_last_pose(name: str) -> None:
-    solution = solve(load_case(name), starts=2)
-    case = solution.case
-    text = export_robot(solution, ["mjcf"], pose=case.pose_count)["robot.xml"]
-    assert Tree(text, 50.0).open <= 1e-9
-
-
-def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = tmp_path / "robot"
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine", encoding="utf-8")
-    case = "paper-4.1-helical"
-    for words, fault in {
-        ("--format", "stl", "--out", str(out)): "--format stl: is no format; allowed: mjcf, urdf, csv, dxf, all",
-        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
-        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
-    }.items():
-        status, said, wrong = cli("export", case, *words)
-        assert (status, said) == (2, ""), words
-        assert fault in wrong
-        assert wrong.count("\n") == 1
-    monkeypatch.setattr("screwsynth.nlp.exchange.writing.dxf.find_spec", lambda _: None)
-    status, _, wrong = cli("export", case, "--format", "all", "--out", str(out))
-    assert status == 2
-    assert "ezdxf, which is not installed: pip install 'screwsynth[robots]'" in wrong
-    assert not out.exists()
-    assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
-
-
-def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
-    text = starter_case(robot_function("hexapod")())
-    (tmp_path / "case.toml").write_text(text + "\n[limits]\nleg_length = { max = 1 }\n", encoding="utf-8")
-    out = tmp_path / "robot"
-    status, _, wrong = cli(
-        "export", str(tmp_path / "case.toml"), "--format", "mjcf", "--out", str(out), "--starts", "2"
-    )
-    assert status == 1
-    assert "the solve is infeasible: nothing is exported" in wrong
-    assert not out.exists()
-    nlp = formulate(case_from_tables(tomllib.loads(text), name="hexapod", source="hexapod"))
-    fixed = [
-        f"--set={each.name}={value}"
-        for each, value in zip(nlp.program.variables, nlp.start, strict=True)
-        if not each.name.startswith("q")
-    ]
-    status, _, wrong = cli(
-        "export",
-        str(tmp_path / "case.toml"),
-        "--format",
-        "mjcf",
-        "--out",
-        str(out),
-        *fixed,
-        "--set=angle=0",
-        "--set=axis=0,0,1",
-    )
-    assert (status, wrong) == (0, "")
