@@ -304,22 +304,24 @@ def test_the_written_robot_is_refused_where_it_is_another(tmp_path: Path) -> Non
         robot(**{**found.tables, "limb": [{"joints": []}]})
 
 
-CLOSINGS = '<robot name="all"><link name="base"/>' + "".join(
-    f'<link name="a{k}"/><link name="b{k}"/><link name="c{k}"/>'
-    f'<joint name="turn{k}" type="revolute"><origin xyz="0.1 0 {k}" rpy="0.2 0.1 0"/><axis xyz="1 2 0"/>'
-    f'<parent link="base"/><child link="a{k}"/></joint><joint name="slide{k}" type="prismatic"><origin xyz="0.3 0.2 0" rpy="0.5 0 0.3"/>'
-    f'<axis xyz="0 1 1"/><parent link="a{k}"/><child link="b{k}"/></joint><joint name="loose{k}" type="floating">'
-    f'<origin xyz="0.5 0.1 {k}.2" rpy="0.2 0.1 -0.3"/><parent link="base"/><child link="c{k}"/></joint>'
-    f'<constraint name="end{k}" type="{kind}"><parent link="b{k}"/><parent_origin xyz="0.1 0.2 0.05" rpy="0.1 0.4 0"/>'
-    f'<parent_axis xyz="1 0 1"/><child link="c{k}"/><child_origin xyz="0 0.1 0.1" rpy="0.3 0 0"/>'
-    f'<child_axis xyz="0 1 1"/></constraint>'
+CLOSINGS = [
+    f"""<link name="a{k}"/><link name="b{k}"/><link name="c{k}"/>
+<joint name="turn{k}" type="revolute"><origin xyz="0.1 0 {k}" rpy="0.2 0.1 0"/><axis xyz="1 2 0"/>
+<parent link="base"/><child link="a{k}"/></joint>
+<joint name="slide{k}" type="prismatic"><origin xyz="0.3 0.2 0" rpy="0.5 0 0.3"/><axis xyz="0 1 1"/>
+<parent link="a{k}"/><child link="b{k}"/></joint>
+<joint name="loose{k}" type="floating"><origin xyz="0.5 0.1 {k}.2" rpy="0.2 0.1 -0.3"/>
+<parent link="base"/><child link="c{k}"/></joint>
+<constraint name="end{k}" type="{kind}">
+<parent link="b{k}"/><parent_origin xyz="0.1 0.2 0.05" rpy="0.1 0.4 0"/><parent_axis xyz="1 0 1"/>
+<child link="c{k}"/><child_origin xyz="0 0.1 0.1" rpy="0.3 0 0"/><child_axis xyz="0 1 1"/></constraint>"""
     for k, kind in enumerate(["spherical", "fixed", "revolute", "prismatic", "cylindrical", "universal"])
-) + "</robot>"  # fmt: skip
+]
 
 
 def test_newton_closes_every_kind_of_joint(tmp_path: Path) -> None:
     path = tmp_path / "all.urdf"
-    path.write_text(CLOSINGS, encoding="utf-8")
+    path.write_text(f'<robot name="all"><link name="base"/>{"".join(CLOSINGS)}</robot>', encoding="utf-8")
     given = read_urdf(read_xml(path), path)
     before = {body.name: body.place for body in given.bodies}
     assert all(gap_of(each, before).distance > 0.01 for each in given.closures)
