@@ -19,6 +19,9 @@ def export(
         list[str], typer.Option("--format", metavar="NAME", help="mjcf, urdf, csv, dxf or all; may be repeated.")
     ],
     settings: SettingTexts = None,
+    of: Annotated[
+        str | None, typer.Option("--of", metavar="FILE", help="Result that --json wrote, instead of solving again.")
+    ] = None,
     pose: Annotated[
         int, typer.Option(parser=WholeNumber("--pose", 1), metavar="N", help="Pose, where the case has several.")
     ] = 1,
@@ -27,13 +30,13 @@ def export(
     jobs: Jobs = None,
     force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
 ) -> None:
-    """Solve a case and write the robot for MuJoCo, URDF, CSV or DXF.
+    """Write the solved robot as MJCF, URDF, CSV or DXF.
 
-    A case with nothing free is taken as it is.
+    A case with nothing free is taken as it is, and one with a result as the result states it.
     """
     from ..case.reader import read_case
     from ..errors import one_line
-    from ..exchange.export import check_pose, files_at, fixed_point, is_assembled
+    from ..exchange.export import check_pose, check_same_robot, files_at, fixed_point, is_assembled
     from ..exchange.writing.folder import check_formats
     from ..output.files import check_folder, check_outputs, write_folder
     from .progress import solve_with_progress
@@ -41,7 +44,18 @@ def export(
     chosen = check_formats(formats)
     if not force:
         check_folder(out)
-    loaded, _, inputs = read_case(case, read_settings(settings))
+    fixings = read_settings(settings)
+    loaded, _, inputs = read_case(case, fixings)
+    jacobian = None
+    if of is not None:
+        import numpy as np
+
+        from ..results.reading import load_result
+        from ..results.settings import robot_of, settings_of
+
+        robot = robot_of(load_result(of), of, loaded)
+        jacobian = np.array(robot.jacobian)
+        loaded, _, inputs = read_case(case, {**fixings, **settings_of(robot, loaded)})
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_pose(loaded, pose)
     fixed = fixed_point(loaded)
@@ -52,6 +66,8 @@ def export(
     else:
         nlp, x = fixed
         fault = "" if is_assembled(nlp, x) else "the robot's loops do not close there"
+        if jacobian is not None and not fault:
+            check_same_robot(nlp, x, jacobian)
     if fault:
         typer.echo(f"screwsynth: {one_line(case)}: {fault}: nothing is exported", err=True)
         raise typer.Exit(1)

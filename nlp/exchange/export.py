@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...models import FloatArray
 from ...models.mechanism import MechanismError
 from ..case.case import Case
 from ..case.pose import Free
 from ..errors import InputError
 from ..evidence.closing import closed_start
-from ..evidence.state import loops_are_closed
+from ..evidence.state import evaluate, loops_are_closed
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from .solved.mechanism_of import mechanism_of
 from .writing.folder import check_formats, exported_files
+
+#: Largest difference of the Jacobian of a result from that of its numbers, in parts of its largest entry: results are
+#: closed to the solver's accuracy, and another assembly of the joints differs by parts of 1.
+_SAME = 1e-6
 
 if TYPE_CHECKING:
     from ..solver.solution import Solution
@@ -76,6 +82,23 @@ def fixed_point(case: Case) -> tuple[Nlp, FloatArray] | None:
 def is_assembled(nlp: Nlp, x: FloatArray) -> bool:
     """Return whether the loops of the robot are closed at a point (n,)."""
     return loops_are_closed(nlp, x)
+
+
+def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
+    """Refuse a point whose Jacobian is not that of a result.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        jacobian: (m, 6) of the result, at the first pose.
+
+    Raises:
+        InputError: the same numbers give another Jacobian.
+    """
+    J = evaluate(nlp, x).jacobian
+    if J.shape != jacobian.shape or not np.abs(J - jacobian).max() <= _SAME * np.abs(jacobian).max():
+        fault = "another assembly of its joints than the path from home leads to, or of another version of the case"
+        raise InputError(f"the result is of {fault}: export the case without it")
 
 
 def check_pose(case: Case, pose: int) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from screwsynth.models import WrenchKind, robot, robot_function
 from screwsynth.models.catalog import gallery_names
-from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, wrenches_of
+from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
 from screwsynth.nlp import (
     Case,
     InputError,
@@ -26,10 +26,7 @@ from screwsynth.nlp import (
     Task,
     case_from_tables,
     evaluate,
-    export_robot,
     formulate,
-    load_case,
-    solve,
 )
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
@@ -50,6 +47,7 @@ Run = Callable[..., tuple[int, str, str]]
 ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
+OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
 
 
 def starter(name: str) -> Case:
@@ -150,17 +148,23 @@ def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(
     assert tree.open <= 1e-8
 
 
-def test_general_method_finds_the_same_rows_in_the_mechanism_read_from_mjcf_and_urdf(tmp_path: Path) -> None:
+def test_export_import_export_import_keeps_the_rows_of_every_robot(tmp_path: Path) -> None:
     for name in ROBOTS:
-        nlp, x = placed(name, 1)
-        J = work_rates(evaluate(nlp, x).jacobian)
-        files = exported_files(exported(name, 1), ["mjcf", "urdf"])
-        for file, text in files.items():
-            (tmp_path / file).write_text(text, encoding="utf-8")
-        for file in ("robot.xml", "robot.urdf"):
-            read = import_robot(Request(tmp_path / file, Ends("platform")))
-            again = wrenches_of(read.mechanism, nlp.case.characteristic_length).jacobian
-            np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=f"{name} {file}")
+        for seed in (0, 1):
+            nlp, x = placed(name, seed)
+            J = work_rates(evaluate(nlp, x).jacobian)
+            mechanism = exported(name, seed).mechanism
+            for _ in range(2):
+                (tmp_path / "robot.xml").write_text(mjcf_text(mechanism), encoding="utf-8")
+                mechanism = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
+            again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+            np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
+        urdf = urdf_of(exported(name, 1).mechanism)
+        (tmp_path / "robot.urdf").write_text(urdf.text, encoding="utf-8")
+        (tmp_path / "robot.yaml").write_text(urdf.loops_text(exported(name, 1).mechanism), encoding="utf-8")
+        mechanism = import_robot(Request(tmp_path / "robot.urdf", Ends("platform"))).mechanism
+        again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+        np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=f"{name}, URDF")
 
 
 def rebuilt(tables: dict[str, object], nlp: Nlp) -> Nlp:
@@ -171,10 +175,8 @@ def rebuilt(tables: dict[str, object], nlp: Nlp) -> Nlp:
     return formulate(case)
 
 
-@pytest.mark.parametrize(
-    "name", [*SOME, *[pytest.param(each, marks=pytest.mark.slow) for each in ROBOTS if each not in SOME]]
-)
-def test_export_import_export_import_keeps_the_rows(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [*SOME, *[pytest.param(each, marks=pytest.mark.slow) for each in OTHERS]])
+def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(name: str, tmp_path: Path) -> None:
     for seed in (0, 1):
         nlp, x = placed(name, seed)
         state = evaluate(nlp, x)
@@ -338,78 +340,18 @@ def _pitched(yaw: float) -> Array:
     return _about(2, yaw) @ _about(1, np.pi / 2)
 
 
-def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
-    out = tmp_path / "robot"
-    words = ("export", "paper-4.4-max", "--starts", "2", "--format", "mjcf", "--format", "csv", "--out", str(out))
-    status, said, wrong = cli(*words)
-    assert (status, wrong) == (0, "")
-    assert said.startswith("5 files in ")
-    files = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert set(files) == {"README.md", "robot.xml", "joints.csv", "links.csv", "plates.csv", "screwsynth-files.txt"}
-    assert cli(*words)[0] == 0
-    assert files == {path.name: path.read_bytes() for path in out.iterdir()}
-    solution = solve(load_case("paper-4.4-max"), starts=2)
-    again = export_robot(solution, ["mjcf"])
-    assert again["robot.xml"].encode() == files["robot.xml"]
-    tree = Tree(again["robot.xml"], 50.0)
-    assert tree.open <= 1e-9
-
-
-@pytest.mark.parametrize("name", ["paper-4.2", "free-wrist", "drilling-spindle"])
-def test_shipped_cases_at_their_last_pose(name: str) -> None:
-    solution = solve(load_case(name), starts=2)
-    case = solution.case
-    text = export_robot(solution, ["mjcf"], pose=case.pose_count)["robot.xml"]
-    assert Tree(text, 50.0).open <= 1e-9
-
-
-def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = tmp_path / "robot"
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine", encoding="utf-8")
-    case = "paper-4.1-helical"
-    for words, fault in {
-        ("--format", "stl", "--out", str(out)): "--format stl: is no format; allowed: mjcf, urdf, csv, dxf, all",
-        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
-        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
-    }.items():
-        status, said, wrong = cli("export", case, *words)
-        assert (status, said) == (2, ""), words
-        assert fault in wrong
-        assert wrong.count("\n") == 1
-    monkeypatch.setattr("screwsynth.nlp.exchange.writing.dxf.find_spec", lambda _: None)
-    status, _, wrong = cli("export", case, "--format", "all", "--out", str(out))
-    assert status == 2
-    assert "ezdxf, which is not installed: pip install 'screwsynth[robots]'" in wrong
-    assert not out.exists()
-    assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
-
-
-def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
-    text = starter_case(robot_function("hexapod")())
-    (tmp_path / "case.toml").write_text(text + "\n[limits]\nleg_length = { max = 1 }\n", encoding="utf-8")
-    out = tmp_path / "robot"
-    status, _, wrong = cli(
-        "export", str(tmp_path / "case.toml"), "--format", "mjcf", "--out", str(out), "--starts", "2"
-    )
-    assert status == 1
-    assert "the solve is infeasible: nothing is exported" in wrong
-    assert not out.exists()
-    nlp = formulate(case_from_tables(tomllib.loads(text), name="hexapod", source="hexapod"))
-    fixed = [
-        f"--set={each.name}={value}"
-        for each, value in zip(nlp.program.variables, nlp.start, strict=True)
-        if not each.name.startswith("q")
+def test_links_that_are_limbs_are_exported_and_coupled_joints_are_refused() -> None:
+    nlp, _ = placed("3-rps", 0)
+    found = exported("3-rps", 0)
+    tables = links_of(found.mechanism)
+    program = rebuilt(tables, nlp)
+    again = mechanism_of(program, closed_start(program))
+    assert [(joint.label, joint.actuator) for joint in again.joints] == [
+        (joint.label, joint.actuator) for joint in found.joints
     ]
-    status, _, wrong = cli(
-        "export",
-        str(tmp_path / "case.toml"),
-        "--format",
-        "mjcf",
-        "--out",
-        str(out),
-        *fixed,
-        "--set=angle=0",
-        "--set=axis=0,0,1",
-    )
-    assert (status, wrong) == (0, "")
+    for one, other in zip(again.mechanism.joints, found.mechanism.joints, strict=True):
+        np.testing.assert_allclose(one.point, other.point, atol=1e-12)
+    program = rebuilt(tables | {"coupling": [{"factors": {"joint_1_1": 0.5, "joint_1_2": 1.0}}]}, nlp)
+    fault = "joints joint_1_1, joint_1_2, joint_1_3 are no limb with branches (its joints are coupled)"
+    with pytest.raises(InputError, match=re.escape(fault)):
+        mechanism_of(program, closed_start(program))

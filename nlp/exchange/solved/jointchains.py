@@ -11,16 +11,20 @@ from casadi import SX
 
 from ....models import FloatArray, Model
 from ....models.catalog import gallery_names, gallery_tables
-from ....models.joints.chain import HomeRobot, Joint, Limb, home_robot
-from ....models.joints.words import read_words
+from ....models.joints.chain import HomeRobot, Joint, Limb
+from ....models.joints.graphwords import read_robot
+from ....models.joints.linkgraph import home_of
 from ....models.mechanism.graph import ElementaryKind
 from ...case.plain import plain_value
+from ...errors import InputError, listing
 from .chains import Chain, Chains, Step
 
 #: Names of the elementary joints of a joint that has several, and the suffix of each.
 _PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
 #: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
 _APART = 0.1
+#: Most names that a message lists.
+_MOST_NAMES = 8
 
 
 def is_given_by_joints(model: Model) -> bool:
@@ -35,8 +39,17 @@ def joint_chains(model: Model, dimensions: FloatArray, coordinates: Mapping[tupl
         model: the robot.
         dimensions: (d,) its dimensions in order, radians for angles.
         coordinates: known coordinates from home by label and part of a joint, such as ``("2:3", "first")``.
+
+    Raises:
+        InputError: the robot has a part that is no limb with branches, such as nested loops.
     """
-    robot = home_robot(read_words(_tables(model)))
+    robot = home_of(read_robot(_tables(model)))
+    if robot.graph is not None and robot.graph.networks:
+        indices, reason = robot.graph.networks[0]
+        names = listing(robot.graph.joints[k].name for k in indices[:_MOST_NAMES])
+        more = ", ..." if len(indices) > _MOST_NAMES else ""
+        fault = f"joints {names}{more} are no limb with branches ({reason}), and only these are exported"
+        raise InputError(f"robot {model.name!r} cannot be exported: {fault}")
     numbers = _Numbers(robot, dimensions)
     actuators = (each.name for each in model.actuators)
     known: dict[int, list[Step]] = {}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ....models import Dimension
 from ....models.limbjoints import LimbJoint
 from ...case.case import Case
 from .chains import Step
@@ -66,10 +65,3 @@ def joint_range(
 def joints_by_label(joints: tuple[LimbJoint, ...]) -> dict[str, LimbJoint]:
     """Return joints by their labels."""
     return {joint.label: joint for joint in joints}
-
-
-def is_known(joint: LimbJoint) -> bool:
-    """Return whether the coordinates of a joint follow from the program."""
-    return bool(joint.coordinates) and all(
-        each.dimension in (Dimension.ANGLE, Dimension.LENGTH) for each in joint.coordinates
-    )

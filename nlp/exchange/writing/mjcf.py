@@ -74,7 +74,7 @@ class _Writer:
         world = ET.SubElement(root, "worldbody")
         ET.SubElement(world, "light", pos=numbers([0.0, 0.0, 4 * self._size]), dir="0 0 -1")
         base = self._tree.base
-        body = ET.SubElement(world, "body", {"name": base.name} | _placed(base, None))
+        body = ET.SubElement(world, "body", {"name": self._body(base.name)} | _placed(base, None))
         self._shape(body, base, _BASE)
         self._children(body, base)
         self._equalities(root)
@@ -84,11 +84,19 @@ class _Writer:
         ET.indent(root)
         return ET.tostring(root, encoding="unicode") + "\n"
 
+    def _body(self, link: str) -> str:
+        """Return the name of a link's body: MuJoCo has a body ``world`` already."""
+        names = {each.name for each in self._mechanism.links}
+        name = link
+        while name == "world" or (name != link and name in names):
+            name += "_"
+        return name
+
     def _children(self, body: ET.Element, link: MechanismLink) -> None:
         """Add the bodies behind a link, one inside the other."""
         for edge in self._tree.below(link.name):
             child = edge.child
-            inner = ET.SubElement(body, "body", {"name": child.name} | _placed(child, link))
+            inner = ET.SubElement(body, "body", {"name": self._body(child.name)} | _placed(child, link))
             self._joint(inner, edge)
             shape = shape_of(self._mechanism, child.name, self._size)
             middle = np.mean(shape.points, axis=0) if shape.points else edge.joint.point
@@ -149,11 +157,25 @@ class _Writer:
             if each.kind == "connect":
                 body = links[each.first]
                 anchor = numbers(body.rotation.T @ (each.point - body.position))
-                ET.SubElement(equality, "connect", name=each.name, body1=each.first, body2=each.second, anchor=anchor)
+                ET.SubElement(
+                    equality,
+                    "connect",
+                    name=each.name,
+                    body1=self._body(each.first),
+                    body2=self._body(each.second),
+                    anchor=anchor,
+                )
             else:
                 # Rotations count as lengths of the robot's size, so that the rows of the weld are of one order.
                 scale = number(self._size)
-                ET.SubElement(equality, "weld", name=each.name, body1=each.first, body2=each.second, torquescale=scale)
+                ET.SubElement(
+                    equality,
+                    "weld",
+                    name=each.name,
+                    body1=self._body(each.first),
+                    body2=self._body(each.second),
+                    torquescale=scale,
+                )
         for joint in self._mechanism.joints:
             if joint.kind == "H":
                 _couple(equality, f"{joint.name}_pitch", (joint.name, -joint.pitch), (_slide_name(joint), 1.0))
