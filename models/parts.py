@@ -213,6 +213,8 @@ class PathStructure:
         unknowns: number of its joint variables that are unknowns and that no path before it has.
         equations: number of its loop equations.
         kept: number of those that do not follow from others.
+        nested: names of its joints where it is no path of a limb, but has nested loops, coupled joints, or a passive
+            joint before branches; else empty.
     """
 
     limb: str
@@ -224,3 +226,4 @@ class PathStructure:
     unknowns: int
     equations: int
     kept: int
+    nested: tuple[str, ...] = ()

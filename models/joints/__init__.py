@@ -8,8 +8,8 @@ random dimensions), ``faults`` (joints that contradict themselves, and almost pa
 which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``resistance`` (rows and
 members of a limb), ``angles`` and ``states`` (joints' coordinates from home), ``segments`` (links), ``loops``
 (independent loop equations), ``network`` (nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their
-unknowns, rows and actuators), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and
-``pictures`` (the drawing), ``structure`` (its numbers for people), ``modelparts`` (measured parts of the model),
+unknowns, rows and actuators), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``networkpictures``
+and ``pictures`` (the drawing), ``structure`` (its numbers for people), ``modelparts`` (measured parts of the model),
 ``robot`` (the model).
 """
 

@@ -154,6 +154,7 @@ def _structure(limb: NestedLimb, member: NestedMember, number: int, wrenches: in
         unknowns=limb.unknowns if number == 0 else 0,
         equations=count,
         kept=count,
+        nested=tuple(network.graph.joints[k].name for k in member.joints),
     )
 
 

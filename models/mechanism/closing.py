@@ -22,6 +22,8 @@ _SHORTEST = 1 / 1024
 #: Largest number of Newton steps, and of halvings of one, at each point of the path.
 _STEPS = 40
 _HALVINGS = 12
+#: Steps that leave more than this part of the residual lead nowhere: no solution is near.
+_STUCK = 0.999
 #: Loops are closed where no residual, of order 1, is above this: rounding of 60 joints in a row leaves 1e-14.
 CLOSED = 1e-11
 #: Newton's method goes on until the residual is below this, or no longer falls.
@@ -169,11 +171,22 @@ class _Path:
         Returns:
             The coordinates, or None; then the singular values of the derivatives, or the residual that is left.
         """
-        motions, free = self._motions, self._free
         values = at.values.copy()
         for column, value in self._held.items():
             values[column] = part * value
-        at = Coordinates(values, at.balls)
+        found, residual, slopes = self._reduced(Coordinates(values, at.balls), part)
+        if part < 1.0 and self._pose is not None and not _is_closed(residual):
+            # A robot with fewer than six freedoms leaves the straight path: the loops alone close near it.
+            found, residual, slopes = _Path(self._motions, self._held, None)._reduced(found, part)
+        if not _is_closed(residual):
+            return None, np.array([float(np.abs(residual).max())])
+        count = 6 * len(self._motions.tree.chords) + len(self._couplings)
+        singular = np.linalg.svd(slopes[:count, self._free], compute_uv=False)
+        return found, np.asarray(singular, dtype=np.float64)
+
+    def _reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
+        """Return the coordinates of least residual near others, with the residual and its derivatives."""
+        motions, free = self._motions, self._free
         placed = motions.placed(at)
         residual, slopes = self.equations(at, placed, part)
         error = float(np.linalg.norm(residual))
@@ -195,11 +208,17 @@ class _Path:
                     break
             else:
                 break
+            is_stuck = float(np.linalg.norm(values)) > _STUCK * error > CLOSED
             at, placed, residual, slopes = trial, there, values, derivatives
             error = float(np.linalg.norm(residual))
-        if not float(np.abs(residual).max(initial=0.0)) <= CLOSED:
-            return None, np.array([float(np.abs(residual).max())])
-        return at, np.asarray(np.linalg.svd(slopes[:, free], compute_uv=False), dtype=np.float64)
+            if is_stuck:
+                break
+        return at, residual, slopes
+
+
+def _is_closed(residual: FloatArray) -> bool:
+    """Return whether equations hold."""
+    return float(np.abs(residual).max(initial=0.0)) <= CLOSED
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,12 @@ from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.exchange.reading.blocks import between
 from screwsynth.nlp.exchange.reading.checking import check_text
 from screwsynth.nlp.exchange.reading.filetext import robot_file_text
+from screwsynth.nlp.exchange.reading.frames import Frame, rotation_from_roll_pitch_yaw
 from screwsynth.nlp.exchange.reading.importing import Imported, Request, import_robot
+from screwsynth.nlp.exchange.reading.newton import close, gap_of
 from screwsynth.nlp.exchange.reading.reduction import Ends
+from screwsynth.nlp.exchange.reading.urdf import read_urdf
+from screwsynth.nlp.exchange.reading.xmltext import read_xml
 
 Run = Callable[..., tuple[int, str, str]]
 Array = reachy.Array
@@ -298,3 +302,56 @@ def test_the_written_robot_is_refused_where_it_is_another(tmp_path: Path) -> Non
             check_text(other, found.mechanism, found.size)
     with pytest.raises(RobotError):
         robot(**{**found.tables, "limb": [{"joints": []}]})
+
+
+CLOSINGS = [
+    f"""<link name="a{k}"/><link name="b{k}"/><link name="c{k}"/>
+<joint name="turn{k}" type="revolute"><origin xyz="0.1 0 {k}" rpy="0.2 0.1 0"/><axis xyz="1 2 0"/>
+<parent link="base"/><child link="a{k}"/></joint>
+<joint name="slide{k}" type="prismatic"><origin xyz="0.3 0.2 0" rpy="0.5 0 0.3"/><axis xyz="0 1 1"/>
+<parent link="a{k}"/><child link="b{k}"/></joint>
+<joint name="loose{k}" type="floating"><origin xyz="0.5 0.1 {k}.2" rpy="0.2 0.1 -0.3"/>
+<parent link="base"/><child link="c{k}"/></joint>
+<constraint name="end{k}" type="{kind}">
+<parent link="b{k}"/><parent_origin xyz="0.1 0.2 0.05" rpy="0.1 0.4 0"/><parent_axis xyz="1 0 1"/>
+<child link="c{k}"/><child_origin xyz="0 0.1 0.1" rpy="0.3 0 0"/><child_axis xyz="0 1 1"/></constraint>"""
+    for k, kind in enumerate(["spherical", "fixed", "revolute", "prismatic", "cylindrical", "universal"])
+]
+
+
+def test_newton_closes_every_kind_of_joint(tmp_path: Path) -> None:
+    path = tmp_path / "all.urdf"
+    path.write_text(f'<robot name="all"><link name="base"/>{"".join(CLOSINGS)}</robot>', encoding="utf-8")
+    given = read_urdf(read_xml(path), path)
+    before = {body.name: body.place for body in given.bodies}
+    assert all(gap_of(each, before).distance > 0.01 for each in given.closures)
+    angles = {
+        each.name: float(place(each.first, each.first_frame, before) @ place(each.second, each.second_frame, before))
+        for each in given.closures
+    }
+    closed = close(given, 1.0).description
+    after = {body.name: body.place for body in closed.bodies}
+    for each in closed.closures:
+        A, B = after[each.first] @ each.first_frame, after[each.second] @ each.second_frame
+        apart, cosine = A.rotation.T @ (B.position - A.position), float(A.rotation[:, 2] @ B.rotation[:, 2])
+        # What each joint leaves free, told from its frames alone.
+        free_way = each.closing.value in ("slide", "cylinder")
+        assert np.abs(apart[:2] if free_way else apart).max() < 1e-12, each.name
+        if each.closing.value in ("hinge", "cylinder"):
+            assert abs(cosine) == pytest.approx(1, abs=1e-12)
+        if each.closing.value in ("weld", "slide"):
+            np.testing.assert_allclose(A.rotation, B.rotation, atol=1e-12)
+        if each.closing.value == "universal":
+            assert cosine == pytest.approx(angles[each.name], abs=1e-12)
+    # The joints of the tree still hold: slides keep their direction, hinges their distance from the base.
+    for body in ("b0", "b3"):
+        hinge_body = f"a{body[1]}"
+        before_way = (before[hinge_body].inverse() @ before[body]).position
+        after_way = (after[hinge_body].inverse() @ after[body]).position
+        slide = rotation_from_roll_pitch_yaw(0.5, 0, 0.3) @ np.array([0, 1, 1])
+        np.testing.assert_allclose(np.cross(after_way - before_way, slide), 0, atol=1e-12)
+
+
+def place(body: str, frame: Frame, places: dict[str, Frame]) -> Array:
+    """The axis z of a frame on a body, in the world."""
+    return np.asarray((places[body] @ frame).rotation[:, 2])

@@ -73,6 +73,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.urdf", URDF.replace('type="revolute"', 'type="hinge"', 1), ALL, 'type = "hinge": must be one of revolute'),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="0 0 0"', 1), ALL, 'axis = "0 0 0": must be a direction'),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0"', 1), ALL, 'axis, xyz = "1 0": must be three finite numbers'),
+    ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "has a coordinate above 1e+09, or one that is no number"),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0 inf"', 1), ALL, "must be three finite numbers"),
     ("m.urdf", URDF.replace('<link name="rod_2"/>', '<link name="rod_1"/>'), ALL, "has two elements <link> with the name 'rod_1'"),
     ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have one root link; it has torso, spare"),

@@ -51,9 +51,12 @@ class RepeatTable(Table):
     through: Vector = Field(default=[0.0, 0.0, 0.0], description="point of the axis")
 
 
-class JointAxes(Table):
-    """Axes and actuation of a joint, at home."""
+class JointTable(Table):
+    """A joint of a limb, at home."""
 
+    type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
+    name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
+    at: VectorExpression = Field(description="its centre, or a point of its axis")
     axis: VectorExpression | None = Field(default=None, description="direction of its axis")
     axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="axes of a U, the base side first"
@@ -61,14 +64,6 @@ class JointAxes(Table):
     pitch: Expression | None = Field(default=None, description="way per radian of an H")
     to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
     actuated: bool | None = Field(default=None, description="whether an actuator drives it")
-
-
-class JointTable(JointAxes):
-    """A joint of a limb, at home."""
-
-    type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
-    name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
-    at: VectorExpression = Field(description="its centre, or a point of its axis")
 
 
 class BranchTable(Table):
@@ -88,7 +83,7 @@ class LimbTable(Table):
     centre: VectorExpression | None = Field(default=None, description="place where its wrenches are measured")
 
 
-class LinkJointTable(JointAxes):
+class LinkJointTable(Table):
     """A joint between two links, at home."""
 
     name: Name = Field(description="its name, unique among the joints")
@@ -97,6 +92,13 @@ class LinkJointTable(JointAxes):
         description="names of its links, the base's side first"
     )
     at: VectorExpression | None = Field(default=None, description="its centre, or a point of its axis")
+    axis: VectorExpression | None = Field(default=None, description="direction of its axis")
+    axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="axes of a U, the base side first"
+    )
+    pitch: Expression | None = Field(default=None, description="way per radian of an H")
+    to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
+    actuated: bool | None = Field(default=None, description="whether an actuator drives it")
 
 
 class CouplingTable(Table):
@@ -198,8 +200,10 @@ def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
     if fault["type"] in ("greater_than_equal", "less_than_equal") and location[-1] == "count":
         return CaseError(_place(location), f"must be a whole number from 1 to {_MOST_COPIES}", written.value)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
-    sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
-    return CaseError(_place(location), sentence, written.value)
+    # The word "points" is a key of its own, and not a slip for "joint".
+    if needed and (written.fault == "is missing" or location == ["joint"]):
+        return CaseError(_place(location), f"is missing; it must be {needed}", written.value)
+    return CaseError(_place(location), written.fault, written.value)
 
 
 def _place(location: Sequence[int | str]) -> str:

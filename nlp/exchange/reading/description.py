@@ -13,6 +13,9 @@ from ....models.mechanism import Coupling
 from ....models.mechanism.graph import ElementaryKind
 from .frames import Frame
 
+#: Largest coordinate, in the file's unit of length: beyond it, squares of distances lose what a loop is open by.
+LARGEST = 1e9
+
 
 @dataclass(frozen=True, eq=False)
 class Body:

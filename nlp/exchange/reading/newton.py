@@ -73,7 +73,9 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None) -> 
         B: its frame on the second body.
         kept: cosine between the axes of a universal joint; None for that of the frames themselves.
     """
-    apart, z, other = B.position - A.position, A.rotation[:, 2], B.rotation[:, 2]
+    # In axes of the first body's frame no common motion of both bodies changes an equation.
+    apart = A.rotation.T @ (B.position - A.position)
+    z, other = A.rotation[:, 2], B.rotation[:, 2]
     match closure.closing:
         case Closing.BALL:
             return np.asarray(apart)
@@ -82,9 +84,9 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None) -> 
         case Closing.HINGE:
             return np.concatenate([apart, A.rotation[:, :2].T @ other])
         case Closing.SLIDE:
-            return np.concatenate([A.rotation[:, :2].T @ apart, rotation_vector(A.rotation.T @ B.rotation)])
+            return np.concatenate([apart[:2], rotation_vector(A.rotation.T @ B.rotation)])
         case Closing.CYLINDER:
-            return np.concatenate([A.rotation[:, :2].T @ apart, A.rotation[:, :2].T @ other])
+            return np.concatenate([apart[:2], A.rotation[:, :2].T @ other])
         case Closing.UNIVERSAL:
             return np.append(apart, 0.0 if kept is None else float(z @ other) - kept)
 
@@ -99,10 +101,8 @@ def _derivatives(closure: LoopClosure, A: Frame, B: Frame, twist: FloatArray) ->
         twist: (6, n) twists of the second body minus those of the first, velocities at the world's origin.
     """
     w, v = twist[:3], twist[3:]
-    point = v - cross_matrix(B.position) @ w
+    point = A.rotation.T @ (v - cross_matrix(B.position) @ w)
     x, y, z, other = *A.rotation.T, B.rotation[:, 2]
-    # The frame on the first body is held: the equations are in its axes, and a common motion changes none of them.
-    across = np.array([x, y]) @ point
     tilt = np.array([np.cross(other, x), np.cross(other, y)]) @ w
     match closure.closing:
         case Closing.BALL:
@@ -112,9 +112,9 @@ def _derivatives(closure: LoopClosure, A: Frame, B: Frame, twist: FloatArray) ->
         case Closing.HINGE:
             return np.vstack([point, tilt])
         case Closing.SLIDE:
-            return np.vstack([across, A.rotation.T @ w])
+            return np.vstack([point[:2], A.rotation.T @ w])
         case Closing.CYLINDER:
-            return np.vstack([across, tilt])
+            return np.vstack([point[:2], tilt])
         case Closing.UNIVERSAL:
             return np.vstack([point, np.cross(other, z)[None] @ w])
 

@@ -11,7 +11,7 @@ import numpy as np
 from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
 from ...errors import InputError, listing, nearest
 from .blocks import between
-from .description import Description
+from .description import LARGEST, Description
 from .elements import Element, bodies_of, elements_of, place_in, rigid_groups
 from .frames import Frame
 from .newton import Gap, gap_of
@@ -77,6 +77,7 @@ def reduce(given: Description, ends: Ends) -> Reduced:
         InputError: a name means nothing, the platform is on an open chain or is part of the base, or nothing drives it.
     """
     check_names(given)
+    _check_places(given)
     platform, origin = _platform(given, ends.platform)
     base = ends.base or given.root
     if base not in {body.name for body in given.bodies}:
@@ -141,6 +142,21 @@ def check_names(given: Description) -> None:
         for name in names:
             if not name.isprintable() or not name.strip():
                 raise InputError(f"{given.source}: the {kind} {name!r} has a name with characters that cannot be shown")
+
+
+def _check_places(given: Description) -> None:
+    """Refuse places that are no finite numbers, or too large.
+
+    Raises:
+        InputError: there is one.
+    """
+    places = {f"body {each.name}": each.place.position for each in given.bodies}
+    places |= {f"joint {each.name}": each.point for each in given.joints}
+    for each in given.closures:
+        places |= {f"joint {each.name}": np.concatenate([each.first_frame.position, each.second_frame.position])}
+    for name, place in places.items():
+        if not float(np.abs(place).max()) <= LARGEST:
+            raise InputError(f"{given.source}: the {name} has a coordinate above {LARGEST:g}, or one that is no number")
 
 
 def _platform(given: Description, name: str) -> tuple[str, Frame]:

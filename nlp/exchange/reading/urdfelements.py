@@ -9,7 +9,11 @@ import numpy as np
 
 from ....models.arrays import FloatArray
 from ...errors import InputError, listing
+from .description import LARGEST
 from .frames import Frame, rotation_from_roll_pitch_yaw
+
+#: Shortest vector that is a direction: a shorter one is a zero in decimals.
+_SHORTEST = 1e-12
 
 
 def name_of(element: Element, source: str) -> str:
@@ -35,8 +39,8 @@ def numbers_of(element: Element, key: str, default: str, place: str) -> FloatArr
         numbers = [float(part) for part in text.split()]
     except ValueError:
         numbers = []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise InputError(f'{place}, {key} = "{text[:60]}": must be three finite numbers')
+    if len(numbers) != 3 or not all(abs(number) <= LARGEST for number in numbers):
+        raise InputError(f'{place}, {key} = "{text[:60]}": must be three finite numbers of {LARGEST:g} or less')
     return np.array(numbers)
 
 
@@ -75,7 +79,7 @@ def axis_of(element: Element, tag: str, place: str) -> FloatArray:
     child = element.find(tag)
     axis = np.array([1.0, 0.0, 0.0]) if child is None else numbers_of(child, "xyz", "1 0 0", f"{place}, {tag}")
     length = float(np.linalg.norm(axis))
-    if length == 0:
+    if length < _SHORTEST:
         raise InputError(f'{place}, {tag} = "0 0 0": must be a direction')
     return axis / length
 
