@@ -57,11 +57,11 @@ def gallery_names() -> tuple[str, ...]:
 
 def gallery_description(name: str) -> str | None:
     """Return what a robot of the gallery is, without building it; None where no robot of the gallery has the name."""
-    return _gallery_tables(name)["description"] if name in gallery_names() else None
+    return gallery_tables(name)["description"] if name in gallery_names() else None
 
 
-def _gallery_tables(name: str) -> dict[str, Any]:
-    """Return the tables of a robot of the gallery."""
+def gallery_tables(name: str) -> dict[str, Any]:
+    """Return the tables of the robot file of a robot of the gallery, one of :func:`gallery_names`."""
     import tomllib  # noqa: PLC0415 - most runs do not need it
 
     return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
@@ -82,7 +82,7 @@ def gallery_robot(name: str) -> Model:
     if name not in gallery_names():
         raise UnknownModelError(name)
     # A case file names the robot by its file, and people by its own name.
-    return replace(robot(**(_gallery_tables(name) | {"name": name})), options={})
+    return replace(robot(**(gallery_tables(name) | {"name": name})), options={})
 
 
 def robot_function(name: str) -> RobotFunction:

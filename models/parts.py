@@ -200,12 +200,16 @@ class Actuator:
 class JointScrews:
     """Current screws of a limb's joints, whose ranks tell a limb's singularities.
 
+    Nested loops leave no joint a screw of its own. The columns of one of their members are motions of the platform, one
+    for each rate of a joint: with the actuators locked, and as driven ones with all joints free.
+
     Attributes:
         limb: name of the limb.
         joints: label of the joint of each column, such as ``2:3``.
         all: (6, k) screws of all its joints from base to platform as twists, the world's origin as reference.
         driven: indices of the columns of actuated joints.
         passive_rank, all_rank: ranks of the passive joints' and of all screws at almost all dimensions and poses.
+        is_nested: whether the columns are motions that nested loops leave.
     """
 
     limb: str
@@ -214,6 +218,7 @@ class JointScrews:
     driven: tuple[int, ...]
     passive_rank: int
     all_rank: int
+    is_nested: bool = False
 
 
 @dataclass(frozen=True)
@@ -244,6 +249,8 @@ class PathStructure:
         unknowns: number of its joint variables that are unknowns and that no path before it has.
         equations: number of its loop equations.
         kept: number of those that do not follow from others.
+        nested: names of its joints where it is no path of a limb, but has nested loops, coupled joints, or a passive
+            joint before branches; else empty.
     """
 
     limb: str
@@ -255,3 +262,4 @@ class PathStructure:
     unknowns: int
     equations: int
     kept: int
+    nested: tuple[str, ...] = ()

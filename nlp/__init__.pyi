@@ -66,6 +66,7 @@ from .evidence.state import RobotState as RobotState
 from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
+from .exchange.export import export_robot as export_robot
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of

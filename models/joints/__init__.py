@@ -1,14 +1,16 @@
 """Robots given joint by joint: limbs as chains of joints become the rows, unknowns and loop equations of a model.
 
 The modules in order, each of which imports only those before it: ``expression`` (the small language of a robot's
-numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is
-written), ``words`` (a robot as it is written), ``chain`` (joints and limbs with their symbols), ``generic`` (ranks at
+numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is written),
+``words`` and ``graphwords`` (a robot as it is written, by limbs or by links), ``chain`` (joints and limbs with their
+symbols), ``linkgraph`` (limbs and nested loops among links), ``mechanisms`` (robots in numbers), ``generic`` (ranks at
 random dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at
 which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``distances`` (equations
 that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``angles`` and
-``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``outline``
-(corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``structure`` (its numbers for
-people), ``robot`` (the model).
+``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``network``
+(nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their unknowns, rows and actuators), ``outline``
+(corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and ``pictures`` (the drawing), ``structure``
+(its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model).
 """
 
 from .expression import ExpressionError

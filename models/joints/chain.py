@@ -81,6 +81,36 @@ class Limb:
 
 
 @dataclass(frozen=True, eq=False)
+class LinkJoint:
+    """A joint between two links at home: the names of the joint and of its links; None for the joint of a weld."""
+
+    name: str
+    inner: str
+    outer: str
+    joint: Joint | None
+
+
+@dataclass(frozen=True, eq=False)
+class HomeGraph:
+    """Links and joints at home.
+
+    Attributes:
+        links: names.
+        base, platform: names of two of them.
+        joints: between them.
+        couplings: each as indices of joints, with a factor (1, 1) each; radians and lengths.
+        networks: indices of the joints of each part that no limb has, and the reason, as a clause.
+    """
+
+    links: tuple[str, ...]
+    base: str
+    platform: str
+    joints: tuple[LinkJoint, ...]
+    couplings: tuple[tuple[tuple[int, SX], ...], ...]
+    networks: tuple[tuple[tuple[int, ...], str], ...]
+
+
+@dataclass(frozen=True, eq=False)
 class HomeRobot:
     """A robot at home.
 
@@ -91,6 +121,7 @@ class HomeRobot:
         home: (3, 1) origin of the platform frame, length.
         size: (1, 1) a length of the order of the robot's own, by which lengths become plain numbers.
         limbs: its limbs.
+        graph: its links and joints where it is given by these; None for a robot given limb by limb.
     """
 
     words: RobotWords
@@ -99,10 +130,55 @@ class HomeRobot:
     home: SX
     size: SX
     limbs: tuple[Limb, ...]
+    graph: HomeGraph | None = None
+
+    @property
+    def joints(self) -> list[Joint]:
+        """All joints: those of the graph, or of all paths of all limbs."""
+        if self.graph is not None:
+            return [each.joint for each in self.graph.joints if each.joint is not None]
+        return [joint for limb in self.limbs for path in limb.paths for joint in path]
 
 
 def home_robot(words: RobotWords) -> HomeRobot:
     """Return a robot at home, from its words.
+
+    Raises:
+        RobotError: an expression has a fault.
+    """
+    head = home_head(words)
+    limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, head.names)]
+    return head.with_parts(tuple(limbs), None)
+
+
+@dataclass(frozen=True, eq=False)
+class HomeHead:
+    """Dimensions and home of a robot, before its joints.
+
+    Attributes:
+        words: of the robot.
+        names: values of the names that expressions may use, (1, 1) each.
+        symbols: those of the dimensions among them.
+        typical: (d,) typical values of the dimensions.
+        home: (3, 1) origin of the platform frame, length.
+    """
+
+    words: RobotWords
+    names: Mapping[str, SX]
+    symbols: Mapping[str, SX]
+    typical: FloatArray
+    home: SX
+
+    def with_parts(self, limbs: tuple[Limb, ...], graph: HomeGraph | None) -> HomeRobot:
+        """Return the robot with limbs, and with links and joints where it is given by these."""
+        stacked = ca.vertcat(SX(0, 1), *self.symbols.values())
+        lengths = [self.symbols[name] for name, item in self.words.dimensions.items() if item.kind is Dimension.LENGTH]
+        robot = HomeRobot(self.words, stacked, self.typical, self.home, SX(1), limbs, graph)
+        return replace(robot, size=_size(lengths, robot.joints, stacked))
+
+
+def home_head(words: RobotWords) -> HomeHead:
+    """Return dimensions and home of a robot.
 
     Raises:
         RobotError: an expression has a fault.
@@ -115,15 +191,11 @@ def home_robot(words: RobotWords) -> HomeRobot:
     names: dict[str, SX] = dict(symbols)
     for name, text in words.derived.items():
         later = [each for each in words.derived if each not in names]
-        names[name] = _scalar(f"derived, {name}", text, names, later)
-    home = _vector("home", words.home, names)
-    limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, names)]
-    stacked = ca.vertcat(SX(0, 1), *symbols.values())
-    lengths = [symbols[name] for name, item in words.dimensions.items() if item.kind is Dimension.LENGTH]
-    return HomeRobot(words, stacked, np.array(typical), home, _size(lengths, limbs, stacked), tuple(limbs))
+        names[name] = scalar_value(f"derived, {name}", text, names, later)
+    return HomeHead(words, names, symbols, np.array(typical), _vector("home", words.home, names))
 
 
-def _size(lengths: Sequence[SX], limbs: Sequence[Limb], symbols: SX) -> SX:
+def _size(lengths: Sequence[SX], joints: Sequence[Joint], symbols: SX) -> SX:
     """Return a length of the order of the robot's, smooth and positive for all dimensions but zero.
 
     It is the root of the sum of the squares of the dimensions that are lengths; without any, the largest coordinate of
@@ -131,7 +203,7 @@ def _size(lengths: Sequence[SX], limbs: Sequence[Limb], symbols: SX) -> SX:
     """
     if lengths:
         return ca.norm_2(ca.vertcat(*lengths))
-    points = ca.veccat(*[joint.point for limb in limbs for path in limb.paths for joint in path])
+    points = ca.veccat(SX(0), *[joint.point for joint in joints])
     middle = ca.Function("points", [symbols], [ca.densify(points)])(1.0).full()
     largest = float(np.nan_to_num(np.abs(middle)).max())
     return SX(largest or 1.0)
@@ -139,18 +211,30 @@ def _size(lengths: Sequence[SX], limbs: Sequence[Limb], symbols: SX) -> SX:
 
 def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
     """Return the copies of a limb."""
-    known = dict(names)
-    for name, written in words.points.items():
-        if name in known:
-            raise RobotError(f"{words.place}, point {name}", "has the name of a dimension")
-        later = [each for each in words.points if each not in known]
-        known[name] = _vector(f"{words.place}, point {name}", written, known, later)
-    stem = tuple(_joint(joint, known) for joint in words.stem)
-    branches = tuple(tuple(_joint(joint, known) for joint in branch) for branch in words.branches) or ((),)
+    known = with_points(f"{words.place}, ", words.points, names)
+    stem = tuple(joint_at_home(joint, known) for joint in words.stem)
+    branches = tuple(tuple(joint_at_home(joint, known) for joint in branch) for branch in words.branches) or ((),)
     centre = None if words.centre is None else _vector(f"{words.place}, centre", words.centre, known)
     first = Limb("", words.place, group, stem, branches, centre, np.eye(3))
     turns = [None] if words.repeat is None else _turns(words.repeat)
     return [_turned(first, name, turn) for name, turn in zip(words.names, turns, strict=True)]
+
+
+def with_points(place: str, points: Mapping[str, VectorExpression], names: Mapping[str, SX]) -> dict[str, SX]:
+    """Return the values of names with those of points, (3, 1) each.
+
+    Args:
+        place: words before the point in messages.
+        points: by name.
+        names: values that are known before.
+    """
+    known = dict(names)
+    for name, written in points.items():
+        if name in known:
+            raise RobotError(f"{place}point {name}", "has the name of a dimension")
+        later = [each for each in points if each not in known]
+        known[name] = _vector(f"{place}point {name}", written, known, later)
+    return known
 
 
 def _turns(repeat: RepeatWords) -> list[Displacement]:
@@ -188,7 +272,7 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
     )
 
 
-def _joint(words: JointWords, names: Mapping[str, SX]) -> Joint:
+def joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
     """Return a joint at home."""
     point = _vector(f"{words.place}, at", words.at, names)
     none = SX.zeros(3)
@@ -205,7 +289,7 @@ def _joint(words: JointWords, names: Mapping[str, SX]) -> Joint:
         case "C":
             axes = [axis(AxisKind.ROTATION, given[0]), axis(AxisKind.TRANSLATION, given[0])]
         case "H":
-            axes = [axis(AxisKind.ROTATION, given[0], _scalar(f"{words.place}, pitch", words.pitch, names))]
+            axes = [axis(AxisKind.ROTATION, given[0], scalar_value(f"{words.place}, pitch", words.pitch, names))]
         case "Pa":
             to = _vector(f"{words.place}, to", words.to if words.to is not None else words.at, names)
             axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
@@ -228,14 +312,14 @@ def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -
 def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
     """Return the value of a vector expression, (3, 1); the last argument are names that are not given yet."""
     if not isinstance(written, str):
-        return ca.vertcat(*[_scalar(place, each, names, later) for each in written])
+        return ca.vertcat(*[scalar_value(place, each, names, later) for each in written])
     value = _evaluated(place, written, names, later)
     if value.shape != (3, 1):
         raise RobotError(place, f"is {written!r}, which is a number; a vector is needed")
     return value
 
 
-def _scalar(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
+def scalar_value(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
     """Return the value of a scalar expression, (1, 1); the last argument are names that are not given yet."""
     value = _evaluated(place, written, names, later)
     if not value.is_scalar():

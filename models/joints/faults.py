@@ -58,6 +58,8 @@ def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
     for limb in groups.values():
         for path in limb.paths:
             pairs += [*_joint_faults(robot, path), *_rods(robot, path), *_axes(robot, path)]
+    for joint in () if robot.graph is None else robot.joints:
+        pairs += _joint_faults(robot, (joint,))
     remarks: list[str] = []
     if pairs:
         function = ca.Function("pairs", [robot.symbols], [ca.densify(ca.vertcat(*[each.measure for each in pairs]))])

@@ -37,7 +37,7 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
     Raises:
         RobotError: the home has no finite value at the typical dimensions.
     """
-    joints = [joint for limb in robot.limbs for path in limb.paths for joint in path]
+    joints = robot.joints
     parts = [part for joint in joints for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)]
     outputs = ca.densify(ca.veccat(robot.home, *parts))
     function = ca.Function("home", [robot.symbols], [outputs])

@@ -136,32 +136,32 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     if cut.far is not None:
         _join_rod(path, base, platform, frame)
     elif cut.type:
-        _join_joint(path, base, platform, frame)
+        join_joint(path, base, platform, frame)
     else:
         turn = base.rotation.T @ platform.rotation
         place = joints[min(cut.first, count - 1)].point
         apart = base.rotation.T @ (platform.point(place) - base.point(place))
-        path.equations += _equations(ca.inv_skew(turn - turn.T) / 2) + _equations(apart, frame.size)
+        path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
         path.checks.append(3 - ca.trace(turn))
     return path
 
 
-def _equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
+def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
     """Return equations from their left sides (k, 1) and a common size; without one they are of order 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
 
 
-def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
-    """Add screws and equations of a joint at the cut."""
+def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
+    """Add screws and equations of a joint at the cut, between displacements of its two sides."""
     joints, j = path.joints, path.cut.joint
     joint = joints[j]
     ends = base.point(joint.point), platform.point(joint.point)
-    path.equations += _equations(ends[0] - ends[1], frame.size)
+    path.equations += loop_equations(ends[0] - ends[1], frame.size)
     shorter_base = sum(len(each.axes) for each in joints[:j]) < sum(len(each.axes) for each in joints[j + 1 :])
     path.points[j] = ends[0] if shorter_base else ends[1]
     path.behind[j] = platform
     if joint.type == "S":
-        path.screws[j] = _rotations_about(path.points[j])
+        path.screws[j] = rotations_about(path.points[j])
         return
     if joint.type == "U":
         first, second = joint.axes
@@ -169,12 +169,12 @@ def _join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFra
         # Both axes pass through one point where the loop is closed: the expressions of the point are the same then.
         path.screws[j] = [ca.vertcat(each, ca.cross(path.points[j], each)) for each in directions]
         angle = ca.dot(first.axis, second.axis)
-        path.equations += _equations(ca.dot(*directions) - angle)
+        path.equations += loop_equations(ca.dot(*directions) - angle)
         return
     (axis,) = joint.axes
     path.screws[j] = [axis.screw(SX(0), base)]
-    across, turned = _normals(axis.axis, frame), platform.rotation @ axis.axis
-    path.equations += _equations(ca.vertcat(*[ca.dot(base.rotation @ normal, turned) for normal in across]))
+    across, turned = normals_of(axis.axis, frame), platform.rotation @ axis.axis
+    path.equations += loop_equations(ca.vertcat(*[ca.dot(base.rotation @ normal, turned) for normal in across]))
     path.checks.append(1 - ca.dot(base.rotation @ axis.axis, turned))
 
 
@@ -189,9 +189,9 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     path.points[far] = sides[0].point(joints[far].point)
     path.points[j] = sides[1].point(joints[j].point)
     path.rod = path.points[j] - path.points[far]
-    path.screws[j] = _rotations_about(path.points[j])
+    path.screws[j] = rotations_about(path.points[j])
     if joints[far].type == "S":
-        path.screws[far] = _rotations_about(path.points[far])
+        path.screws[far] = rotations_about(path.points[far])
     square = ca.sumsqr(home)
     is_straight = True
     if slide is not None:
@@ -200,7 +200,7 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     if joints[far].type == "U" and is_straight:
         path.screws[far] = _universal_screws(path, sides[0], home, frame)
     if slide is None:
-        path.equations += _equations(ca.sumsqr(path.rod) - square, 2 * square)
+        path.equations += loop_equations(ca.sumsqr(path.rod) - square, 2 * square)
         return
     # The slide's own direction is not known where it is not along the rod: only its part along the rod does work.
     current = ca.sumsqr(path.rod)
@@ -259,13 +259,13 @@ def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
     return -1.0 if along < 0 else 1.0
 
 
-def _rotations_about(point: SX) -> list[SX]:
+def rotations_about(point: SX) -> list[SX]:
     """Return three rotations (6, 1) about a point."""
     directions = (SX(np.eye(3)[k].tolist()) for k in range(3))
     return [ca.vertcat(each, ca.cross(point, each)) for each in directions]
 
 
-def _normals(axis: SX, frame: PathFrame) -> list[SX]:
+def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
     """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
     first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))

@@ -13,6 +13,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene
 from ..parts import PoseSymbols
+from .networkpictures import NetworkDrawing
 from .opened import OpenedPath, PathFrame
 from .outline import outline
 from .placed import PlacedJoint, arc_between, placed_joints
@@ -104,9 +105,14 @@ class _Sketch:
 
 
 def scene_of(
-    paths: Sequence[DrawnPath], pose: PoseSymbols, origin: SX, frame: PathFrame, carrying: Collection[str]
+    paths: Sequence[DrawnPath],
+    pose: PoseSymbols,
+    origin: SX,
+    frame: PathFrame,
+    carrying: Collection[str],
+    networks: Sequence[NetworkDrawing] = (),
 ) -> Scene:
-    """Return the drawing of paths at a pose.
+    """Return the drawing of paths and networks at a pose.
 
     Args:
         paths: of all limbs.
@@ -114,14 +120,26 @@ def scene_of(
         origin: (3, 1) origin of the platform frame at home, length.
         frame: values that all paths share.
         carrying: names of the limbs that have a wrench.
+        networks: drawings of networks.
     """
     sketch = _Sketch(frame, float(frame.typical_value(frame.size).item()), origin, carrying)
     for drawn in paths:
         _add_path(sketch, drawn, [each for each in paths if each.limb == drawn.limb])
+    for network in networks:
+        _add_network(sketch, network)
     centre = sketch.node("P", pose.position, origin, Body.PLATFORM)
     for body, nodes in sketch.outlines.items():
         _add_outline(sketch, body, nodes, centre if body is Body.PLATFORM else None)
     return Scene(tuple(sketch.points.values()), tuple(sketch.links), joints=tuple(sketch.joints.values()))
+
+
+def _add_network(sketch: _Sketch, network: NetworkDrawing) -> None:
+    """Add a network, with its joints on base and platform among their outlines."""
+    sketch.points |= {each.name: each for each in network.points}
+    sketch.links += network.links
+    sketch.joints |= {each.name: each for each in network.joints}
+    for body, own in ((Body.BASE, network.base), (Body.PLATFORM, network.platform)):
+        sketch.outlines[body] += [sketch.node(name, place, at_home, body) for name, place, at_home in own]
 
 
 def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> None:

@@ -10,41 +10,32 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..basis import basis_of_member, constraint_rows, rank_of_rows
-from ..instance import Substitution, jacobian
 from ..limbjoints import LimbJoint, LimbLink
-from ..member import Member, resisted_parts, scaled_twists
+from ..member import Member
 from ..model import Model
-from ..parts import (
-    Actuator,
-    AssemblySign,
-    Closure,
-    Dimension,
-    GenericRanks,
-    JointScrews,
-    Parameter,
-    PathStructure,
-    PoseSymbols,
-    Quantity,
-    Unknown,
-)
+from ..parts import Actuator, AssemblySign, Closure, Dimension, JointScrews, PathStructure, PoseSymbols, Unknown
 from ..wrench import Wrench
-from .chain import HomeRobot, Joint, Limb, home_robot
+from .chain import HomeRobot, Joint, Limb
 from .cut import choose_cut, simplified
 from .distances import distance_equations
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression, plain
 from .generic import sampled_dimensions
-from .loops import ClosedPoint, PoseOf, examine_loops
+from .graphwords import read_robot
+from .linkgraph import home_of
+from .loops import PoseOf, examine_loops
+from .modelparts import generic_ranks, parameters, quantities, with_kinds
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
+from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
+from .networkpictures import network_drawing
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
 from .structure import joint_screws, member_remarks, structure_of, with_kept
-from .words import RobotWords, read_words
+from .words import RobotWords
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -54,12 +45,18 @@ _WAY = 4.0
 def robot(
     name: str,
     *,
-    limb: Sequence[Mapping[str, object]],
+    limb: Sequence[Mapping[str, object]] | None = None,
     home: VectorExpression = (0.0, 0.0, 0.0),
     dimensions: Mapping[str, Mapping[str, object]] | None = None,
     derived: Mapping[str, Expression] | None = None,
     description: str = "",
     length_unit: str = "",
+    links: Sequence[str] | None = None,
+    base: str | None = None,
+    platform: str | None = None,
+    points: Mapping[str, VectorExpression] | None = None,
+    joint: Sequence[Mapping[str, object]] | None = None,
+    coupling: Sequence[Mapping[str, object]] | None = None,
 ) -> Model:
     """Return a robot that is given joint by joint, at home; the arguments are the keys of a robot file.
 
@@ -73,6 +70,13 @@ def robot(
         derived: further numbers by name, as expressions of the dimensions and of earlier ones.
         description: one sentence for people.
         length_unit: unit of the typical dimensions, such as ``"m"``; empty for proportions in any unit.
+        links: names of all links of a robot that is given without limbs, by links and joints.
+        base: name of the link that is the base; ``"base"`` if left out.
+        platform: name of the link that is the platform; ``"platform"`` if left out.
+        points: points by name, at home.
+        joint: its joints, each a mapping with ``name``, ``type``, ``between`` (two links, the base's side first) and
+            the keys of a limb's joint; a joint of type ``"weld"`` has no other.
+        coupling: linear relations of joints' coordinates, each a mapping with ``factors`` by joint.
 
     Raises:
         RobotError: a key or value is not allowed, or the robot cannot be put together near home.
@@ -85,9 +89,15 @@ def robot(
         "derived": derived,
         "description": description,
         "length_unit": length_unit,
+        "links": links,
+        "base": base,
+        "platform": platform,
+        "points": points,
+        "joint": joint,
+        "coupling": coupling,
     }
     definition = {key: plain(value) for key, value in tables.items() if value is not None and value != ""}
-    return _model(read_words(tables), definition)
+    return _model(read_robot(definition), definition)
 
 
 @dataclass(eq=False)
@@ -113,6 +123,16 @@ class _Builder:
     remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
     structure: list[PathStructure] = field(default_factory=list)
+    networks: list[NestedLimb] = field(default_factory=list)
+
+    def add_network(self, joints: Sequence[int]) -> None:
+        """Add joints that are no limb with branches: their unknowns and equations; members follow from closed loops."""
+        name = str(len(self.robot.limbs) + len(self.networks) + 1)
+        found = nested_limb(name, self.robot, joints, self._variables(name, {}), self.frame)
+        self.networks.append(found)
+        self.closure += found.closure
+        self.checks += found.checks
+        self.joints += nested_joints(found)
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
@@ -127,7 +147,7 @@ class _Builder:
         for index, joints in enumerate(limb.paths):
             new = _labels(limb, index, joints, labels)
             labels |= new
-            path = self._path(limb, index, joints, self._variables(limb, known), labels)
+            path = self._path(limb, index, joints, self._variables(limb.name, known), labels)
             if path is None:
                 self._remark_idle(limb)
                 fault = "its limb neither resists nor drives the platform"
@@ -204,13 +224,13 @@ class _Builder:
         self.screws += [] if screws is None else [screws]
         return path
 
-    def _variables(self, limb: Limb, known: dict[tuple[int, int], SX]) -> Variables:
+    def _variables(self, limb: str, known: dict[tuple[int, int], SX]) -> Variables:
         """Return the function that gives the variable of a joint's axis, as a new unknown at its first use."""
 
         def variable(joint: Joint, axis: int) -> SX:
             key = id(joint), axis
             if key not in known:
-                name = f"q{limb.name}_{len(known) + 1}"
+                name = f"q{limb}_{len(known) + 1}"
                 symbol = SX.sym(name)
                 slides = joint.axes[axis].kind is AxisKind.TRANSLATION
                 reach, size = (_WAY, self.robot.size) if slides else (_TURN, SX(1))
@@ -242,7 +262,7 @@ def _labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int,
 
 def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     """Return the model of a robot from its words, and the tables that state them."""
-    at_home = home_robot(words)
+    at_home = home_of(words)
     samples = sampled_dimensions(at_home)
     remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
@@ -251,30 +271,40 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
     builder = _Builder(at_home, frame, samples)
     for limb in at_home.limbs:
         builder.add_limb(limb)
-    if not (builder.wrenches or builder.members):
-        raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
-    if not builder.actuators:
-        fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
-        raise RobotError("actuated", fault)
+    for joints, _ in () if at_home.graph is None else at_home.graph.networks:
+        builder.add_network(joints)
+    if not builder.networks:
+        _check_carrying(builder)
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
     loops = examine_loops(at_home, closure, PoseOf(pose.rotation, pose.position), builder.unknowns, samples)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
-    members = [_with_kinds(member, builder, numbers, loops.points[0]) for member in builder.members]
+    for network in builder.networks:
+        found = resisting(network, at_home, frame, numbers, loops.points)
+        builder.members += found.members
+        builder.actuators += found.actuators
+        builder.positions += found.positions
+        builder.screws += found.screws
+        builder.structure += found.structure
+    _check_carrying(builder)
+    members = [
+        with_kinds(member, builder.actuators, at_home.size, numbers, loops.points[0]) for member in builder.members
+    ]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
+    drawings = [network_drawing(e.name, e.network, carries=e.name in builder.carrying) for e in builder.networks]
     model = Model(
         name=words.name,
         description=words.description,
         length_unit=words.length_unit,
         options={"definition": definition},
-        parameters=_parameters(at_home),
+        parameters=parameters(at_home),
         pose=pose,
         home=frame.typical_triple(at_home.home),
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
-        quantities=_quantities(builder),
-        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying),
+        quantities=quantities(builder.actuators, builder.positions),
+        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, drawings),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
@@ -287,61 +317,13 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         links=with_shared_places(builder.links, frame),
         remarks=(*remarks, *builder.remarks, *member_remarks(builder.structure)),
     )
-    return replace(model, generic=_generic_ranks(model, at_home, loops.points))
+    return replace(model, generic=generic_ranks(model, at_home, loops.points))
 
 
-def _generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
-    """Return the largest ranks of a robot's rows and constraints over closed configurations."""
-    own = Substitution.identity(model)
-    size = ca.Function("size", [robot.symbols], [robot.size])
-    length = SX.sym("length")
-    screws = ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators])
-    rows = jacobian(model.wrenches, length, model.members)
-    function = ca.Function("rows", [*own.all, length], [ca.densify(rows), ca.densify(screws)])
-    ranks = []
-    for point in points:
-        reach = float(size(point.dimensions))
-        values = function(point.dimensions, point.unknowns, point.rotation, point.position, reach)
-        J, driven = (each.full() for each in values)
-        if np.isfinite(J).all():
-            constraints = constraint_rows(model, J, driven)
-            ranks.append([rank_of_rows(each, point.position, reach) for each in (J, constraints)])
-    most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
-    return GenericRanks(int(most[0]), int(most[1]))
-
-
-def _with_kinds(member: Member, builder: _Builder, numbers: Sequence[SX], point: ClosedPoint) -> Member:
-    """Return a member with the kinds of its wrenches, measured at a closed configuration."""
-    size = builder.robot.size
-    columns = scaled_twists(member.screws, member.centre, size, member.size)
-    driving = [each.screw for each in builder.actuators if each.limb == member.limb]
-    actuated = scaled_twists(ca.horzcat(SX(6, 0), *driving), member.centre, size, member.size)
-    vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated))
-    function = ca.Function("kinds", list(numbers), [ca.densify(vectors)])
-    found = function(point.dimensions, point.unknowns, point.rotation, point.position).full()
-    basis = basis_of_member(found[:, : member.size], found[:, member.size :], member.size - member.rank)
-    return replace(member, kinds=basis.kinds)
-
-
-def _parameters(robot: HomeRobot) -> tuple[Parameter, ...]:
-    """Return the dimensions of a robot as parameters of its model."""
-    return tuple(
-        Parameter(name, robot.symbols[k], item.kind, item.description or "dimension", (float(robot.typical[k]),))
-        for k, (name, item) in enumerate(robot.words.dimensions.items())
-    )
-
-
-def _quantities(builder: _Builder) -> tuple[Quantity, ...]:
-    """Return the positions of the actuators from home, angles and lengths apart."""
-    found = []
-    for dimension, name in ((Dimension.ANGLE, "actuator_angle"), (Dimension.LENGTH, "actuator_length")):
-        own = [
-            (each.name, position)
-            for each, position in zip(builder.actuators, builder.positions, strict=True)
-            if each.dimension is dimension
-        ]
-        if own:
-            owners, values = zip(*own, strict=True)
-            words = f"{dimension.value} by which an actuator is away from home"
-            found.append(Quantity(name, owners, ca.vertcat(*values), dimension, words))
-    return tuple(found)
+def _check_carrying(builder: _Builder) -> None:
+    """Refuse a robot whose limbs do not resist the platform, or that has no actuated joint."""
+    if not (builder.wrenches or builder.members):
+        raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
+    if not builder.actuators:
+        fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
+        raise RobotError("actuated", fault)

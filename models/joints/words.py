@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..parts import Dimension
 from .forms import (
@@ -38,12 +38,14 @@ JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "S": (),
     "Pa": ("axis", "to", "actuated"),
 }
+#: Keys of every robot file beside those of its limbs, or of its links and joints.
+HEAD_KEYS = ("name", "description", "length_unit", "home", "dimensions", "derived")
 _MOST_LIMBS = 24
 #: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
 _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
 #: Most joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
-_MOST_IN_ALL = 120
+MOST_IN_ALL = 120
 #: Fault of a branch with branches of its own.
 NESTED_BRANCH = "is a branch of a branch; allowed are branches of a limb, each with joints up to the platform"
 #: Copies of a limb nearer than this coincide, degrees.
@@ -96,6 +98,36 @@ class LimbWords:
 
 
 @dataclass(frozen=True)
+class LinkJointWords:
+    """A joint between two links, by their names; a weld has no words of a joint."""
+
+    place: str
+    name: str
+    between: tuple[str, str]
+    joint: JointWords | None
+
+
+@dataclass(frozen=True)
+class CouplingWords:
+    """A linear relation of joints' coordinates: place, and a factor by the name of each joint."""
+
+    place: str
+    factors: Mapping[str, Expression]
+
+
+@dataclass(frozen=True)
+class GraphWords:
+    """A robot as links and joints: names of links, base and platform, points, joints and couplings."""
+
+    links: tuple[str, ...]
+    base: str
+    platform: str
+    points: Mapping[str, VectorExpression]
+    joints: tuple[LinkJointWords, ...]
+    couplings: tuple[CouplingWords, ...]
+
+
+@dataclass(frozen=True)
 class RobotWords:
     """A robot as it is written."""
 
@@ -106,6 +138,7 @@ class RobotWords:
     dimensions: Mapping[str, DimensionWords] = field(default_factory=dict)
     derived: Mapping[str, Expression] = field(default_factory=dict)
     length_unit: str = ""
+    graph: GraphWords | None = None
 
 
 def read_words(tables: Mapping[str, object]) -> RobotWords:
@@ -117,21 +150,11 @@ def read_words(tables: Mapping[str, object]) -> RobotWords:
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
     """
-    refuse_other_keys("", tables, ("name", "description", "length_unit", "home", "dimensions", "derived", "limb"))
-    name = tables.get("name")
-    if not isinstance(name, str) or not name.strip():
-        raise RobotError("name", "is missing: give the robot's name as a text")
-    name_of("name", name)
+    refuse_other_keys("", tables, (*HEAD_KEYS, "limb"))
+    head = read_head(tables)
     limbs = tables.get("limb")
     if not isinstance(limbs, Sequence) or isinstance(limbs, str) or not limbs:
         raise RobotError("limb", "is missing: a robot needs at least one [[limb]]")
-    dimensions = {
-        key: _dimension(key, value) for key, value in table_of("dimensions", tables.get("dimensions")).items()
-    }
-    derived = {
-        key: expression_of(f"derived.{key}", value) for key, value in table_of("derived", tables.get("derived")).items()
-    }
-    check_names([*dimensions, *derived], "a dimension")
     read: list[LimbWords] = []
     for index, each in enumerate(limbs):
         read.append(
@@ -141,16 +164,36 @@ def read_words(tables: Mapping[str, object]) -> RobotWords:
     if len(names) > _MOST_LIMBS:
         raise RobotError("limb", f"has {len(names)} limbs with all copies; at most {_MOST_LIMBS} are allowed")
     joints = sum(len(each.names) * (len(each.stem) + sum(map(len, each.branches))) for each in read)
-    if joints > _MOST_IN_ALL:
-        raise RobotError("limb", f"has {joints} joints with all copies; at most {_MOST_IN_ALL} are allowed")
+    if joints > MOST_IN_ALL:
+        raise RobotError("limb", f"has {joints} joints with all copies; at most {MOST_IN_ALL} are allowed")
     for limb in names:
         if names.count(limb) > 1:
             raise RobotError("limb", f"has two limbs with the name {limb!r}")
+    return replace(head, limbs=tuple(read))
+
+
+def read_head(tables: Mapping[str, object]) -> RobotWords:
+    """Return a robot without limbs: its name, home, dimensions and derived numbers.
+
+    Raises:
+        RobotError: a value has a form that is not allowed.
+    """
+    name = tables.get("name")
+    if not isinstance(name, str) or not name.strip():
+        raise RobotError("name", "is missing: give the robot's name as a text")
+    name_of("name", name)
+    dimensions = {
+        key: _dimension(key, value) for key, value in table_of("dimensions", tables.get("dimensions")).items()
+    }
+    derived = {
+        key: expression_of(f"derived.{key}", value) for key, value in table_of("derived", tables.get("derived")).items()
+    }
+    check_names([*dimensions, *derived], "a dimension")
     return RobotWords(
         name=name,
         description=text_of("description", tables.get("description", "")) or f"{name}, given joint by joint",
         home=vector_of("home", tables.get("home", (0.0, 0.0, 0.0))),
-        limbs=tuple(read),
+        limbs=(),
         dimensions=dimensions,
         derived=derived,
         length_unit=name_of("length_unit", tables.get("length_unit", "")),
@@ -222,12 +265,12 @@ def _only_joints(place: str, branch: object) -> object:
 def _joints(place: str, value: object) -> tuple[JointWords, ...]:
     """Return the joints of a limb or of a branch."""
     return tuple(
-        _joint(f"{place}, joint {k + 1}", table_of(f"{place}, joint {k + 1}", each))
+        joint_words(f"{place}, joint {k + 1}", table_of(f"{place}, joint {k + 1}", each))
         for k, each in enumerate(list_of(f"{place}, joints", value))
     )
 
 
-def _joint(place: str, table: Mapping[str, object]) -> JointWords:
+def joint_words(place: str, table: Mapping[str, object]) -> JointWords:
     """Return a joint."""
     kind = table.get("type")
     if not isinstance(kind, str) or kind not in JOINT_KEYS:

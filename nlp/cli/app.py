@@ -10,6 +10,8 @@ from .certify import certify
 from .check import check
 from .codegen import codegen
 from .evaluate import evaluate
+from .export import export
+from .importing import SeveralValues, import_
 from .models import models
 from .new import new
 from .report import report
@@ -29,8 +31,9 @@ app = typer.Typer(
 )
 
 # In the order in which help lists them.
-for command in (solve, report, tradeoff, certify, verify_proof, check, evaluate, codegen, models, schema, new):
+for command in (solve, report, tradeoff, certify, verify_proof, check, evaluate, codegen, export, models, schema, new):
     app.command()(command)
+app.command("import", cls=SeveralValues)(import_)
 
 
 def _print_version(wanted: bool) -> None:

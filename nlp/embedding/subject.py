@@ -22,6 +22,9 @@ from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
 
+#: Names of joints that a message shows.
+_MOST_SHOWN = 8
+
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
 #: Digits of numbers that come from a solve: few enough to be the same on every machine.
@@ -41,12 +44,13 @@ def find_subject(case: Case) -> Subject:
     For a worst case each task is solved first by itself: the worst one is relative to their own optima.
 
     Raises:
-        CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
+        CaseError: the case contradicts itself, or C cannot be generated for its robot, its tasks or its poses.
         InputError: its functions have no finite value at any point that is tried.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
         fault = "optimises nothing, so C is not generated for it: must be 'weighted-sum' or 'worst-case'"
         raise CaseError("combine.method", fault, case.method.value, case.source)
+    _refuse_nested_loops(case)
     _check_pairs(formulate(case))
     if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
         several = len(case.tasks) > 1
@@ -59,6 +63,15 @@ def find_subject(case: Case) -> Subject:
         fault = "has a task without an optimum of its own, so there is nothing to combine"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
+
+
+def _refuse_nested_loops(case: Case) -> None:
+    """Refuse a robot with nested loops: three made 20 MB of C, which a compiler did not end within four minutes."""
+    for each in case.model.structure:
+        if each.nested:
+            shown = ", ".join(each.nested[:_MOST_SHOWN]) + (", ..." if len(each.nested) > _MOST_SHOWN else "")
+            fault = f"has joints that are no limb with branches ({shown}); C is generated for limbs with branches only"
+            raise CaseError("robot", fault, source=case.source)
 
 
 def magnitude_of(nlp: Nlp) -> SX:

@@ -11,7 +11,8 @@ Ranks at the point are compared with those at almost all dimensions and closed c
 A limb whose screws become dependent resists wrenches more than at almost all points near by. The wrenches near by are
 known to first order: with rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` of the point is also one near by
 where ``w`` does no work in the change ``sum n_j ds_j``, and ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` by the motions
-``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes.
+``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes. Of nested
+loops the change is not known, so that joints and wrenches are not told.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from .state import RobotState
 
 #: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
 DEPENDENT = 1e-7
+#: Motions that nested loops leave, below this part of the largest, are rounding errors, and must not be scaled up.
+_NEGLIGIBLE = 1e-9
 #: Rates of dependent joints below this part of the largest are zero: such a joint takes no part.
 _TAKES_PART = 1e-6
 
@@ -69,13 +72,13 @@ class Singularity:
     Attributes:
         kind: the kind.
         limb: name of the limb that it belongs to; None for one of the whole robot.
-        joints: labels of the limb's dependent joints.
+        joints: labels of the limb's dependent joints; empty for nested loops.
         gained: (k, 6) twists that the platform gains: angular velocity, then velocity at the world's origin. They span
             the motions that no wrench resists; of a constraint singularity that leaves other motions to resist or not,
             all that no constraint resists.
         locking: (k, 6) wrenches that a limb resists with in addition: force, then moment about the world's origin; each
             is of unit force, or a unit couple. The platform loses the motions in which they do work. Of more than one,
-            it depends on the way to the point which combinations are additional.
+            it depends on the way to the point which combinations are additional. None for nested loops.
     """
 
     kind: SingularityKind
@@ -159,7 +162,18 @@ def _screws_at(
     """Return the screws (6, k) of each path of joints whose screws are known, at a point."""
     unknowns = x[list(nlp.program.places.unknowns[pose])]
     values = nlp.program.kernels.joint_screws.call([parameters, unknowns, rotation, position])
-    return [np.array(each) for each in values]
+    screws = [np.array(each) for each in values]
+    paths = nlp.program.model.joint_screws
+    return [
+        _without_rounding(own, np.ravel(position)) if each.is_nested else own
+        for each, own in zip(paths, screws, strict=True)
+    ]
+
+
+def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return motions (6, k) with zeros for those that are rounding errors of the others."""
+    lengths = np.linalg.norm(_homogeneous(screws, centre, _reach(screws, centre)), axis=0)
+    return np.asarray(np.where(lengths <= _NEGLIGIBLE * lengths.max(initial=0.0), 0.0, screws))
 
 
 def _singularity_of(each: JointScrews, screws: FloatArray, own: FloatArray, centre: FloatArray) -> Singularity | None:
@@ -182,6 +196,8 @@ def _singularity_of(each: JointScrews, screws: FloatArray, own: FloatArray, cent
         rank = _rank(unit)
         if len(known) == len(columns) and rank >= generic:
             continue
+        if each.is_nested:
+            return Singularity(kind, each.limb)
         before = [k for k in every if np.isfinite(screws[:, k]).all()]
         changes, kernel = _changes(screws, before, known, unit, reach, centre)
         cokernel = np.linalg.svd(unit)[0][:, rank:]
@@ -242,12 +258,17 @@ def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatA
 
 def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
     """Return twists (6, n), velocities of a centre in parts of the largest, each of unit size; and this largest."""
-    velocities = _homogeneous(screws, centre, 1.0)[3:]
-    turning = np.linalg.norm(screws[:3], axis=0) > 0
-    reach = float(np.linalg.norm(velocities[:, turning], axis=0).max(initial=0.0)) or 1.0
+    reach = _reach(screws, centre)
     scaled = _homogeneous(screws, centre, reach)
     lengths = np.linalg.norm(scaled, axis=0)
     return scaled / np.where(lengths > 0, lengths, 1.0), reach
+
+
+def _reach(screws: FloatArray, centre: FloatArray) -> float:
+    """Return the largest velocity of a centre (3,) by twists (6, n) that turn; 1 without one."""
+    velocities = _homogeneous(screws, centre, 1.0)[3:]
+    turning = np.linalg.norm(screws[:3], axis=0) > 0
+    return float(np.linalg.norm(velocities[:, turning], axis=0).max(initial=0.0)) or 1.0
 
 
 def _rank(columns: FloatArray) -> int:

@@ -98,7 +98,7 @@ class _Modes:
         self.limbs: list[str] = []
         outputs: list[SX] = []
         self._passive: list[int | None] = []
-        paths = {each.limb: each for each in model.joint_screws}
+        paths = {each.limb: each for each in model.joint_screws if not each.is_nested}
         for limb in model.limbs:
             rows = [row for row in model.wrenches if row.limb == limb]
             driving = [each.screw for each in model.actuators if each.limb == limb]

@@ -53,7 +53,7 @@ class RepeatTable(Table):
 
 
 class JointTable(Table):
-    """A joint, at home."""
+    """A joint of a limb, at home."""
 
     type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
     name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
@@ -84,8 +84,34 @@ class LimbTable(Table):
     centre: VectorExpression | None = Field(default=None, description="place where its wrenches are measured")
 
 
-class RobotFile(Table):
-    """A robot given joint by joint, at home."""
+class LinkJointTable(Table):
+    """A joint between two links, at home."""
+
+    name: Name = Field(description="its name, unique among the joints")
+    type: Literal["R", "P", "H", "C", "U", "S", "Pa", "weld"] = Field(description="its kind")
+    between: Annotated[list[Name], Field(min_length=2, max_length=2)] = Field(
+        description="names of its links, the base's side first"
+    )
+    at: VectorExpression | None = Field(default=None, description="its centre, or a point of its axis")
+    axis: VectorExpression | None = Field(default=None, description="direction of its axis")
+    axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="axes of a U, the base side first"
+    )
+    pitch: Expression | None = Field(default=None, description="way per radian of an H")
+    to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
+    actuated: bool | None = Field(default=None, description="whether an actuator drives it")
+
+
+class CouplingTable(Table):
+    """A linear relation of joints' coordinates."""
+
+    factors: dict[str, Expression] = Field(
+        description="factor of each joint; their sum with coordinates stays as it is"
+    )
+
+
+class HeadTable(Table):
+    """The part of every robot file: name, home and dimensions."""
 
     name: Name = Field(description="its name")
     description: str = Field(default="", description="one sentence")
@@ -93,13 +119,40 @@ class RobotFile(Table):
     home: VectorExpression = Field(default="0*x", description="origin of the platform at home")
     dimensions: dict[str, DimensionTable] = Field(default_factory=dict, description="dimensions by name")
     derived: dict[str, Expression] = Field(default_factory=dict, description="further numbers by name")
+
+
+class RobotFile(HeadTable):
+    """A robot given limb by limb, at home."""
+
     limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
 
 
+class LinkFile(HeadTable):
+    """A robot given by links and joints, at home: for shapes that limbs with branches do not have."""
+
+    links: Annotated[list[Name], Field(min_length=2)] = Field(description="names of all links")
+    base: Name = Field(default="base", description="the link that is the base")
+    platform: Name = Field(default="platform", description="the link that is the platform")
+    points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
+    joint: Annotated[list[LinkJointTable], Field(min_length=1)] = Field(description="joints")
+    coupling: list[CouplingTable] = Field(default_factory=list, description="relations of joints' coordinates")
+
+
+#: Keys that only a robot of links and joints has.
+_LINK_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
 #: Keys longer than this are cut in messages.
 _LONGEST_KEY = 60
 #: Words for one entry of a list.
-_ONE = {"limb": "limb", "joints": "joint", "branch": "branch", "angles": "angle", "axes": "axis"}
+_ONE = {
+    "limb": "limb",
+    "joint": "joint",
+    "coupling": "coupling",
+    "links": "link",
+    "joints": "joint",
+    "branch": "branch",
+    "angles": "angle",
+    "axes": "axis",
+}
 #: Values that a key must have, for messages where it is missing.
 _NEEDED = {
     "type": "one of R, P, H, C, U, S and Pa",
@@ -107,6 +160,10 @@ _NEEDED = {
     "name": "a text in quotes",
     "limb": "one or more tables [[limb]]",
     "joints": "a list of one or more joints",
+    "links": "a list of the names of all links",
+    "joint": "one or more tables [[joint]]",
+    "between": "a list of two links, the base's side first",
+    "factors": "a table with a factor for each joint",
     "typical": "a number, degrees for an angle",
 }
 
@@ -120,16 +177,24 @@ def check_form(tables: dict[str, Any]) -> None:
     Raises:
         CaseError: the first fault, with limb and joint in words.
     """
+    given = [key for key in _LINK_KEYS if key in tables]
+    if given and "limb" in tables:
+        raise CaseError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
     try:
-        RobotFile.model_validate(tables)
+        (LinkFile if given else RobotFile).model_validate(tables)
     except ValidationError as error:
-        raise _error(error.errors()[0]) from None
+        raise _error(error.errors()[0], tables) from None
 
 
-def _error(fault: ErrorDetails) -> CaseError:
-    """Return a fault as an error whose key is a place in words, such as ``limb 2, joint 1, axis``."""
+def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
+    """Return a fault of tables as an error whose key is a place in words, such as ``limb 2, joint 1, axis``."""
     written = case_error(fault)
     location = [*fault["loc"], *([fault["ctx"]["key"]] if "key" in fault.get("ctx", {}) else [])]
+    if location[0] == "joint" and len(location) > 1 and isinstance(location[1], int):
+        table = tables["joint"][location[1]]
+        name = table.get("name") if isinstance(table, dict) else None
+        if isinstance(name, str) and name.isidentifier():
+            location[:2] = [f"joint {name}"]
     if fault["type"] == "string_type" and location[-1] == "<word>":
         return CaseError(_place(location), "must be an expression in quotes or a list of 3", written.value)
     if fault["type"] == "float_type" and location[-1] == "<number>":
@@ -139,8 +204,10 @@ def _error(fault: ErrorDetails) -> CaseError:
     if fault["type"] == "unknown_key" and location[-1] == "branch" and "branch" in location[:-1]:
         return CaseError(_place(location), NESTED_BRANCH)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
-    sentence = f"{written.fault}; it must be {needed}" if needed and written.fault == "is missing" else written.fault
-    return CaseError(_place(location), sentence, written.value)
+    # The word "points" is a key of its own, and not a slip for "joint".
+    if needed and (written.fault == "is missing" or location == ["joint"]):
+        return CaseError(_place(location), f"is missing; it must be {needed}", written.value)
+    return CaseError(_place(location), written.fault, written.value)
 
 
 def _place(location: Sequence[int | str]) -> str:

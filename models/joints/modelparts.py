@@ -1,0 +1,84 @@
+"""Parts of a robot's model that are measured at closed configurations, or listed from its dimensions and actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..basis import basis_of_member, constraint_rows, rank_of_rows
+from ..instance import Substitution, jacobian
+from ..member import Member, resisted_parts, scaled_twists
+from ..model import Model
+from ..parts import Actuator, Dimension, GenericRanks, Parameter, Quantity
+from .chain import HomeRobot
+from .loops import ClosedPoint
+
+
+def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
+    """Return the largest ranks of a robot's rows and constraints over closed configurations."""
+    own = Substitution.identity(model)
+    size = ca.Function("size", [robot.symbols], [robot.size])
+    length = SX.sym("length")
+    screws = ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators])
+    rows = jacobian(model.wrenches, length, model.members)
+    function = ca.Function("rows", [*own.all, length], [ca.densify(rows), ca.densify(screws)])
+    ranks = []
+    for point in points:
+        reach = float(size(point.dimensions))
+        values = function(point.dimensions, point.unknowns, point.rotation, point.position, reach)
+        J, driven = (each.full() for each in values)
+        if np.isfinite(J).all():
+            constraints = constraint_rows(model, J, driven)
+            ranks.append([rank_of_rows(each, point.position, reach) for each in (J, constraints)])
+    most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
+    return GenericRanks(int(most[0]), int(most[1]))
+
+
+def with_kinds(
+    member: Member, actuators: Sequence[Actuator], size: SX, numbers: Sequence[SX], point: ClosedPoint
+) -> Member:
+    """Return a member with the kinds of its wrenches, measured at a closed configuration.
+
+    Args:
+        member: the member.
+        actuators: of all limbs.
+        size: (1, 1) the robot's size, length.
+        numbers: symbols of dimensions, unknowns, rotation and position.
+        point: the configuration.
+    """
+    columns = scaled_twists(member.screws, member.centre, size, member.size)
+    driving = [each.screw for each in actuators if each.limb == member.limb]
+    actuated = scaled_twists(ca.horzcat(SX(6, 0), *driving), member.centre, size, member.size)
+    vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated))
+    function = ca.Function("kinds", list(numbers), [ca.densify(vectors)])
+    found = function(point.dimensions, point.unknowns, point.rotation, point.position).full()
+    basis = basis_of_member(found[:, : member.size], found[:, member.size :], member.size - member.rank)
+    return replace(member, kinds=basis.kinds)
+
+
+def parameters(robot: HomeRobot) -> tuple[Parameter, ...]:
+    """Return the dimensions of a robot as parameters of its model."""
+    return tuple(
+        Parameter(name, robot.symbols[k], item.kind, item.description or "dimension", (float(robot.typical[k]),))
+        for k, (name, item) in enumerate(robot.words.dimensions.items())
+    )
+
+
+def quantities(actuators: Sequence[Actuator], positions: Sequence[SX]) -> tuple[Quantity, ...]:
+    """Return the positions (1, 1) of the actuators from home, angles and lengths apart."""
+    found = []
+    for dimension, name in ((Dimension.ANGLE, "actuator_angle"), (Dimension.LENGTH, "actuator_length")):
+        own = [
+            (each.name, position)
+            for each, position in zip(actuators, positions, strict=True)
+            if each.dimension is dimension
+        ]
+        if own:
+            owners, values = zip(*own, strict=True)
+            words = f"{dimension.value} by which an actuator is away from home"
+            found.append(Quantity(name, owners, ca.vertcat(*values), dimension, words))
+    return tuple(found)

@@ -1,0 +1,265 @@
+"""Members of a network: screws of the platform that nested loops and coupled joints allow, as expressions.
+
+With the rates ``q`` of a member's passive joints along a spanning tree from the base, its loops demand ``L q = 0``, and
+the platform's twist is ``S q``. The member allows the twists ``S N`` with the projector ``N`` on the null space of
+``L``, and the twist ``s - S L^+ l`` for a unit rate of an actuator with the columns ``s`` and ``l``. Projector and
+pseudo-inverse follow from the ranks of the loops for almost all configurations, without a choice of columns. Loops are
+taken one after the other: a recursion for all at once would lose half of the digits.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..mechanism.centre import CentreRule, centre_rule
+from ..mechanism.members import robot_graph
+from ..mechanism.topology import spanning_tree
+from ..member import Member
+from .chain import HomeRobot
+from .generic import RANK_TOLERANCE
+from .loops import ClosedPoint
+from .mechanisms import mechanism_at_home
+from .motion import AxisKind
+from .network import OpenNetwork
+from .opened import PathFrame
+
+
+@dataclass(frozen=True)
+class NestedMember:
+    """A member of a network by its joints in the robot's graph.
+
+    Attributes:
+        passive: indices of the joints that move while actuators are locked.
+        joints: of these and of all others that it depends on.
+        centre: indices of the joints whose mean is its centre, or whose axes meet there.
+        is_meeting: whether axes meet at the centre.
+    """
+
+    passive: tuple[int, ...]
+    joints: tuple[int, ...]
+    centre: tuple[int, ...]
+    is_meeting: bool
+
+
+class Motions(NamedTuple):
+    """Motions of a member with some of its joints free.
+
+    Attributes:
+        loops: (m, n) each, the rows of ``L`` for each loop or coupling, in angles and parts of the robot's size.
+        platform: (6, n) ``S``, the platform's twists for the same rates.
+        columns: index of the joint of each column.
+    """
+
+    loops: tuple[SX, ...]
+    platform: SX
+    columns: tuple[int, ...]
+
+
+class MotionRanks(NamedTuple):
+    """Ranks of each loop among the rates that close those before it, and of the twists that all leave the platform."""
+
+    loops: tuple[int, ...]
+    twists: int
+
+
+def nested_members(robot: HomeRobot, network: OpenNetwork) -> list[NestedMember]:
+    """Return the members of a network, from the robot's mechanism at typical dimensions."""
+    mechanism = mechanism_at_home(robot)
+    names = {each.name: k for k, each in enumerate(network.graph.joints)}
+
+    def written(joints: Sequence[int]) -> tuple[int, ...]:
+        found = (mechanism.joints[k].name.partition(".")[0] for k in joints)
+        return tuple(dict.fromkeys(names[name] for name in found))
+
+    members = []
+    for each in robot_graph(mechanism).members:
+        joints = written(each.joints)
+        if set(joints) <= set(network.joints):
+            rule: CentreRule = centre_rule(mechanism, each)
+            members.append(NestedMember(written(each.passive), joints, written(rule.joints), rule.is_meeting))
+    return members
+
+
+def motions_of(network: OpenNetwork, frame: PathFrame, joints: Collection[int], free: Collection[int]) -> Motions:
+    """Return loops and platform's twists of some joints of a network, some of which are free."""
+    own = [k for k in network.joints if k in joints]
+    moving = [k for k in own if k in free]
+    start, count = {}, 0
+    for k in moving:
+        start[k] = count
+        count += len(network.screws[k])
+    columns = tuple(k for k in moving for _ in network.screws[k])
+
+    def block(k: int) -> SX:
+        """Return the twists (6, n) of a joint for rates of order 1, among those of all free joints."""
+        found = SX(6, count)
+        if k in start:
+            screws = ca.horzcat(*network.screws[k])
+            slide = is_slide(network, k)
+            found[:, start[k] : start[k] + screws.shape[1]] = screws * frame.size if slide else screws
+        return found
+
+    edges = [network.ends(k) for k in own]
+    tree = spanning_tree([network.base], edges, lambda i: len(network.screws[own[i]]))
+    twists = {network.base: SX(6, count)}
+    for i, parent, child in tree.branches:
+        sign = 1 if edges[i][0] == parent else -1
+        twists[child] = twists[parent] + sign * block(own[i])
+    rows = _coupling_rows(network, frame, own, start, count)
+    for i in tree.chords:
+        relative = twists[edges[i][1]] - twists[edges[i][0]] - block(own[i])
+        place = network.points[own[i]]
+        velocities = [relative[3:, k] + ca.cross(relative[:3, k], place) for k in range(count)]
+        rows.append(ca.vertcat(relative[:3, :], ca.horzcat(SX(3, 0), *velocities) / frame.size))
+    loops = tuple(ca.sparsify(row) for row in rows)
+    return Motions(loops, ca.densify(twists.get(network.platform, SX(6, count))), columns)
+
+
+def is_slide(network: OpenNetwork, k: int) -> bool:
+    """Return whether a joint's first unit screw is a translation, so that its rate is a length per unit of time."""
+    return network.joint(k).axes[0].kind is not AxisKind.ROTATION
+
+
+def _coupling_rows(
+    network: OpenNetwork, frame: PathFrame, own: Sequence[int], start: dict[int, int], count: int
+) -> list[SX]:
+    """Return the equation (1, n) of each coupling all of whose joints are among some."""
+    rows = []
+    for coupling in network.graph.couplings:
+        if all(k in own for k, _ in coupling):
+            row = SX(1, count)
+            first, scale = coupling[0]
+            scale = scale * frame.size if is_slide(network, first) else scale
+            for k, factor in coupling:
+                if k in start:
+                    row[0, start[k]] = factor * (frame.size if is_slide(network, k) else 1) / scale
+            rows.append(row)
+    return rows
+
+
+def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX) -> MotionRanks:
+    """Return the most frequent ranks at closed configurations.
+
+    Args:
+        motions: loops and platform's twists.
+        symbols: of dimensions, unknowns, rotation and position.
+        points: closed configurations.
+        size: (1, 1) the robot's size.
+    """
+    outputs = [motions.platform, size, *[ca.densify(loop) for loop in motions.loops]]
+    function = ca.Function("nested", list(symbols), outputs)
+    found: Counter[MotionRanks] = Counter()
+    for point in points:
+        values = function(point.dimensions, point.unknowns, point.rotation, point.position)
+        platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in values)
+        if not all(np.isfinite(each).all() for each in (platform, *loops)):
+            continue
+        about = np.vstack([platform[:3], (platform[3:] + np.cross(platform[:3].T, point.position).T) / length])
+        ranks, null = [], np.eye(platform.shape[1])
+        for loop in loops:
+            _, singular, right = np.linalg.svd(loop @ null)
+            ranks.append(_rank(singular))
+            null = null @ right[ranks[-1] :].T
+        twists = _rank(np.linalg.svd(about @ null)[1]) if null.size else 0
+        found[MotionRanks(tuple(ranks), twists)] += 1
+    return max(found, key=lambda ranks: (found[ranks], ranks))
+
+
+def _rank(values: FloatArray) -> int:
+    """Return the rank of screws of order 1: a loop that others close already leaves rounding errors alone."""
+    return int(np.count_nonzero(values > RANK_TOLERANCE))
+
+
+@dataclass(frozen=True, eq=False)
+class NullSpace:
+    """The null space of a member's loops, loop after loop: a loop with the rates that all before it leave free.
+
+    Attributes:
+        projector: (n, n) on the rates that close all loops.
+        inverses: pseudo-inverse (n, m) of each loop's equations, among the rates that close those before it.
+        motions: loops and platform's twists.
+    """
+
+    projector: SX
+    inverses: tuple[SX, ...]
+    motions: Motions
+
+    @property
+    def screws(self) -> SX:
+        """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
+        return self.motions.platform @ self.projector
+
+    def driven_screw(self, screw: SX, loops: Sequence[SX]) -> SX:
+        """Return the twist (6, 1) of the platform for a unit rate of an actuated joint, up to those that are allowed.
+
+        Args:
+            screw: (6, 1) of the joint in the platform's twist.
+            loops: (m, 1) of the joint in each loop.
+        """
+        rates = SX(self.projector.shape[0], 1)
+        for own, inverse, loop in zip(loops, self.inverses, self.motions.loops, strict=True):
+            rates -= inverse @ (own + loop @ rates)
+        return screw + self.motions.platform @ rates
+
+
+def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
+    """Return the null space of a member's loops from their ranks."""
+    projector = SX.eye(motions.platform.shape[1])
+    inverses = []
+    for loop, rank in zip(motions.loops, ranks.loops, strict=True):
+        left = ca.densify(loop @ projector)
+        inverse = pseudo_inverse(left, rank)
+        inverses.append(inverse)
+        projector -= inverse @ left
+    return NullSpace(projector, tuple(inverses), motions)
+
+
+def pseudo_inverse(matrix: SX, rank: int) -> SX:
+    """Return the pseudo-inverse (n, m) of a matrix (m, n) whose rank does not change.
+
+    It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
+    Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
+    One step ``X (2 I - A X)`` of Newton's method squares its relative error.
+    """
+    if rank == 0:
+        return SX(matrix.shape[1], matrix.shape[0])
+    gram = matrix @ matrix.T
+    scale = ca.trace(gram)  # keeps the coefficients of order 1
+    gram = gram / scale
+    size = gram.shape[0]
+    power, before, coefficient = SX.eye(size), SX.eye(size), SX(1)
+    for k in range(1, rank + 1):
+        before = power
+        product = gram @ power
+        coefficient = -ca.trace(product) / k
+        power = product + coefficient * SX.eye(size)
+    found = -matrix.T @ before / (coefficient * scale)
+    return 2 * found - found @ (matrix @ found)
+
+
+def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:
+    """Return a member of a network, with the kinds of its wrenches still to be measured."""
+    return Member(limb, _centre(network, each), screws, rank, ())
+
+
+def _centre(network: OpenNetwork, member: NestedMember) -> SX:
+    """Return the centre (3, 1) of a member in the world frame, length; joints ride on their second link."""
+    if member.is_meeting:
+        # Both hinges of a universal joint are one joint here.
+        if len(member.centre) == 1:
+            return network.points[member.centre[0]]
+        one, other = member.centre
+        first, second = (network.screws[k][0][:3] for k in (one, other))
+        apart = network.points[other] - network.points[one]
+        normal = ca.cross(first, second)
+        return network.points[one] + first * (ca.dot(ca.cross(apart, second), normal) / ca.sumsqr(normal))
+    places = [network.motions[network.ends(k)[1]].point(network.joint(k).point) for k in member.centre]
+    return sum(places, SX.zeros(3)) * (1 / len(places))

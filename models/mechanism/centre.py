@@ -1,0 +1,106 @@
+"""Centre of a member: the point about which its couples are measured, by the rules of robots given joint by joint.
+
+In this order: the mean of the passive joints on the platform where there are several; the passive spherical joint, or
+the common point of three passive hinges that follow each other, nearest the platform; that of two hinges; the point of
+the last passive joint. A nested loop between two hinges ends their row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .graph import Mechanism, MechanismJoint
+from .members import MemberGraph
+from .motions import size_of
+from .topology import Classes, bridges_between
+
+#: Axes meet where their distance, in parts of the mechanism's size, or the sine of their angle, is below this: rounding
+#: leaves 1e-15, also at configurations that Newton's method closed.
+_MEET = 1e-9
+
+
+class CentreRule(NamedTuple):
+    """Joints that give a member's centre.
+
+    Attributes:
+        joints: indices.
+        is_meeting: whether the centre is the point where the axes of the two joints meet; else it is the mean of the
+            joints' points.
+    """
+
+    joints: tuple[int, ...]
+    is_meeting: bool = False
+
+
+def centre_of(mechanism: Mechanism, rule: CentreRule) -> FloatArray:
+    """Return the centre (3,) in the world frame, length."""
+    joints = [mechanism.joints[k] for k in rule.joints]
+    if not rule.is_meeting:
+        return np.asarray(np.mean([joint.point for joint in joints], axis=0))
+    one, other = joints
+    normal = np.cross(one.axis, other.axis)
+    along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
+    return np.asarray(one.point + along * one.axis)
+
+
+def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
+    """Return the joints that give the centre of a member."""
+    if len(member.on_platform) > 1:
+        return CentreRule(member.on_platform)
+    joints = mechanism.joints
+    rows = _rows(mechanism, member)
+    chain = [k for row in rows for k in row]
+    size = size_of(mechanism)
+    found: list[tuple[int, CentreRule]] = []
+    for count in (3, 2):
+        if count == 3:
+            found += [(place, CentreRule((k,))) for place, k in enumerate(chain) if joints[k].kind == "S"]
+        before = 0
+        for row in rows:
+            for k in range(len(row) - count + 1):
+                own = row[k : k + count]
+                if _meet([joints[each] for each in own], size):
+                    found.append((before + k + count - 1, CentreRule((own[0], own[1]), is_meeting=True)))
+            before += len(row)
+        if found:
+            return max(found, key=lambda each: each[0])[1]
+    return CentreRule((chain[-1] if chain else (*member.on_platform, *reversed(member.joints))[0],))
+
+
+def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
+    """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
+    classes = Classes([link.name for link in mechanism.links])
+    for joint in mechanism.joints:
+        if joint.kind == "weld":
+            classes.merge(joint.inner, joint.outer)
+    own = [mechanism.joints[k] for k in member.joints]
+    edges = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in own]
+    path = bridges_between(classes.find(mechanism.base), classes.find(mechanism.platform), edges)
+    rows: list[list[int]] = [[]]
+    for number, k in enumerate(path.bridges):
+        follows = number > 0 and bool(set(edges[k]) & set(edges[path.bridges[number - 1]]))
+        if not follows:
+            rows.append([])
+        if member.joints[k] in member.passive:
+            rows[-1].append(member.joints[k])
+        else:
+            rows.append([])
+    return rows
+
+
+def _meet(joints: Sequence[MechanismJoint], size: float) -> bool:
+    """Return whether the axes of hinges meet in one point."""
+    if any(joint.kind != "R" for joint in joints):
+        return False
+    one, other = joints[0], joints[1]
+    normal = np.cross(one.axis, other.axis)
+    if float(np.linalg.norm(normal)) < _MEET:
+        return False
+    along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
+    point = one.point + along * one.axis
+    apart = [float(np.linalg.norm(np.cross(point - joint.point, joint.axis))) for joint in joints]
+    return max(apart) < _MEET * size

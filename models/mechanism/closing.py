@@ -1,0 +1,288 @@
+"""A mechanism with closed loops at a pose of its platform, at positions of its actuators, or at both.
+
+From the stated configuration, pose and actuators move along a straight line to those wanted. At each step Newton's
+method with damped least-norm steps and a line search closes the loops. Steps are halved where it does not converge, or
+where a joint moves farther than a step should.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .graph import Mechanism, MechanismError, MechanismJoint, MechanismLink
+from .motions import Coordinates, Equations, Motions, Placed, moved, rotation_matrix, rotation_vector
+
+#: First and shortest step of the path, as parts of its length.
+_FIRST = 1 / 8
+_SHORTEST = 1 / 1024
+#: Largest number of Newton steps, and of halvings of one, at each point of the path.
+_STEPS = 40
+_HALVINGS = 12
+#: Steps that leave more than this part of the residual lead nowhere: no solution is near.
+_STUCK = 0.999
+#: Loops are closed where no residual, of order 1, is above this: rounding of 60 joints in a row leaves 1e-14.
+CLOSED = 1e-11
+#: Newton's method goes on until the residual is below this, or no longer falls.
+_EXACT = 2e-16
+#: Singular values of the derivatives below this part of the largest are zero: those of dependent loops, and of rods
+#: that turn about themselves, are rounding errors.
+_ZERO = 1e-9
+#: Largest change of a coordinate of order 1 in a step: a larger one may be a jump to another assembly.
+_LARGE = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedMechanism:
+    """A mechanism whose loops are closed.
+
+    Attributes:
+        mechanism: at the configuration found; places, axes and ranges of its joints are stated there.
+        coordinates: of each joint R, P and H, counted from the configuration at the start, radians or length.
+        residual: largest error of a loop, radians or parts of the mechanism's size.
+        nearness: smallest singular value of the loops' derivatives on the path, as a part of that at its start. Values
+            that are zero on the whole path do not count. Near 0, the path comes close to a singularity of the joints.
+        points: number of closed configurations on the path.
+    """
+
+    mechanism: Mechanism
+    coordinates: Mapping[str, float]
+    residual: float
+    nearness: float
+    points: int
+
+
+def close(
+    mechanism: Mechanism,
+    *,
+    position: FloatArray | None = None,
+    rotation: FloatArray | None = None,
+    actuators: Mapping[str, float] | None = None,
+) -> ClosedMechanism:
+    """Return a mechanism with its loops closed, from the stated configuration on.
+
+    Args:
+        mechanism: the mechanism.
+        position: (3,) origin of the platform's frame in the world, length; None to leave the pose open.
+        rotation: (3, 3) of the platform's frame in the world; None for that of the stated configuration.
+        actuators: coordinates of joints by name, radians or length from the stated configuration. Joints that are not
+            named move as the loops need; without a pose, actuators that are not named stay.
+
+    Raises:
+        MechanismError: a name is unknown, or the loops do not close there.
+    """
+    motions = Motions(mechanism)
+    wanted = dict(actuators or {})
+    _check_wanted(mechanism, wanted)
+    if position is None and rotation is None:
+        wanted = {joint.name: 0.0 for joint in mechanism.joints if joint.actuated} | wanted
+    held = {motions.column(name): value / motions.units[motions.column(name)] for name, value in wanted.items()}
+    pose = None if position is None and rotation is None else _pose_path(mechanism, position, rotation)
+    path = _Path(motions, held, pose)
+    at, values = path.closed(motions.stated, 0.0)
+    if at is None:
+        raise MechanismError("", f"its loops are open by {values[0]:.3g} as stated, and could not be closed near there")
+    spectra = [values]
+    done, step = 0.0, 1.0 if pose is None and not any(held.values()) else _FIRST
+    while done < 1.0:
+        part = min(1.0, done + step)
+        found, values = path.closed(at, part)
+        change = np.inf if found is None else float(np.abs(found.values - at.values).max(initial=0.0))
+        if change > _LARGE and part - done > _SHORTEST:
+            step = (part - done) / 2
+            continue
+        if found is None:
+            fault = f"its loops do not close at the pose or actuators wanted: after {100 * done:.0f} % of the way there"
+            raise MechanismError("", f"{fault} they stay open by {values[0]:.3g}")
+        at, done, step = found, part, 2 * step
+        spectra.append(values)
+    placed = motions.placed(at)
+    residual, _ = path.equations(at, placed, 1.0)
+    values = at.values * motions.units
+    coordinates = {
+        joint.name: float(values[motions.columns[k]][0])
+        for k, joint in enumerate(mechanism.joints)
+        if joint.kind in ("R", "P", "H")
+    }
+    largest = float(np.abs(residual).max(initial=0.0))
+    return ClosedMechanism(
+        _placed(mechanism, placed, coordinates), coordinates, largest, _nearness(spectra), len(spectra)
+    )
+
+
+def closed_nearby(mechanism: Mechanism, motions: Motions, step: FloatArray) -> Mechanism | None:
+    """Return a mechanism with its loops closed near coordinates that open them; None where they do not close.
+
+    Args:
+        mechanism: the mechanism.
+        motions: its motions.
+        step: (n,) coordinates of order 1, from the stated configuration.
+    """
+    path = _Path(motions, {}, None)
+    start = motions.stepped(motions.stated, step, motions.placed(motions.stated))
+    at, _ = path.closed(start, 1.0)
+    if at is None:
+        return None
+    placed, values = motions.placed(at), at.values * motions.units
+    coordinates = {
+        joint.name: float(values[motions.columns[k]][0])
+        for k, joint in enumerate(mechanism.joints)
+        if joint.kind in ("R", "P", "H")
+    }
+    return _placed(mechanism, placed, coordinates)
+
+
+class _Path:
+    """The equations along a path: loops, couplings, and the platform's pose.
+
+    Args:
+        motions: of the mechanism.
+        held: values of coordinates at the end of the path, of order 1, by column.
+        pose: of the platform as a function of the part of the path; None where it is open.
+    """
+
+    def __init__(self, motions: Motions, held: Mapping[int, float], pose: _Pose | None) -> None:
+        self._motions, self._held, self._pose = motions, dict(held), pose
+        self._free = np.array([k for k in range(motions.count) if k not in held], dtype=np.intp)
+        couplings = motions.mechanism.couplings
+        self._couplings = np.zeros((len(couplings), motions.count))
+        for row, coupling in enumerate(couplings):
+            for name, factor in coupling.factors:
+                column = motions.column(name)
+                self._couplings[row, column] = factor * motions.units[column]
+            self._couplings[row] /= np.abs(self._couplings[row]).max()
+
+    def equations(self, at: Coordinates, placed: Placed, part: float) -> Equations:
+        """Return the equations at a part of the path."""
+        residual, slopes = self._motions.loops(placed)
+        rows, derivatives = [residual, self._couplings @ at.values], [slopes, self._couplings]
+        if self._pose is not None:
+            own = self._motions.towards(placed, self._motions.mechanism.platform, self._pose.at(part))
+            rows.append(own[0])
+            derivatives.append(own[1])
+        return Equations(np.concatenate(rows), np.vstack(derivatives))
+
+    def closed(self, at: Coordinates, part: float) -> tuple[Coordinates | None, FloatArray]:
+        """Return the coordinates at which the loops are closed, near others.
+
+        Returns:
+            The coordinates, or None; then the singular values of the derivatives, or the residual that is left.
+        """
+        values = at.values.copy()
+        for column, value in self._held.items():
+            values[column] = part * value
+        found, residual, slopes = self._reduced(Coordinates(values, at.balls), part)
+        if part < 1.0 and self._pose is not None and not _is_closed(residual):
+            # A robot with fewer than six freedoms leaves the straight path: the loops alone close near it.
+            found, residual, slopes = _Path(self._motions, self._held, None)._reduced(found, part)
+        if not _is_closed(residual):
+            return None, np.array([float(np.abs(residual).max())])
+        count = 6 * len(self._motions.tree.chords) + len(self._couplings)
+        singular = np.linalg.svd(slopes[:count, self._free], compute_uv=False)
+        return found, np.asarray(singular, dtype=np.float64)
+
+    def _reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
+        """Return the coordinates of least residual near others, with the residual and its derivatives."""
+        motions, free = self._motions, self._free
+        placed = motions.placed(at)
+        residual, slopes = self.equations(at, placed, part)
+        error = float(np.linalg.norm(residual))
+        for _ in range(_STEPS):
+            if error <= _EXACT:
+                break
+            left, singular, right = np.linalg.svd(slopes[:, free], full_matrices=False)
+            # Damping by the squared residual keeps dependent loops, whose smallest singular values are of the order of
+            # the residual, from asking for large steps, and vanishes fast enough for quadratic convergence.
+            weights = singular / (singular**2 + error**2)
+            weights[singular <= _ZERO * singular.max(initial=0.0)] = 0.0
+            step = np.zeros(motions.count)
+            step[free] = -right.T @ (weights * (left.T @ residual))
+            for halving in range(_HALVINGS):
+                trial = motions.stepped(at, step / 2**halving, placed)
+                there = motions.placed(trial)
+                values, derivatives = self.equations(trial, there, part)
+                if float(np.linalg.norm(values)) < error:
+                    break
+            else:
+                break
+            is_stuck = float(np.linalg.norm(values)) > _STUCK * error > CLOSED
+            at, placed, residual, slopes = trial, there, values, derivatives
+            error = float(np.linalg.norm(residual))
+            if is_stuck:
+                break
+        return at, residual, slopes
+
+
+def _is_closed(residual: FloatArray) -> bool:
+    """Return whether equations hold."""
+    return float(np.abs(residual).max(initial=0.0)) <= CLOSED
+
+
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """A straight path of the platform: displacement (4, 4) from the stated configuration, at a part of the way."""
+
+    start: FloatArray
+    shift: FloatArray
+    turn: FloatArray
+
+    def at(self, part: float) -> FloatArray:
+        found = np.eye(4)
+        found[:3, :3] = rotation_matrix(part * self.turn)
+        found[:3, 3] = self.start + part * self.shift - found[:3, :3] @ self.start
+        return found
+
+
+def _pose_path(mechanism: Mechanism, position: FloatArray | None, rotation: FloatArray | None) -> _Pose:
+    """Return the path of the platform from the stated pose to another one."""
+    link = next(each for each in mechanism.links if each.name == mechanism.platform)
+    shift = np.zeros(3) if position is None else np.asarray(position, dtype=np.float64) - link.position
+    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64) @ link.rotation.T
+    return _Pose(link.position, shift, rotation_vector(turn))
+
+
+def _check_wanted(mechanism: Mechanism, wanted: Mapping[str, float]) -> None:
+    """Refuse coordinates of joints that are unknown or have none."""
+    kinds = {joint.name: joint.kind for joint in mechanism.joints}
+    for name in wanted:
+        if kinds.get(name) not in ("R", "P", "H"):
+            known = ", ".join(joint.name for joint in mechanism.joints if joint.actuated)
+            raise MechanismError(f"joint {name}", f"has no coordinate that can be given; actuated joints are {known}")
+
+
+def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, float]) -> Mechanism:
+    """Return a mechanism that is stated at another configuration of it."""
+
+    def link(each: MechanismLink) -> MechanismLink:
+        there = placed.displacements[each.name]
+        return replace(each, position=moved(there, each.position), rotation=there[:3, :3] @ each.rotation)
+
+    def joint(each: MechanismJoint) -> MechanismJoint:
+        # A slide or screw carries its point on the outer link, which is the platform's side of limbs.
+        there = placed.displacements[each.outer]
+        limits = each.range
+        if limits is not None:
+            limits = limits[0] - coordinates.get(each.name, 0.0), limits[1] - coordinates.get(each.name, 0.0)
+        outer = each.point if each.outer_point is None else each.outer_point
+        point, axis = moved(there, outer), there[:3, :3] @ each.axis
+        return replace(each, point=point, axis=axis, range=limits, outer_point=None)
+
+    return replace(
+        mechanism,
+        links=tuple(link(each) for each in mechanism.links),
+        joints=tuple(joint(each) for each in mechanism.joints),
+    )
+
+
+def _nearness(spectra: list[FloatArray]) -> float:
+    """Return the smallest singular value on a path, as a part of that at its start; values that stay zero left out."""
+    if not spectra[0].size:
+        return 1.0
+    rank = max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra)
+    if rank == 0:
+        return 1.0
+    smallest = [float(each[rank - 1]) for each in spectra]
+    return min(smallest) / smallest[0] if smallest[0] > _ZERO * spectra[0][0] else 0.0

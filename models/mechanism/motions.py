@@ -1,0 +1,238 @@
+"""Places and screws of all links and joints of a mechanism at any values of its joints' coordinates.
+
+Links are placed along a spanning tree from the base. A joint that is not in the tree closes a loop: its residual is the
+displacement that is missing between its two links. Angles are in radians and lengths in parts of the mechanism's size,
+so that residuals and coordinates are of order 1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..rotation import axis_angle_from_matrix
+from .graph import ElementaryKind, Mechanism, MechanismJoint
+from .topology import spanning_tree
+
+#: Number of coordinates of a joint of each kind. Those of a spherical joint are steps of a rotation, which is kept as a
+#: matrix: three angles would have singular values.
+WIDTHS: dict[ElementaryKind, int] = {"R": 1, "P": 1, "H": 1, "S": 3, "weld": 0}
+
+
+def rotation_matrix(vector: FloatArray) -> FloatArray:
+    """Return the rotation matrix (3, 3) of a rotation vector (3,), radians."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+
+
+def rotation_vector(matrix: FloatArray) -> FloatArray:
+    """Return the rotation vector (3,), radians, of a rotation matrix (3, 3)."""
+    axis, angle = axis_angle_from_matrix(matrix)
+    return axis * angle
+
+
+def size_of(mechanism: Mechanism) -> float:
+    """Return a length of the order of a mechanism's: the largest extent of its joints; 1 where all are at one point."""
+    points = np.array([joint.point for joint in mechanism.joints if joint.kind != "weld"]).reshape(-1, 3)
+    return float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0 if len(points) else 1.0
+
+
+def about(rotation: FloatArray, point: FloatArray, shift: FloatArray) -> FloatArray:
+    """Return the displacement (4, 4) that turns about a point (3,) and then shifts."""
+    found = np.eye(4)
+    found[:3, :3], found[:3, 3] = rotation, point - rotation @ point + shift
+    return found
+
+
+def moved(displacement: FloatArray, point: FloatArray) -> FloatArray:
+    """Return where a displacement (4, 4) takes a point (3,)."""
+    return np.asarray(displacement[:3, :3] @ point + displacement[:3, 3])
+
+
+def inverse(displacement: FloatArray) -> FloatArray:
+    """Return the displacement (4, 4) back."""
+    found = np.eye(4)
+    found[:3, :3] = displacement[:3, :3].T
+    found[:3, 3] = -displacement[:3, :3].T @ displacement[:3, 3]
+    return found
+
+
+class Coordinates(NamedTuple):
+    """Values of all joints' coordinates.
+
+    Attributes:
+        values: (n,) by column; radians and lengths in parts of the mechanism's size; 0 for those of spherical joints.
+        balls: (3, 3) rotation of each spherical joint, by the joint's index.
+    """
+
+    values: FloatArray
+    balls: dict[int, FloatArray]
+
+
+class Equations(NamedTuple):
+    """Equations of a mechanism at some coordinates.
+
+    Attributes:
+        residual: (m,) left sides, which are zero where they hold, of order 1.
+        slopes: (m, n) their derivatives by coordinates of order 1, exact where they hold.
+    """
+
+    residual: FloatArray
+    slopes: FloatArray
+
+
+class Placed(NamedTuple):
+    """A mechanism at some coordinates.
+
+    Attributes:
+        displacements: (4, 4) of each link from the stated configuration, by name.
+        joints: (4, 4) of each joint's own displacement at its coordinates.
+        screws: (6, k) current unit screws of each joint's axes as twists, the world's origin as reference.
+        twists: (6, n) twist of each link for unit rates of the coordinates of the tree, by name.
+    """
+
+    displacements: dict[str, FloatArray]
+    joints: list[FloatArray]
+    screws: list[FloatArray]
+    twists: dict[str, FloatArray]
+
+
+def joint_screws(joint: MechanismJoint, rotation: FloatArray, point: FloatArray) -> FloatArray:
+    """Return the unit screws (6, k) of a joint's axes as twists.
+
+    Args:
+        joint: the joint.
+        rotation: (3, 3) of the inner link from the configuration in which the joint states its axis.
+        point: (3,) current place of the joint, length.
+    """
+    if joint.kind == "weld":
+        return np.zeros((6, 0))
+    if joint.kind == "S":
+        return np.vstack([np.eye(3), np.cross(point, np.eye(3)).T])
+    axis = rotation @ joint.axis
+    if joint.kind == "P":
+        return np.concatenate([np.zeros(3), axis])[:, None]
+    pitch = joint.pitch if joint.kind == "H" else 0.0
+    return np.concatenate([axis, np.cross(point, axis) + pitch * axis])[:, None]
+
+
+class Motions:
+    """Motions of a mechanism along a spanning tree from its base.
+
+    Args:
+        mechanism: the mechanism.
+
+    Attributes:
+        columns: slice of the coordinates of each joint.
+        count: number of coordinates.
+        size: length that coordinates and residuals are parts of.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.size = mechanism, size_of(mechanism)
+        edges = [(joint.inner, joint.outer) for joint in mechanism.joints]
+        widths = [WIDTHS[joint.kind] for joint in mechanism.joints]
+        self.tree = spanning_tree([mechanism.base], edges, lambda k: widths[k])
+        ends = np.cumsum([0, *widths])
+        self.columns = [slice(int(ends[k]), int(ends[k + 1])) for k in range(len(widths))]
+        self.count = int(ends[-1])
+        self._index = {joint.name: k for k, joint in enumerate(mechanism.joints)}
+        unit = [
+            self.size if joint.kind == "P" else 1.0 for joint in mechanism.joints for _ in range(WIDTHS[joint.kind])
+        ]
+        #: (n,) coordinates of order 1 times this are radians and lengths.
+        self.units = np.array(unit)
+
+    @property
+    def stated(self) -> Coordinates:
+        """The coordinates at the stated configuration."""
+        balls = {k: np.eye(3) for k, joint in enumerate(self.mechanism.joints) if joint.kind == "S"}
+        return Coordinates(np.zeros(self.count), balls)
+
+    def column(self, joint: str) -> int:
+        """Return the column of the coordinate of a joint R, P or H."""
+        return self.columns[self._index[joint]].start
+
+    def placed(self, at: Coordinates) -> Placed:
+        """Return all links and joints at some coordinates."""
+        joints = self.mechanism.joints
+        own = [self._own_motion(k, at) for k in range(len(joints))]
+        displacements = {self.mechanism.base: np.eye(4)}
+        twists = {self.mechanism.base: np.zeros((6, self.count))}
+        screws: list[FloatArray] = [np.zeros((6, 0))] * len(joints)
+        for k, parent, child in self.tree.branches:
+            outward = joints[k].inner == parent
+            displacements[child] = displacements[parent] @ (own[k] if outward else inverse(own[k]))
+            screws[k] = self._screws(k, displacements)
+            twist = twists[parent].copy()
+            twist[:, self.columns[k]] += screws[k] if outward else -screws[k]
+            twists[child] = twist
+        for k in self.tree.chords:
+            screws[k] = self._screws(k, displacements)
+        return Placed(displacements, own, screws, twists)
+
+    def loops(self, placed: Placed) -> Equations:
+        """Return the missing rotation vector and displacement of each of the c joints that close a loop."""
+        residuals, slopes = [np.zeros(0)], [np.zeros((0, self.count))]
+        for k in self.tree.chords:
+            joint = self.mechanism.joints[k]
+            inner, outer = placed.displacements[joint.inner], placed.displacements[joint.outer]
+            relative = placed.twists[joint.outer] - placed.twists[joint.inner]
+            relative[:, self.columns[k]] -= placed.screws[k]
+            point = moved(inner @ placed.joints[k], joint.point if joint.outer_point is None else joint.outer_point)
+            residuals.append(self._mismatch(outer @ inverse(inner @ placed.joints[k]), point))
+            slopes.append(self.at_point(relative, point))
+        return Equations(np.concatenate(residuals), np.vstack(slopes))
+
+    def towards(self, placed: Placed, link: str, target: FloatArray) -> Equations:
+        """Return how far a link is from a displacement (4, 4), as :meth:`loops` does."""
+        origin = next(each.position for each in self.mechanism.links if each.name == link)
+        residual = self._mismatch(placed.displacements[link] @ inverse(target), moved(target, origin))
+        return Equations(residual, self.at_point(placed.twists[link], moved(target, origin)))
+
+    def stepped(self, at: Coordinates, step: FloatArray, placed: Placed) -> Coordinates:
+        """Return coordinates after a step (n,)."""
+        balls = {}
+        for k, ball in at.balls.items():
+            inner = placed.displacements[self.mechanism.joints[k].inner][:3, :3]
+            balls[k] = inner.T @ rotation_matrix(step[self.columns[k]]) @ inner @ ball
+        values = at.values + step
+        for k in at.balls:
+            values[self.columns[k]] = 0.0
+        return Coordinates(values, balls)
+
+    def at_point(self, twists: FloatArray, point: FloatArray) -> FloatArray:
+        """Return twists (6, n) with the velocities of a point in parts of the size, for coordinates of order 1."""
+        velocities = twists[3:] + np.cross(twists[:3].T, point).T
+        return np.asarray(np.vstack([twists[:3], velocities / self.size]) * self.units)
+
+    def _mismatch(self, displacement: FloatArray, point: FloatArray) -> FloatArray:
+        """Return a displacement (4, 4) as rotation vector and shift of a point in parts of the size, (6,)."""
+        turn = rotation_vector(displacement[:3, :3])
+        return np.concatenate([turn, (moved(displacement, point) - point) / self.size])
+
+    def _own_motion(self, k: int, at: Coordinates) -> FloatArray:
+        """Return the displacement (4, 4) of a joint's outer link at the stated configuration of its inner one."""
+        joint, value = self.mechanism.joints[k], at.values[self.columns[k]]
+        outer = joint.point if joint.outer_point is None else joint.outer_point
+        turn, shift = np.eye(3), joint.point - outer
+        if joint.kind == "S":
+            turn = at.balls[k]
+        elif joint.kind == "P":
+            shift = shift + self.size * float(value[0]) * joint.axis
+        elif joint.kind in ("R", "H"):
+            angle = float(value[0])
+            turn = rotation_matrix(angle * joint.axis)
+            shift = shift + (joint.pitch * angle * joint.axis if joint.kind == "H" else 0.0)
+        return about(turn, outer, shift)
+
+    def _screws(self, k: int, displacements: dict[str, FloatArray]) -> FloatArray:
+        joint = self.mechanism.joints[k]
+        inner = displacements[joint.inner]
+        return joint_screws(joint, inner[:3, :3], moved(inner, joint.point))

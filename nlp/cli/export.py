@@ -1,0 +1,78 @@
+"""The command ``export``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .numbers import WholeNumber
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings
+
+
+def export(
+    case: CaseName,
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
+    formats: Annotated[
+        list[str], typer.Option("--format", metavar="NAME", help="mjcf, urdf, csv, dxf or all; may be repeated.")
+    ],
+    settings: SettingTexts = None,
+    of: Annotated[
+        str | None, typer.Option("--of", metavar="FILE", help="Result that --json wrote, instead of solving again.")
+    ] = None,
+    pose: Annotated[
+        int, typer.Option(parser=WholeNumber("--pose", 1), metavar="N", help="Pose, where the case has several.")
+    ] = 1,
+    starts: Starts = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
+) -> None:
+    """Write the solved robot as MJCF, URDF, CSV or DXF.
+
+    A case with nothing free is taken as it is, and one with a result as the result states it.
+    """
+    from ..case.reader import read_case
+    from ..errors import one_line
+    from ..exchange.export import check_pose, check_same_robot, files_at, fixed_point, is_assembled
+    from ..exchange.writing.folder import check_formats
+    from ..output.files import check_folder, check_outputs, write_folder
+    from .progress import solve_with_progress
+
+    chosen = check_formats(formats)
+    if not force:
+        check_folder(out)
+    fixings = read_settings(settings)
+    loaded, _, inputs = read_case(case, fixings)
+    jacobian = None
+    if of is not None:
+        import numpy as np
+
+        from ..results.reading import load_result
+        from ..results.settings import robot_of, settings_of
+
+        robot = robot_of(load_result(of), of, loaded)
+        jacobian = np.array(robot.jacobian)
+        loaded, _, inputs = read_case(case, {**fixings, **settings_of(robot, loaded)})
+    loaded = replace(loaded, search=loaded.search.but(starts, seed))
+    check_pose(loaded, pose)
+    fixed = fixed_point(loaded)
+    if fixed is None:
+        solution = solve_with_progress(loaded, jobs).solution
+        nlp, x = solution.outcomes[0].own.nlp, solution.x
+        fault = "" if solution.status.is_answer else f"the solve is {solution.status.value}"
+    else:
+        nlp, x = fixed
+        fault = "" if is_assembled(nlp, x) else "the robot's loops do not close there"
+        if jacobian is not None and not fault:
+            check_same_robot(nlp, x, jacobian)
+    if fault:
+        typer.echo(f"screwsynth: {one_line(case)}: {fault}: nothing is exported", err=True)
+        raise typer.Exit(1)
+    files = files_at(nlp, x, chosen, pose)
+    for name in files if Path(out).is_dir() else ():
+        check_outputs(inputs, {"--out": str(Path(out) / name)})
+    write_folder(out, files, force=force)
+    typer.echo(f"{len(files)} files in {one_line(out)}: {', '.join(files)}")

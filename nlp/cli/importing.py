@@ -1,0 +1,85 @@
+"""The command ``import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from .options import console
+
+
+class SeveralValues(TyperCommand):
+    """A command whose options ``--actuated`` and ``--free`` take every value up to the next option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
+        """Write the option again before each further value, and read the arguments."""
+        written: list[str] = []
+        option, is_first = "", False
+        for word in args:
+            if word.startswith("-") and word != "-":
+                option, is_first = (word, True) if word in ("--actuated", "--free") else ("", False)
+                written.append(word)
+            elif option and not is_first:
+                written += [option, word]
+            else:
+                written.append(word)
+                is_first = False
+        return super().parse_args(ctx, written)
+
+
+def import_(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A model in MJCF (.xml) or URDF.")],
+    platform: Annotated[str, typer.Option(metavar="BODY", help="Body, link or site that is the platform.")] = "",
+    base: Annotated[str, typer.Option(metavar="BODY", help="Body that is the base; else the fixed root.")] = "",
+    actuated: Annotated[
+        list[str] | None, typer.Option(metavar="JOINT...", help="Driven joints, instead of those of the model.")
+    ] = None,
+    out: Annotated[str | None, typer.Option(metavar="FILE", help="Robot file to write; - is stdout.")] = None,
+    close: Annotated[bool, typer.Option("--close", help="Close open loops by Newton's method.")] = False,
+    loops: Annotated[
+        str | None, typer.Option(metavar="YAML", help="Loops of a URDF, instead of the .yaml file beside it.")
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME...", help="Make a joint's place, JOINT.axis, or a suggestion a dimension."),
+    ] = None,
+    suggest: Annotated[bool, typer.Option("--suggest", help="List circles and symmetries, for --free.")] = False,
+) -> None:
+    """Read a robot with closed loops from MJCF or URDF.
+
+    The robot file has the model's numbers; its joints have the model's names. FILE stands before --actuated and --free.
+    """
+    from ..errors import InputError, one_line
+    from ..exchange.reading.importing import Request, import_robot
+    from ..exchange.reading.reduction import Ends
+    from ..exchange.reading.robotfile import robot_file
+    from ..exchange.reading.symmetry import offers_of
+    from ..exchange.reading.words import offer_lines, summary_lines
+    from ..output.files import check_outputs, write_text
+    from ..output.terminal import show
+    from ..results.text import Line, Tone
+
+    if not platform:
+        raise InputError("--platform: is missing: name the body that is the platform")
+    if out is None and not suggest:
+        raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
+    inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}
+    check_outputs(inputs, {"--out": out})
+    ends = Ends(platform, base, tuple(actuated or ()))
+    found = import_robot(Request(Path(file), ends, close, None if loops is None else Path(loops)))
+    lines = list(summary_lines(found))
+    offers = offers_of(found.tables, found.size) if suggest or free else None
+    if suggest and offers is not None:
+        lines += offer_lines(offers, found.size)
+    if out is not None:
+        written = robot_file(found, Path(file).name, free or [], offers)
+        lines += written.lines
+        write_text(out, written.text)
+    if out != "-":
+        title = Line(found.mechanism.name, tone=Tone.TITLE)
+        show(console(), [title, *(Line(text, label=label) for label, text in lines)])
+        if out is not None:
+            typer.echo(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')

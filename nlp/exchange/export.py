@@ -1,0 +1,111 @@
+"""The files of a solved case for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...models import FloatArray
+from ...models.mechanism import MechanismError
+from ..case.case import Case
+from ..case.pose import Free
+from ..errors import InputError
+from ..evidence.closing import closed_start
+from ..evidence.state import evaluate, loops_are_closed
+from ..program.formulation import formulate
+from ..program.nlp import Nlp
+from .solved.mechanism_of import mechanism_of
+from .writing.folder import check_formats, exported_files
+
+#: Largest difference of the Jacobian of a result from that of its numbers, in parts of its largest entry: results are
+#: closed to the solver's accuracy, and another assembly of the joints differs by parts of 1.
+_SAME = 1e-6
+
+if TYPE_CHECKING:
+    from ..solver.solution import Solution
+
+
+def export_robot(solution: Solution, formats: Collection[str] = ("all",), *, pose: int = 1) -> dict[str, str]:
+    """Return the files of a solved robot for other programs, as text by file name.
+
+    Args:
+        solution: the answer to a case.
+        formats: ``mjcf``, ``urdf``, ``csv`` and ``dxf``, any of them; or ``all``.
+        pose: number of the pose, from 1.
+
+    Returns:
+        The texts, with a ``README.md`` of frames, units and choices. Lengths are in the unit of the case.
+
+    Raises:
+        InputError: the solve gave no answer, the case has no such pose, there is no such format, the joints of the
+            robot's limbs are not known, or ``dxf`` is asked for and ezdxf is not installed.
+        EvaluationError: a loop of the robot is open.
+    """
+    check_formats(formats)
+    check_pose(solution.case, pose)
+    if not solution.status.is_answer:
+        raise InputError(f"the solve of {solution.case.name!r} is {solution.status.value}: there is nothing to export")
+    return files_at(solution.outcomes[0].own.nlp, solution.x, formats, pose)
+
+
+def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> dict[str, str]:
+    """Return the files of the robot at a point of its program; the rest is as for :func:`export_robot`.
+
+    Args:
+        nlp: the program of a task.
+        x: (n,) the point.
+        formats: as for :func:`export_robot`.
+        pose: as for :func:`export_robot`.
+
+    Raises:
+        InputError: the joints of the robot's limbs are not known, or a format needs more than the robot has.
+        EvaluationError: a loop of the robot is open.
+    """
+    try:
+        return exported_files(mechanism_of(nlp, x, pose), formats)
+    except MechanismError as error:
+        raise InputError(f"robot {nlp.program.model.name!r} cannot be exported: {error}") from None
+
+
+def fixed_point(case: Case) -> tuple[Nlp, FloatArray] | None:
+    """Return the program of the first task and its point where nothing of a case is free; None where something is."""
+    values = [value for name in case.parameters for value in case.components(name)]
+    values += [value for pose in case.poses for value in (*pose.position, pose.rotation.angle)]
+    if any(isinstance(value, Free) for value in values):
+        return None
+    nlp = formulate(case)
+    return nlp, closed_start(nlp)
+
+
+def is_assembled(nlp: Nlp, x: FloatArray) -> bool:
+    """Return whether the loops of the robot are closed at a point (n,)."""
+    return loops_are_closed(nlp, x)
+
+
+def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
+    """Refuse a point whose Jacobian is not that of a result.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        jacobian: (m, 6) of the result, at the first pose.
+
+    Raises:
+        InputError: the same numbers give another Jacobian.
+    """
+    J = evaluate(nlp, x).jacobian
+    if J.shape != jacobian.shape or not np.abs(J - jacobian).max() <= _SAME * np.abs(jacobian).max():
+        fault = "another assembly of its joints than the path from home leads to, or of another version of the case"
+        raise InputError(f"the result is of {fault}: export the case without it")
+
+
+def check_pose(case: Case, pose: int) -> None:
+    """Refuse a pose that a case does not have.
+
+    Raises:
+        InputError: the case has fewer poses.
+    """
+    if not 1 <= pose <= case.pose_count:
+        raise InputError(f"--pose {pose}: the case has {case.pose_count} pose{'s' * (case.pose_count > 1)}")

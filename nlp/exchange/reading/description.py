@@ -1,0 +1,148 @@
+"""A robot as both formats state it: a tree of bodies with joints, and loops that equations close."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+from ....models.mechanism import Coupling
+from ....models.mechanism.graph import ElementaryKind
+from .frames import Frame
+
+#: Largest coordinate, in the file's unit of length: beyond it, squares of distances lose what a loop is open by.
+LARGEST = 1e9
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body of the tree.
+
+    Attributes:
+        name: unique among the bodies.
+        parent: name of the body that it hangs on; empty for the root, and for one that floats freely.
+        place: its frame in the world, with all joints at their stated positions.
+    """
+
+    name: str
+    parent: str
+    place: Frame
+
+
+@dataclass(frozen=True, eq=False)
+class TreeJoint:
+    """The joint between a body and its parent, at its stated position.
+
+    Attributes:
+        name: unique among the joints.
+        kind: ``R``, ``P``, ``S`` or ``weld``.
+        body: name of the body that it moves; its parent is the other one.
+        point: (3,) its centre or a point of its axis, in the world.
+        axis: (3,) unit direction of its axis in the world; zero for ``S`` and ``weld``.
+        range: smallest and largest coordinate, counted from the stated position; None for no limit.
+    """
+
+    name: str
+    kind: ElementaryKind
+    body: str
+    point: FloatArray
+    axis: FloatArray
+    range: tuple[float, float] | None = None
+
+
+class Closing(Enum):
+    """The joint that closes a loop, with z as its axis in both frames."""
+
+    BALL = "ball"
+    WELD = "weld"
+    HINGE = "hinge"
+    SLIDE = "slide"
+    CYLINDER = "cylinder"
+    UNIVERSAL = "universal"
+
+
+@dataclass(frozen=True, eq=False)
+class LoopClosure:
+    """A joint that closes a loop, with a frame on each of its bodies, in the body's own frame.
+
+    The two frames coincide where the loop is closed, but for the freedom of the joint. The axis of a hinge, slide or
+    cylinder is z of both frames. A universal joint has its first axis along z of the first frame, its second along z
+    of the other; at the stated configuration they have the angle that they keep.
+
+    Attributes:
+        name: unique among joints and closures.
+        closing: its kind.
+        first: name of the body on one side.
+        second: name of the other body.
+        first_frame: frame on the first body.
+        second_frame: frame on the second body.
+    """
+
+    name: str
+    closing: Closing
+    first: str
+    second: str
+    first_frame: Frame
+    second_frame: Frame
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A robot as a file states it.
+
+    Attributes:
+        name: of the robot.
+        source: name of the file, for messages.
+        root: name of the fixed body.
+        bodies: parents before children.
+        joints: at most one for each body; one that floats freely has none.
+        closures: joints that close loops.
+        couplings: linear relations of joint coordinates.
+        driven: names of the joints with an actuator.
+        frames: named places on bodies, as name of the body and the frame in it.
+        notes: sentences about what was left out or assumed.
+    """
+
+    name: str
+    source: str
+    root: str
+    bodies: tuple[Body, ...]
+    joints: tuple[TreeJoint, ...]
+    closures: tuple[LoopClosure, ...]
+    couplings: tuple[Coupling, ...] = ()
+    driven: frozenset[str] = frozenset()
+    frames: Mapping[str, tuple[str, Frame]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def place_of(self, name: str) -> Frame:
+        """Return the place of a body in the world."""
+        return next(body.place for body in self.bodies if body.name == name)
+
+
+def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
+    """Return a frame at a point (3,) with z along an axis (3,) of any length but zero."""
+    z = axis / np.linalg.norm(axis)
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return Frame(point, np.column_stack([x, np.cross(z, x), z]))
+
+
+def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
+    """Return a name, with a number behind it where it is taken."""
+    name, number = wanted, 2
+    while name in taken:
+        name, number = f"{wanted}_{number}", number + 1
+    return name
+
+
+def common_name(names: Sequence[str]) -> str:
+    """Return the common beginning of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
+    common = names[0]
+    for name in names[1:]:
+        common = common[: next((k for k, (a, b) in enumerate(zip(common, name, strict=False)) if a != b), len(common))]
+        common = common[: len(name)]
+    return common.rstrip("_-. ")

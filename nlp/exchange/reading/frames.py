@@ -1,0 +1,78 @@
+"""Places of bodies: position and rotation, composed and inverted, and rotations from the words of URDF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+
+#: Rotation below which the axis of a small rotation is taken from its skew part alone, rad.
+_SMALL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A place of a body, or of a frame on it.
+
+    Attributes:
+        position: (3,) its origin, length.
+        rotation: (3, 3) its axes as columns.
+    """
+
+    position: FloatArray = field(default_factory=lambda: np.zeros(3))
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+
+    def __matmul__(self, inner: Frame) -> Frame:
+        """Return the place of a frame that is given in this one."""
+        return Frame(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+
+    def inverse(self) -> Frame:
+        """Return the place of the world in this frame."""
+        return Frame(-self.rotation.T @ self.position, self.rotation.T)
+
+
+def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
+    """Return the rotation (3, 3) about a unit axis (3,) by an angle in radians (Rodrigues)."""
+    K = cross_matrix(axis)
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
+
+
+def rotation_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> FloatArray:
+    """Return the rotation (3, 3) of URDF's ``rpy``, radians: about the fixed axes x, then y, then z."""
+    x, y, z = np.eye(3)
+    return rotation_about(z, yaw) @ rotation_about(y, pitch) @ rotation_about(x, roll)
+
+
+def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) of a quaternion (4,), real part first, of any length."""
+    w, *v = quaternion / np.linalg.norm(quaternion)
+    K = cross_matrix(np.array(v))
+    return np.asarray(np.eye(3) + 2 * w * K + 2 * K @ K)
+
+
+def rotation_vector(rotation: FloatArray) -> FloatArray:
+    """Return axis times angle (3,) of a rotation (3, 3), radians, angle from 0 to pi."""
+    skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    sine, cosine = float(np.linalg.norm(skew)) / 2, (float(np.trace(rotation)) - 1) / 2
+    angle = float(np.arctan2(sine, cosine))
+    if sine > _SMALL:
+        return np.asarray(skew / (2 * sine) * angle)
+    if cosine > 0:
+        return np.asarray(skew / 2)
+    column = (rotation + np.eye(3))[:, int(np.argmax(np.diag(rotation)))]
+    return np.asarray(column / np.linalg.norm(column) * angle)
+
+
+def cross_matrix(v: FloatArray) -> FloatArray:
+    """Return the matrix (3, 3) of the cross product with a vector (3,)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def perpendiculars(axis: FloatArray) -> FloatArray:
+    """Return two unit vectors (2, 3) perpendicular to a unit axis (3,) and to each other."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])

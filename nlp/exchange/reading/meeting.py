@@ -1,0 +1,195 @@
+"""Hinges that stand for one joint: several about one axis, and three through one point, which are a ball.
+
+What a limb carries depends on axes that meet exactly. Joints are replaced only where they do; axes that almost meet get
+a note.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+from ....models.mechanism import Mechanism, MechanismJoint
+from ...errors import listing
+from .description import common_name
+from .elements import SAME_POINT
+
+#: Axes whose distance, in parts of the robot's size, or whose sine is below this almost meet or are almost parallel:
+#: decimals that are typed with three digits are nearer.
+ALMOST = 1e-3
+#: Smallest volume that three unit axes span as a ball joint. Below it they are nearly in one plane, and the stated
+#: configuration is the singular one of a wrist.
+_FLAT = 1e-3
+#: Most names that a note lists.
+_MOST_NAMES = 12
+
+
+class Met(NamedTuple):
+    """A mechanism with hinges replaced.
+
+    Attributes:
+        mechanism: the mechanism.
+        notes: sentences about joints that were replaced, and about axes that almost meet.
+    """
+
+    mechanism: Mechanism
+    notes: tuple[str, ...]
+
+
+def with_meeting_joints(given: Mechanism, size: float) -> Met:
+    """Return a mechanism with passive hinges about one axis as one hinge, and three through one point as a ball.
+
+    Only hinges with nothing else between them are replaced, and none that a coupling names.
+
+    Args:
+        given: the mechanism.
+        size: of the robot.
+    """
+    hinges: list[str] = []
+    while (joined := _same_axis(given, size)) is not None:
+        given, words = joined
+        hinges.append(words)
+    balls: list[str] = []
+    while (joined := _ball(given, size)) is not None:
+        given, words = joined
+        balls.append(words)
+    notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
+    notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
+    return Met(given, (*notes, *_almost(given, size)))
+
+
+def _some(words: list[str]) -> str:
+    """Return the first of many words as a list."""
+    return listing(words[:_MOST_NAMES]) + (f" and {len(words) - _MOST_NAMES} more" if len(words) > _MOST_NAMES else "")
+
+
+def chains_of(given: Mechanism) -> list[list[MechanismJoint]]:
+    """Return the sequences of joints between links that have more than two joints, or are base or platform."""
+    own = _joints_of_links(given)
+    ends = {name for name, joints in own.items() if len(joints) != 2} | {given.base, given.platform}
+    found: list[list[MechanismJoint]] = []
+    seen: set[str] = set()
+    for link in [each.name for each in given.links if each.name in ends]:
+        for joint in own.get(link, []):
+            if joint.name in seen:
+                continue
+            chain, at, step = [joint], _other(joint, link), joint
+            seen.add(joint.name)
+            while at not in ends:
+                step = next(each for each in own[at] if each.name != step.name)
+                chain.append(step)
+                seen.add(step.name)
+                at = _other(step, at)
+            found.append(chain)
+    return found
+
+
+def axes_gap(one: MechanismJoint, other: MechanismJoint) -> tuple[float, float]:
+    """Return the distance of two axes, and the sine of their angle."""
+    normal = np.cross(one.axis, other.axis)
+    sine, apart = float(np.linalg.norm(normal)), other.point - one.point
+    if sine < ALMOST:
+        return float(np.linalg.norm(np.cross(one.axis, apart))), sine
+    return abs(float(apart @ normal)) / sine, sine
+
+
+def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
+    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
+    normal = np.cross(one.axis, other.axis)
+    way = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
+    return np.asarray(one.point + way * one.axis)
+
+
+def _joints_of_links(given: Mechanism) -> dict[str, list[MechanismJoint]]:
+    own: dict[str, list[MechanismJoint]] = {}
+    for joint in given.joints:
+        own.setdefault(joint.inner, []).append(joint)
+        own.setdefault(joint.outer, []).append(joint)
+    return own
+
+
+def _other(joint: MechanismJoint, link: str) -> str:
+    return joint.outer if joint.inner == link else joint.inner
+
+
+def _runs(given: Mechanism, length: int) -> list[list[MechanismJoint]]:
+    """Return all sequences of so many passive hinges that follow each other."""
+    coupled = {name for each in given.couplings for name, _ in each.factors}
+    found = []
+    for chain in chains_of(given):
+        for start in range(len(chain) - length + 1):
+            run = chain[start : start + length]
+            if all(each.kind == "R" and not each.actuated and each.name not in coupled for each in run):
+                found.append(run)
+    return found
+
+
+def _same_axis(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
+    """Return the mechanism with two hinges about one axis as one; None where there are none."""
+    for one, other in _runs(given, 2):
+        distance, sine = axes_gap(one, other)
+        if sine < SAME_POINT and distance < SAME_POINT * size:
+            merged = _replaced(given, [one, other], replace(one, range=None))
+            return merged, f"{one.name} with {other.name}"
+    return None
+
+
+def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
+    """Return the mechanism with three hinges through one point as a ball; None where there are none."""
+    for run in _runs(given, 3):
+        one, two, _ = run
+        if abs(float(np.linalg.det(np.array([each.axis for each in run])))) < _FLAT:
+            continue
+        point = meeting_point(one, two)
+        off = [np.linalg.norm(np.cross(each.axis, point - each.point)) for each in run]
+        if max(off) < SAME_POINT * size:
+            ball = replace(
+                one,
+                name=common_name([each.name for each in run]) or run[0].name,
+                kind="S",
+                point=point,
+                axis=np.zeros(3),
+                range=None,
+            )
+            return _replaced(given, run, ball), ball.name
+    return None
+
+
+def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint) -> Mechanism:
+    """Return a mechanism with one joint in the place of several that follow each other, without the links between."""
+    counts: dict[str, int] = {}
+    for each in run:
+        for link in (each.inner, each.outer):
+            counts[link] = counts.get(link, 0) + 1
+    inside = {link for link, count in counts.items() if count == 2}
+    inner, outer = (link for link, count in counts.items() if count == 1)
+    if run[0].inner == outer or run[-1].outer == inner:
+        inner, outer = outer, inner
+    # The axis of a hinge that was read from its other side is turned over, so that its coordinate keeps its sign.
+    turned = joint.kind == "R" and joint.inner != inner
+    new = replace(joint, inner=inner, outer=outer, axis=-joint.axis if turned else joint.axis)
+    names = {each.name for each in run}
+    first = next(each.name for each in given.joints if each.name in names)
+    return replace(
+        given,
+        links=tuple(each for each in given.links if each.name not in inside),
+        joints=tuple(
+            new if each.name == first else each for each in given.joints if each.name == first or each.name not in names
+        ),
+    )
+
+
+def _almost(given: Mechanism, size: float) -> list[str]:
+    """Return notes on passive hinges whose axes almost meet."""
+    notes = []
+    for one, other in _runs(given, 2):
+        distance, sine = axes_gap(one, other)
+        if sine >= ALMOST and SAME_POINT * size <= distance < ALMOST * size:
+            share = f"{distance / size:.1g}"
+            notes.append(f"the axes of {one.name} and {other.name} miss each other by {share} of the robot's size")
+        elif SAME_POINT <= sine < ALMOST:
+            notes.append(f"the axes of {one.name} and {other.name} are parallel but for {sine:.1g}")
+    return notes

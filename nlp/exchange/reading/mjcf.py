@@ -1,0 +1,222 @@
+"""Reader of MuJoCo's MJCF, through MuJoCo's own parser."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+
+from ....models.mechanism import Coupling
+from ...errors import InputError
+from .description import Body, Closing, Description, LoopClosure, TreeJoint, common_name, unique_name
+from .extra import required
+from .frames import Frame, rotation_from_quaternion
+from .includes import with_includes
+from .mjcfclean import clean_model
+
+if TYPE_CHECKING:
+    from ....models.mechanism.graph import ElementaryKind
+
+#: Offset of a joint equality below which it holds at the stated configuration: rounding of decimals.
+_OFFSET = 1e-9
+
+
+def read_mjcf(root: Element, path: Path) -> Description:
+    """Return the robot that a MuJoCo model states, at its reference configuration ``qpos0``.
+
+    Args:
+        root: of the main file.
+        path: of the main file.
+
+    Raises:
+        InputError: MuJoCo is not installed, or the model cannot be read.
+    """
+    mujoco = required("mujoco", "MJCF files")
+    clean = clean_model(with_includes(root, path), str(path))
+    warnings: list[str] = []
+    mujoco.set_mju_user_warning(warnings.append)
+    try:
+        with _quiet():
+            model = mujoco.MjModel.from_xml_string(tostring(clean.root, encoding="unicode"))
+            data = mujoco.MjData(model)
+            mujoco.mj_kinematics(model, data)
+    except (ValueError, mujoco.FatalError) as error:
+        reason = str(error).strip().splitlines() or ["no reason given"]
+        raise InputError(f"{path}: MuJoCo cannot read it: {reason[0].removeprefix('XML Error: ')}") from None
+    finally:
+        mujoco.set_mju_user_warning(None)
+    return _Reader(mujoco, model, data, str(path)).description(
+        root.get("model") or path.stem, clean.driven, (*clean.notes, *warnings)
+    )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what a library writes to the process's standard output and error from the user."""
+    with tempfile.TemporaryFile() as lost:
+        kept = [(descriptor, os.dup(descriptor)) for descriptor in (1, 2)]
+        try:
+            for descriptor, _ in kept:
+                os.dup2(lost.fileno(), descriptor)
+            yield
+        finally:
+            for descriptor, copy in kept:
+                os.dup2(copy, descriptor)
+                os.close(copy)
+
+
+class _Reader:
+    """A compiled model at its reference configuration."""
+
+    def __init__(self, mujoco: Any, model: Any, data: Any, source: str) -> None:  # noqa: ANN401 - no stubs
+        self.mujoco, self.model, self.data, self.source = mujoco, model, data, source
+        self.taken: set[str] = set()
+        self.body_names = self._names(model.nbody, model.body, "body")
+        self.taken = set()
+        self.joint_names = self._names(model.njnt, model.joint, "joint")
+        self.bodies: list[Body] = []
+        self.joints: list[TreeJoint] = []
+        self.notes: list[str] = []
+
+    def _names(self, count: int, of: Any, kind: str) -> list[str]:  # noqa: ANN401 - no stubs
+        """Return a name for each of ``count`` things; those without one are numbered."""
+        given = [str(of(k).name) for k in range(count)]
+        names = []
+        for k, name in enumerate(given):
+            chosen = name or unique_name(f"{kind}_{k}", {*given, *self.taken})
+            self.taken.add(chosen)
+            names.append(chosen)
+        return names
+
+    def description(self, name: str, driven: tuple[str, ...], notes: tuple[str, ...]) -> Description:
+        """Return the robot."""
+        self.bodies.append(Body(self.body_names[0], "", Frame()))
+        for k in range(1, self.model.nbody):
+            self._add_body(k)
+        closures, couplings = self._equalities()
+        known = {joint.name for joint in self.joints}
+        for joint in driven:
+            if joint not in known:
+                raise InputError(f"{self.source}: an actuator drives {joint!r}, which is no joint that can be driven")
+        return Description(
+            name=name,
+            source=self.source,
+            root=self.body_names[0],
+            bodies=tuple(self.bodies),
+            joints=tuple(self.joints),
+            closures=tuple(closures),
+            couplings=tuple(couplings),
+            driven=frozenset(driven),
+            frames=self._sites(),
+            notes=(*notes, *self.notes),
+        )
+
+    def _add_body(self, k: int) -> None:
+        """Add a body with its joints; between two joints of one body stands a body without size."""
+        model, data, mujoco = self.model, self.data, self.mujoco
+        name, parent = self.body_names[k], self.body_names[model.body_parentid[k]]
+        place = Frame(data.xpos[k].copy(), data.xmat[k].reshape(3, 3).copy())
+        kinds: dict[int, ElementaryKind] = {
+            int(mujoco.mjtJoint.mjJNT_HINGE): "R",
+            int(mujoco.mjtJoint.mjJNT_SLIDE): "P",
+            int(mujoco.mjtJoint.mjJNT_BALL): "S",
+        }
+        numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
+        if any(model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_FREE) for j in numbers):
+            self.bodies.append(Body(name, "", place))
+            return
+        if not numbers:
+            self.joints.append(
+                TreeJoint(
+                    unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3)
+                )
+            )
+            self.bodies.append(Body(name, parent, place))
+            return
+        for j in numbers:
+            moved = (
+                name if j == numbers[-1] else unique_name(f"{name} behind {self.joint_names[j]}", set(self.body_names))
+            )
+            kind = kinds[int(model.jnt_type[j])]
+            axis = np.zeros(3) if kind == "S" else data.xaxis[j].copy()
+            limits = None
+            if model.jnt_limited[j] and kind != "S":
+                low, high = model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]
+                limits = (float(low), float(high))
+            self.joints.append(TreeJoint(self.joint_names[j], kind, moved, data.xanchor[j].copy(), axis, limits))
+            self.bodies.append(Body(moved, parent, place))
+            parent = moved
+
+    def _sites(self) -> dict[str, tuple[str, Frame]]:
+        """Return the named sites in the frames of their bodies."""
+        found = {}
+        for k in range(self.model.nsite):
+            if self.model.site(k).name:
+                found[str(self.model.site(k).name)] = self._site(k)
+        return found
+
+    def _site(self, k: int) -> tuple[str, Frame]:
+        """Return a site's body, and its frame there."""
+        rotation = rotation_from_quaternion(self.model.site_quat[k])
+        return self.body_names[self.model.site_bodyid[k]], Frame(self.model.site_pos[k].copy(), rotation)
+
+    def _equalities(self) -> tuple[list[LoopClosure], list[Coupling]]:
+        """Return the model's equalities as joints that close loops, and as couplings."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        closures: list[LoopClosure] = []
+        couplings: list[Coupling] = []
+        taken = set(self.joint_names)
+        for k in range(model.neq):
+            if not model.eq_active0[k]:
+                self.notes.append(f"the equality {model.equality(k).name or k + 1} is not active and was left out")
+                continue
+            name = unique_name(self._name_of_equality(k), taken)
+            taken.add(name)
+            if model.eq_type[k] == int(kinds.mjEQ_JOINT):
+                couplings.append(self._coupling(k, name))
+            else:
+                closures.append(self._closure(k, name))
+        return closures, couplings
+
+    def _name_of_equality(self, k: int) -> str:
+        """Return the name of an equality; without one, what the names of its sites have in common."""
+        given = str(self.model.equality(k).name)
+        if given or self.model.eq_objtype[k] != int(self.mujoco.mjtObj.mjOBJ_SITE):
+            return given or f"equality_{k + 1}"
+        names = [str(self.model.site(each).name) for each in (self.model.eq_obj1id[k], self.model.eq_obj2id[k])]
+        return common_name(names) or f"equality_{k + 1}"
+
+    def _closure(self, k: int, name: str) -> LoopClosure:
+        """Return the joint of a connect or weld."""
+        model = self.model
+        first, second = model.eq_obj1id[k], model.eq_obj2id[k]
+        is_weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
+        closing = Closing.WELD if is_weld else Closing.BALL
+        if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            (one, one_frame), (other, other_frame) = self._site(first), self._site(second)
+        else:
+            one, other, numbers = self.body_names[first], self.body_names[second], model.eq_data[k]
+            if is_weld:
+                one_frame, other_frame = Frame(numbers[3:6].copy(), rotation_from_quaternion(numbers[6:10])), Frame()
+            else:
+                one_frame, other_frame = Frame(numbers[0:3].copy()), Frame(numbers[3:6].copy())
+        return LoopClosure(name, closing, one, other, one_frame, other_frame)
+
+    def _coupling(self, k: int, name: str) -> Coupling:
+        """Return the linear relation of a joint equality."""
+        model = self.model
+        first, second = model.eq_obj1id[k], model.eq_obj2id[k]
+        offset, *factors = (float(each) for each in model.eq_data[k][:5])
+        if abs(offset) > _OFFSET or any(factors[1:]):
+            fault = "has a polynomial; only 0 and a factor as the first two of its polycoef are read"
+            raise InputError(f"{self.source}: the equality {name} of joints {fault}")
+        driven = (self.joint_names[first], 1.0)
+        if second < 0:
+            return Coupling(name, (driven,))
+        return Coupling(name, (driven, (self.joint_names[second], -factors[0])))

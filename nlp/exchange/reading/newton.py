@@ -1,0 +1,302 @@
+"""Loops of a description closed by Newton's method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+from .description import Body, Closing, Description, LoopClosure, TreeJoint
+from .frames import Frame, cross_matrix, rotation_about, rotation_vector
+
+#: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
+CLOSED = 1e-12
+#: Steps of Newton's method; from decimals of six digits it needs three.
+_MOST_STEPS = 60
+#: Shortest part of a step that is tried.
+_SHORTEST = 2.0**-12
+#: Singular values below this share of the largest count as zero: dependent equations of overconstrained robots.
+_RANK = 1e-9
+
+
+class Gap(NamedTuple):
+    """How far a loop is open.
+
+    Attributes:
+        name: of the joint that closes it.
+        distance: in length.
+        angle: in radians.
+    """
+
+    name: str
+    distance: float
+    angle: float
+
+
+class Closed(NamedTuple):
+    """A description with its loops closed as far as Newton's method came.
+
+    Attributes:
+        description: with all bodies and joints moved.
+        turn: largest angle by which a joint moved, radians.
+        way: largest displacement of a slide, length.
+        kept: whether the driven joints stayed where they were.
+    """
+
+    description: Description
+    turn: float
+    way: float
+    kept: bool
+
+
+def gap_of(closure: LoopClosure, places: Mapping[str, Frame]) -> Gap:
+    """Return how far a closure is open where its bodies are."""
+    A, B = (places[name] @ frame for name, frame in _sides(closure))
+    equations = _equations(closure, A, B, None)
+    lengths = {Closing.SLIDE: 2, Closing.CYLINDER: 2}.get(closure.closing, 3)
+    return Gap(closure.name, float(np.linalg.norm(equations[:lengths])), float(np.linalg.norm(equations[lengths:])))
+
+
+def _sides(closure: LoopClosure) -> tuple[tuple[str, Frame], tuple[str, Frame]]:
+    return (closure.first, closure.first_frame), (closure.second, closure.second_frame)
+
+
+def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None) -> FloatArray:
+    """Return the equations of a closure, lengths before angles.
+
+    Args:
+        closure: the closure.
+        A: its frame on the first body, in the world.
+        B: its frame on the second body.
+        kept: cosine between the axes of a universal joint; None for that of the frames themselves.
+    """
+    # In axes of the first body's frame no common motion of both bodies changes an equation.
+    apart = A.rotation.T @ (B.position - A.position)
+    z, other = A.rotation[:, 2], B.rotation[:, 2]
+    match closure.closing:
+        case Closing.BALL:
+            return np.asarray(apart)
+        case Closing.WELD:
+            return np.concatenate([apart, rotation_vector(A.rotation.T @ B.rotation)])
+        case Closing.HINGE:
+            return np.concatenate([apart, A.rotation[:, :2].T @ other])
+        case Closing.SLIDE:
+            return np.concatenate([apart[:2], rotation_vector(A.rotation.T @ B.rotation)])
+        case Closing.CYLINDER:
+            return np.concatenate([apart[:2], A.rotation[:, :2].T @ other])
+        case Closing.UNIVERSAL:
+            return np.append(apart, 0.0 if kept is None else float(z @ other) - kept)
+
+
+def _derivatives(closure: LoopClosure, A: Frame, B: Frame, twist: FloatArray) -> FloatArray:
+    """Return the derivatives of a closure's equations by motions of its second body relative to the first.
+
+    Args:
+        closure: the closure.
+        A: its frame on the first body, in the world.
+        B: its frame on the second body.
+        twist: (6, n) twists of the second body minus those of the first, velocities at the world's origin.
+    """
+    w, v = twist[:3], twist[3:]
+    point = A.rotation.T @ (v - cross_matrix(B.position) @ w)
+    x, y, z, other = *A.rotation.T, B.rotation[:, 2]
+    tilt = np.array([np.cross(other, x), np.cross(other, y)]) @ w
+    match closure.closing:
+        case Closing.BALL:
+            return np.asarray(point)
+        case Closing.WELD:
+            return np.vstack([point, A.rotation.T @ w])
+        case Closing.HINGE:
+            return np.vstack([point, tilt])
+        case Closing.SLIDE:
+            return np.vstack([point[:2], A.rotation.T @ w])
+        case Closing.CYLINDER:
+            return np.vstack([point[:2], tilt])
+        case Closing.UNIVERSAL:
+            return np.vstack([point, np.cross(other, z)[None] @ w])
+
+
+class _Mover:
+    """Positions of all joints, as displacements of their bodies from the stated configuration."""
+
+    def __init__(self, given: Description, size: float, *, keeps_driven: bool) -> None:
+        self.given, self.size = given, size
+        self.joint_of = {joint.body: joint for joint in given.joints}
+        self.index: dict[str, slice] = {}
+        count = 0
+        for body in given.bodies[1:]:
+            joint = self.joint_of.get(body.name)
+            width = 6 if joint is None else {"R": 1, "P": 1, "S": 3}.get(joint.kind, 0)
+            if joint is not None and keeps_driven and joint.name in given.driven:
+                width = 0
+            self.index[body.name] = slice(count, count + width)
+            count += width
+        self.count = count
+        places = {body.name: body.place for body in given.bodies}
+        self.cosines = {
+            c.name: float(
+                (places[c.first] @ c.first_frame).rotation[:, 2] @ (places[c.second] @ c.second_frame).rotation[:, 2]
+            )
+            for c in given.closures
+        }
+        #: Displacement of each body relative to its parent, and coordinates of hinges and slides.
+        self.own = {body.name: Frame() for body in given.bodies}
+        self.coordinates = {joint.name: 0.0 for joint in given.joints}
+
+    def moved(self) -> dict[str, Frame]:
+        """Return the displacement of each body in the world."""
+        found: dict[str, Frame] = {}
+        for body in self.given.bodies:
+            found[body.name] = found[body.parent] @ self.own[body.name] if body.parent else self.own[body.name]
+        return found
+
+    def state(self) -> tuple[FloatArray, FloatArray]:
+        """Return equations (m,) and their derivatives (m, n) by coordinates, lengths in parts of the size."""
+        moved = self.moved()
+        screws = self._screws(moved)
+        values: list[FloatArray] = []
+        rows: list[FloatArray] = []
+        for closure in self.given.closures:
+            A, B = (moved[name] @ self.given.place_of(name) @ frame for name, frame in _sides(closure))
+            twist = screws[closure.second] - screws[closure.first]
+            value = _equations(closure, A, B, self.cosines[closure.name])
+            row = _derivatives(closure, A, B, twist)
+            lengths = {Closing.SLIDE: 2, Closing.CYLINDER: 2}.get(closure.closing, 3)
+            value[:lengths] /= self.size
+            row[:lengths] /= self.size
+            values.append(value)
+            rows.append(row)
+        for coupling in self.given.couplings:
+            row = np.zeros(self.count)
+            for name, factor in coupling.factors:
+                body = next(joint.body for joint in self.given.joints if joint.name == name)
+                row[self.index[body]] = factor
+            values.append(np.array([sum(factor * self.coordinates[name] for name, factor in coupling.factors)]))
+            rows.append(row[None])
+        return np.concatenate([np.zeros(0), *values]), np.vstack([np.zeros((0, self.count)), *rows])
+
+    def _screws(self, moved: Mapping[str, Frame]) -> dict[str, FloatArray]:
+        """Return the twist (6, n) of each body by the coordinates, velocities at the world's origin."""
+        found: dict[str, FloatArray] = {self.given.root: np.zeros((6, self.count))}
+        for body in self.given.bodies[1:]:
+            screws = found[body.parent].copy() if body.parent else np.zeros((6, self.count))
+            place = self.index[body.name]
+            if place.stop > place.start:
+                screws[:, place] += self._own_screws(body, moved)
+            found[body.name] = screws
+        return found
+
+    def _own_screws(self, body: Body, moved: Mapping[str, Frame]) -> FloatArray:
+        """Return the current screws (6, k) of the joint of a body."""
+        joint = self.joint_of.get(body.name)
+        if joint is None:
+            return np.eye(6)
+        carried = moved[body.parent]
+        point, axis = carried.position + carried.rotation @ joint.point, carried.rotation @ joint.axis
+        if joint.kind == "P":
+            return np.concatenate([np.zeros(3), axis])[:, None]
+        axes = np.eye(3) if joint.kind == "S" else axis[:, None]
+        return np.vstack([axes, cross_matrix(point) @ axes])
+
+    def step(self, way: FloatArray) -> None:
+        """Move all joints by a step (n,) of their coordinates."""
+        moved = self.moved()
+        for body in self.given.bodies[1:]:
+            part = way[self.index[body.name]]
+            if not part.size:
+                continue
+            joint, own = self.joint_of.get(body.name), self.own[body.name]
+            if joint is None:
+                turn = _rotation(part[:3])
+                self.own[body.name] = Frame(part[3:], turn) @ own
+            elif joint.kind == "S":
+                local = moved[body.parent].rotation.T @ part
+                self.own[body.name] = _about(joint.point, _rotation(local)) @ own
+            elif joint.kind == "P":
+                self.coordinates[joint.name] += float(part[0])
+                self.own[body.name] = Frame(joint.axis * self.coordinates[joint.name])
+            else:
+                self.coordinates[joint.name] += float(part[0])
+                self.own[body.name] = _about(joint.point, rotation_about(joint.axis, self.coordinates[joint.name]))
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    """Return the rotation of a vector (3,), axis times angle."""
+    angle = float(np.linalg.norm(vector))
+    return np.eye(3) if angle == 0 else rotation_about(vector / angle, angle)
+
+
+def _about(point: FloatArray, rotation: FloatArray) -> Frame:
+    """Return the displacement that turns about a point."""
+    return Frame(point - rotation @ point, rotation)
+
+
+def close(given: Description, size: float) -> Closed:
+    """Return a description with its loops closed by Newton's method, with driven joints kept where that is possible.
+
+    Args:
+        given: the description.
+        size: of the robot, by which lengths become plain numbers.
+
+    Returns:
+        The best that was reached; the gaps of its closures say how good it is.
+    """
+    for keeps_driven in (True, False):
+        mover = _Mover(given, size, keeps_driven=keeps_driven)
+        if _solve(mover) <= CLOSED:
+            break
+    turns = [rotation_vector(mover.own[j.body].rotation) for j in given.joints if j.kind in ("R", "S")]
+    ways = [abs(mover.coordinates[j.name]) for j in given.joints if j.kind == "P"]
+    return Closed(
+        _moved(given, mover),
+        max((float(np.linalg.norm(each)) for each in turns), default=0.0),
+        max(ways, default=0.0),
+        keeps_driven,
+    )
+
+
+def _solve(mover: _Mover) -> float:
+    """Move the joints until the loops are closed, or no step makes them closer; return the largest equation."""
+    values, derivatives = mover.state()
+    for _ in range(_MOST_STEPS):
+        error = float(np.linalg.norm(values))
+        if not values.size or np.abs(values).max() <= CLOSED / 100:
+            break
+        way = -np.linalg.pinv(derivatives, rcond=_RANK) @ values
+        length = 1.0
+        before = dict(mover.own), dict(mover.coordinates)
+        while length >= _SHORTEST:
+            mover.step(length * way)
+            values, derivatives = mover.state()
+            if float(np.linalg.norm(values)) < error:
+                break
+            mover.own, mover.coordinates = dict(before[0]), dict(before[1])
+            length /= 2
+        else:
+            values, derivatives = mover.state()
+            break
+    return float(np.abs(values).max(initial=0.0))
+
+
+def _moved(given: Description, mover: _Mover) -> Description:
+    """Return a description with all its bodies and joints where they were moved."""
+    moved = mover.moved()
+    parents = {body.name: body.parent for body in given.bodies}
+
+    def joint(each: TreeJoint) -> TreeJoint:
+        carried, way = moved[parents[each.body]], mover.coordinates[each.name]
+        limits = None if each.range is None else (each.range[0] - way, each.range[1] - way)
+        point, axis = carried.position + carried.rotation @ each.point, carried.rotation @ each.axis
+        return replace(each, point=point, axis=axis, range=limits)
+
+    return replace(
+        given,
+        bodies=tuple(replace(body, place=moved[body.name] @ body.place) for body in given.bodies),
+        joints=tuple(joint(each) for each in given.joints),
+    )
+
+
+__all__ = ["CLOSED", "Closed", "Gap", "close", "gap_of"]

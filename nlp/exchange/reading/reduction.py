@@ -1,0 +1,293 @@
+"""From a description to the mechanism between base and platform: rigid bodies merged, side chains left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
+from ...errors import InputError, listing, nearest
+from .blocks import between
+from .description import LARGEST, Description
+from .elements import Element, bodies_of, elements_of, place_in, rigid_groups
+from .frames import Frame
+from .newton import Gap, gap_of
+
+#: Most names that a message lists.
+_MOST_NAMES = 12
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Base, platform and actuators by name, as the user gives them; empty for what the description says.
+
+    Attributes:
+        platform: a body, or a frame on one, whose origin is that of the platform.
+        base: a body; empty for the fixed root.
+        actuated: joints; empty for those with an actuator in the description.
+    """
+
+    platform: str
+    base: str = ""
+    actuated: tuple[str, ...] = ()
+
+
+class Reduced(NamedTuple):
+    """The mechanism between base and platform.
+
+    Attributes:
+        mechanism: of rigid links and joints, at the stated configuration.
+        size: largest distance of two of its joints, length.
+        gaps: how far the loops are open that closing joints close.
+        notes: sentences about what was left out.
+    """
+
+    mechanism: Mechanism
+    size: float
+    gaps: tuple[Gap, ...]
+    notes: tuple[str, ...]
+
+
+def size_of(given: Description) -> float:
+    """Return the largest distance between joints of a description, 1 where all are in one place."""
+    points = [each.point for each in given.joints]
+    points += [(given.place_of(each.first) @ each.first_frame).position for each in given.closures]
+    return _extent(points)
+
+
+def _extent(points: Sequence[np.ndarray]) -> float:
+    """Return the largest distance between points, 1 where it is zero."""
+    if len(points) < 2:
+        return 1.0
+    cloud = np.array(points)
+    return float(max(np.linalg.norm(cloud - each, axis=1).max() for each in cloud)) or 1.0
+
+
+def reduce(given: Description, ends: Ends) -> Reduced:
+    """Return the mechanism that joins base and platform.
+
+    Args:
+        given: the description.
+        ends: base, platform and actuators.
+
+    Raises:
+        InputError: a name means nothing, the platform is on an open chain or is part of the base, or nothing drives it.
+    """
+    check_names(given)
+    _check_places(given)
+    platform, origin = _platform(given, ends.platform)
+    base = ends.base or given.root
+    if base not in {body.name for body in given.bodies}:
+        every = [body.name for body in given.bodies]
+        raise InputError(f"{given.source}: --base {base}: no such body; {nearest(base, every[:_MOST_NAMES])}")
+    elements = elements_of(given, size_of(given))
+    leader = rigid_groups(elements, bodies_of(given, elements))
+    moving = [each for each in elements if leader[each.first] != leader[each.second]]
+    start, end = leader[base], leader[platform]
+    if start == end:
+        raise InputError(f"{given.source}: --platform {ends.platform}: is rigidly joined to the base {base}")
+    edges = [(leader[each.first], leader[each.second]) for each in moving]
+    kept = [moving[k] for k in between(edges, start, end)]
+    _refuse_open(given, ends, kept, leader, (start, end))
+    driven, notes = _driven(given, ends, kept)
+    names = _link_names(given, kept, leader, {start: base, end: ends.platform})
+    joints = _oriented(kept, leader, start, driven, names)
+    couplings, driven, more = _couplings(given, kept, driven)
+    joints = [replace(each, actuated=each.name in driven) for each in joints]
+    places = {key: origin if key == end else place_in(given, key) for key in names}
+    mechanism = Mechanism(
+        name=_word(given.name),
+        links=tuple(MechanismLink(name, places[key].position, places[key].rotation) for key, name in names.items()),
+        joints=tuple(joints),
+        base=base,
+        platform=ends.platform,
+        couplings=couplings,
+    )
+    bodies = {body.name: body.place for body in given.bodies}
+    own = {each.name for each in kept}
+    gaps = [
+        gap_of(each, bodies)
+        for each in given.closures
+        if _closes(each.name, own) or _merges(given, each.name, leader, names)
+    ]
+    return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
+
+
+def _closes(name: str, own: set[str]) -> bool:
+    """Return whether a closure is among the joints that are kept, as one joint or as two."""
+    return name in own or f"{name} 1" in own
+
+
+def _merges(given: Description, name: str, leader: dict[str, str], names: dict[str, str]) -> bool:
+    """Return whether a closure welds bodies of a link that is kept, or is a further ball of a hinge there."""
+    closure = next(each for each in given.closures if each.name == name)
+    return leader[closure.first] in names and leader[closure.second] in names
+
+
+def check_names(given: Description) -> None:
+    """Refuse names with characters that no text shows.
+
+    Raises:
+        InputError: there is one.
+    """
+    for kind, names in {
+        "body": [each.name for each in given.bodies],
+        "joint": [*(each.name for each in given.joints), *(each.name for each in given.closures)],
+        "frame": list(given.frames),
+        "robot": [given.name],
+    }.items():
+        for name in names:
+            if not name.isprintable() or not name.strip():
+                raise InputError(f"{given.source}: the {kind} {name!r} has a name with characters that cannot be shown")
+
+
+def _check_places(given: Description) -> None:
+    """Refuse places that are no finite numbers, or too large.
+
+    Raises:
+        InputError: there is one.
+    """
+    places = {f"body {each.name}": each.place.position for each in given.bodies}
+    places |= {f"joint {each.name}": each.point for each in given.joints}
+    for each in given.closures:
+        places |= {f"joint {each.name}": np.concatenate([each.first_frame.position, each.second_frame.position])}
+    for name, place in places.items():
+        if not float(np.abs(place).max()) <= LARGEST:
+            raise InputError(f"{given.source}: the {name} has a coordinate above {LARGEST:g}, or one that is no number")
+
+
+def _platform(given: Description, name: str) -> tuple[str, Frame]:
+    """Return the body of the platform, and the place of its frame."""
+    bodies = [body.name for body in given.bodies]
+    if name in bodies:
+        return name, given.place_of(name)
+    if name in given.frames:
+        body, frame = given.frames[name]
+        return body, given.place_of(body) @ frame
+    hint = nearest(name, [*bodies, *given.frames][: _MOST_NAMES * 2])
+    raise InputError(f"{given.source}: --platform {name}: no such body or frame; {hint}")
+
+
+def _refuse_open(
+    given: Description, ends: Ends, kept: list[Element], leader: dict[str, str], nodes: tuple[str, str]
+) -> None:
+    """Refuse a platform to which no path, or only one, leads from the base."""
+    where = f"{given.source}: --platform {ends.platform}:"
+    base = ends.base or given.root
+    if not kept:
+        raise InputError(f"{where} no joints lead to it from the base {base}; choose the base by --base")
+    links = {leader[name] for each in kept for name in (each.first, each.second)} | set(nodes)
+    if len(kept) < len(links):
+        fault = "is at the end of an open chain"
+        raise InputError(
+            f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more"
+        )
+
+
+def _driven(given: Description, ends: Ends, kept: list[Element]) -> tuple[set[str], list[str]]:
+    """Return the actuated joints of the mechanism, and notes about actuators elsewhere."""
+    own = [each.name for each in kept]
+    if ends.actuated:
+        for name in ends.actuated:
+            if name not in own:
+                hint = nearest(name, own[:_MOST_NAMES])
+                fault = "is no joint between base and platform"
+                raise InputError(f"{given.source}: --actuated {name}: {fault}; {hint}")
+    wanted = set(ends.actuated) or set(given.driven)
+    for each in kept:
+        if each.name in wanted and each.kind == "S":
+            raise InputError(
+                f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one"
+            )
+    outside = sorted(wanted - set(own) - _leading(given, own))
+    notes = [f"actuators outside the mechanism were left out: {listing(outside[:_MOST_NAMES])}"] if outside else []
+    driven = wanted & set(own)
+    if not driven and not (wanted & _leading(given, own)):
+        able = [each.name for each in kept if each.kind in ("R", "P")]
+        fault = "no joint between base and platform has an actuator; name them by --actuated, of"
+        raise InputError(f"{given.source}: {fault} {listing(able[:_MOST_NAMES])}")
+    return driven, notes
+
+
+def _leading(given: Description, own: Sequence[str]) -> set[str]:
+    """Return the joints outside the mechanism to which couplings tie joints of it."""
+    found: set[str] = set()
+    for each in given.couplings:
+        names = {name for name, _ in each.factors}
+        if names & set(own):
+            found |= names - set(own)
+    return found
+
+
+def _couplings(
+    given: Description, kept: list[Element], driven: set[str]
+) -> tuple[tuple[Coupling, ...], set[str], list[str]]:
+    """Return the couplings within the mechanism; a joint coupled to a driven one outside it counts as driven."""
+    own = {each.name for each in kept}
+    inside: list[Coupling] = []
+    driven = set(driven)
+    notes: list[str] = []
+    for each in given.couplings:
+        names = [name for name, _ in each.factors]
+        if len(names) < 2 or not own & set(names):
+            continue
+        if set(names) <= own:
+            inside.append(each)
+            continue
+        within, without = sorted(own & set(names)), sorted(set(names) - own)
+        if set(without) & given.driven:
+            driven |= set(within)
+            notes.append(
+                f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself"
+            )
+        else:
+            notes.append(f"the coupling of {listing(within)} with {listing(without)} was left out")
+    return tuple(inside), driven, notes
+
+
+def _link_names(
+    given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]
+) -> dict[str, str]:
+    """Return the name of each rigid link by its first body, in the order of the bodies."""
+    order = {name: k for k, name in enumerate(bodies_of(given, kept))}
+    keys = {leader[name] for each in kept for name in (each.first, each.second)} | set(given_names)
+    return {key: given_names.get(key, key) for key in sorted(keys, key=lambda key: order.get(key, len(order)))}
+
+
+def _oriented(
+    kept: list[Element], leader: dict[str, str], start: str, driven: set[str], names: dict[str, str]
+) -> list[MechanismJoint]:
+    """Return the joints with the link nearer to the base inside.
+
+    The motion of the first body relative to the second about the opposite axis has the same coordinate.
+    """
+    depth = {start: 0}
+    waiting = [start]
+    for node in waiting:
+        for each in kept:
+            ends = leader[each.first], leader[each.second]
+            if node in ends:
+                other = ends[1] if ends[0] == node else ends[0]
+                if other not in depth:
+                    depth[other] = depth[node] + 1
+                    waiting.append(other)
+    joints = []
+    for each in kept:
+        first, second = leader[each.first], leader[each.second]
+        turned = depth[second] < depth[first]
+        inner, outer = (second, first) if turned else (first, second)
+        axis = -each.axis + 0.0 if turned else each.axis
+        joints.append(
+            MechanismJoint(
+                each.name, each.kind, names[inner], names[outer], each.point, axis, 0.0, each.name in driven, each.range
+            )
+        )
+    return joints
+
+
+def _word(name: str) -> str:
+    """Return a robot's name."""
+    return name.strip()

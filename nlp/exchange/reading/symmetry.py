@@ -1,0 +1,229 @@
+"""Circles and symmetries in the numbers of a robot: what one dimension could state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+from .frames import rotation_about
+from .tablejoints import LimbNumbers, limbs_in_numbers
+
+#: Places and directions that differ by less than this, in parts of the robot's size, are taken for the same: models
+#: that are written with six digits differ by 1e-6 and less.
+SAME = 1e-5
+#: An axis this near to a coordinate axis, and a point this near to the origin of a coordinate, are taken for it.
+_ROUND = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class CircleOffer:
+    """Joints on a circle, whose radius could be a dimension.
+
+    Attributes:
+        name: by which it is asked for.
+        joints: names of the joints.
+        points: (n, 3) their places.
+        centre: (3,) of the circle.
+        axis: (3,) unit direction of its axis.
+        radius: of the circle.
+        deviation: largest distance of a joint from the circle, length.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    points: FloatArray
+    centre: FloatArray
+    axis: FloatArray
+    radius: float
+    deviation: float
+
+
+@dataclass(frozen=True, eq=False)
+class FoldOffer:
+    """Limbs that are copies of each other by rotation about an axis.
+
+    Attributes:
+        name: by which it is asked for.
+        count: number of copies.
+        orbits: indices of the limbs of each orbit, in the order of their angles.
+        centre: (3,) point of the axis.
+        axis: (3,) its unit direction.
+        deviation: largest distance of a joint from that of the turned limb, or difference of axes times the size.
+    """
+
+    name: str
+    count: int
+    orbits: tuple[tuple[int, ...], ...]
+    centre: FloatArray
+    axis: FloatArray
+    deviation: float
+
+
+class Mirror(NamedTuple):
+    """A plane in which the robot is its own mirror image: point, normal, and the largest deviation."""
+
+    point: FloatArray
+    normal: FloatArray
+    deviation: float
+
+
+class Offers(NamedTuple):
+    """All that was found."""
+
+    circles: tuple[CircleOffer, ...]
+    fold: FoldOffer | None
+    mirrors: tuple[Mirror, ...]
+
+
+def offers_of(tables: Mapping[str, Any], size: float) -> Offers:
+    """Return the circles and symmetries of a robot file with limbs in numbers.
+
+    Args:
+        tables: of the robot file; one with links and joints has none.
+        size: of the robot.
+    """
+    limbs = limbs_in_numbers(tables)
+    circles = _circles(limbs, size)
+    fold = next((found for circle in circles if (found := _fold(limbs, circle, size)) is not None), None)
+    mirrors = _mirrors(limbs, circles[0], size) if circles else []
+    return Offers(tuple(circles), fold, tuple(mirrors))
+
+
+def _groups(limbs: list[LimbNumbers]) -> list[list[LimbNumbers]]:
+    """Return the limbs by shape."""
+    shapes: dict[tuple[Any, ...], list[LimbNumbers]] = {}
+    for limb in limbs:
+        shapes.setdefault(limb.shape, []).append(limb)
+    return list(shapes.values())
+
+
+def _circles(limbs: list[LimbNumbers], size: float) -> list[CircleOffer]:
+    """Return the circles on which the same joint of all limbs of a shape lies."""
+    found: list[CircleOffer] = []
+    for group in _groups(limbs):
+        for k in range(len(group[0].names)):
+            points = np.array([limb.points[k] for limb in group])
+            known = any(
+                len(each.points) == len(points) and np.allclose(each.points, points, rtol=0, atol=0) for each in found
+            )
+            circle = None if known or len(points) < 3 else _circle_through(points, size)
+            if circle is None:
+                continue
+            centre, axis, radius = circle
+            radial = _radial(points, centre, axis)
+            off = np.linalg.norm(points - centre - radial, axis=1)
+            deviation = float(np.hypot(np.linalg.norm(radial, axis=1) - radius, off).max())
+            even = len(points) > 3 or _is_even(radial, radius)
+            if deviation < SAME * size and even:
+                names = tuple(limb.names[k] for limb in group)
+                found.append(CircleOffer(f"circle{len(found) + 1}", names, points, centre, axis, radius, deviation))
+    return found
+
+
+def _is_even(radial: FloatArray, radius: float) -> bool:
+    """Return whether three points of a circle, on which any three are, are evenly spread."""
+    return bool(np.linalg.norm(radial.sum(axis=0)) < SAME * radius)
+
+
+def _radial(points: FloatArray, centre: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the parts (n, 3) of the ways from an axis to points."""
+    apart = points - centre
+    return np.asarray(apart - np.outer(apart @ axis, axis))
+
+
+def _circle_through(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float] | None:
+    """Return centre, axis and radius of the circle nearest to points (n, 3); None where they are on a line."""
+    middle = points.mean(axis=0)
+    _, values, rows = np.linalg.svd(points - middle)
+    if values[1] < SAME * size:
+        return None
+    axis = _rounded_direction(rows[2])
+    plane = rows[:2]
+    flat = (points - middle) @ plane.T
+    # |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the centre and in the bracket.
+    system = np.column_stack([2 * flat, np.ones(len(flat))])
+    solution = np.linalg.lstsq(system, (flat**2).sum(axis=1), rcond=None)[0]
+    centre = middle + solution[:2] @ plane
+    radius = float(np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 0.0)))
+    centre = np.where(np.abs(centre) < _ROUND * size, 0.0, centre)
+    return (centre, axis, radius) if radius > SAME * size else None
+
+
+def _rounded_direction(axis: FloatArray) -> FloatArray:
+    """Return a direction as a coordinate axis where it is near one, with its largest component positive."""
+    axis = axis * np.sign(axis[int(np.argmax(np.abs(axis)))])
+    nearest = np.eye(3)[int(np.argmax(axis))]
+    return nearest if float(np.linalg.norm(axis - nearest)) < _ROUND else axis
+
+
+def _turned(limb: LimbNumbers, other: LimbNumbers, matrix: FloatArray, centre: FloatArray, size: float) -> float:
+    """Return how far a limb after an orthogonal map about a point is from another one; infinity for another shape.
+
+    A reflection turns the axes of rotation over once more, so that signs of axes do not count there.
+    """
+    if limb.shape != other.shape:
+        return float("inf")
+    apart = (limb.points - centre) @ matrix.T + centre - other.points
+    found = [0.0, *np.linalg.norm(apart, axis=1)]
+    axes = limb.axes @ matrix.T
+    proper = np.linalg.det(matrix) > 0
+    for axis, target, driven in zip(axes, other.axes, limb.driven, strict=True):
+        same, opposite = np.linalg.norm(axis - target), np.linalg.norm(axis + target)
+        found.append(size * float(same if driven and proper else min(same, opposite)))
+    return float(max(found))
+
+
+def _fold(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> FoldOffer | None:
+    """Return the rotations about a circle's axis that map the robot to itself; None where there are none."""
+    most = min(len(group) for group in _groups(limbs))
+    for count in range(most, 1, -1):
+        turn = rotation_about(circle.axis, 2 * np.pi / count)
+        images: dict[int, int] = {}
+        deviation = 0.0
+        for limb in limbs:
+            gaps = [_turned(limb, other, turn, circle.centre, size) for other in limbs]
+            nearest = int(np.argmin(gaps))
+            images[limb.index] = limbs[nearest].index
+            deviation = max(deviation, gaps[nearest])
+        if deviation >= SAME * size or len(set(images.values())) < len(limbs):
+            continue
+        orbits = _orbits(images)
+        if all(len(orbit) == count for orbit in orbits):
+            return FoldOffer("fold", count, orbits, circle.centre, circle.axis, deviation)
+    return None
+
+
+def _orbits(images: Mapping[int, int]) -> tuple[tuple[int, ...], ...]:
+    """Return the cycles of a permutation, each from its smallest index on."""
+    found, seen = [], set[int]()
+    for start in sorted(images):
+        if start in seen:
+            continue
+        orbit = [start]
+        while (step := images[orbit[-1]]) != start:
+            orbit.append(step)
+        seen |= set(orbit)
+        found.append(tuple(orbit))
+    return tuple(found)
+
+
+def _mirrors(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> list[Mirror]:
+    """Return the planes through a circle's axis in which the robot is its own mirror image."""
+    radial = _radial(circle.points, circle.centre, circle.axis)
+    found: list[Mirror] = []
+    for way in [radial[0] - each for each in radial[1:]] + [np.cross(circle.axis, radial[0])]:
+        length = float(np.linalg.norm(way))
+        if length < SAME * size:
+            continue
+        normal = _rounded_direction(way / length)
+        if any(np.linalg.norm(np.cross(each.normal, normal)) < _ROUND for each in found):
+            continue
+        matrix = np.eye(3) - 2 * np.outer(normal, normal)
+        gaps = [min(_turned(limb, other, matrix, circle.centre, size) for other in limbs) for limb in limbs]
+        if max(gaps) < SAME * size:
+            found.append(Mirror(circle.centre, normal, max(gaps)))
+    return found

@@ -1,0 +1,223 @@
+"""Reader of URDF with closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from ....models.arrays import FloatArray
+from ....models.mechanism import Coupling
+from ...errors import InputError, listing
+from .description import Body, Description, LoopClosure, TreeJoint, unique_name
+from .frames import Frame, perpendiculars
+from .urdfelements import axis_of, link_of, name_of, number_of, origin_of
+from .urdfloops import LoopFile, closures_of_constraints, closures_of_frames, closures_of_pairs, read_loop_file
+
+if TYPE_CHECKING:
+    from ....models.mechanism.graph import ElementaryKind
+
+#: Types of joints, with the kind of each elementary joint that they consist of.
+_TYPES: dict[str, tuple[ElementaryKind, ...]] = {
+    "revolute": ("R",),
+    "continuous": ("R",),
+    "prismatic": ("P",),
+    "fixed": ("weld",),
+    "floating": (),
+    "planar": ("P", "P", "R"),
+    "spherical": ("S",),
+    "ball": ("S",),
+}
+
+
+def read_urdf(root: Element, path: Path, loops: Path | None = None) -> Description:
+    """Return the robot that a URDF file states, with all joints at 0.
+
+    Args:
+        root: of the file.
+        path: of the file.
+        loops: YAML file of loops; None for one with the same name beside the URDF file, if there is one.
+
+    Raises:
+        InputError: the file states no tree of links, or a value in it is not allowed.
+    """
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
+        raise InputError(f"{path}: has elements of xacro: write it out as plain URDF first")
+    if loops is None:
+        loops = next((each for each in (path.with_suffix(".yaml"), path.with_suffix(".yml")) if each.is_file()), None)
+    return _Reader(root, path, None if loops is None else read_loop_file(loops)).description()
+
+
+class _Reader:
+    """A URDF file while its tree is walked."""
+
+    def __init__(self, root: Element, path: Path, loops: LoopFile | None) -> None:
+        self.root, self.source, self.loops = root, str(path), loops
+        self.name = root.get("name") or path.stem
+        self.links = self._unique(root.findall("link"))
+        self.elements = {name_of(each, self.source): each for each in root.findall("joint")}
+        self._unique(root.findall("joint"))
+        self.bodies: list[Body] = []
+        self.joints: list[TreeJoint] = []
+        #: Last elementary joint of each joint: the one that carries its name.
+        self.moved: dict[str, str] = {}
+
+    def _unique(self, elements: Iterable[Element]) -> set[str]:
+        """Return the names of elements; refuse one that is given twice."""
+        names: set[str] = set()
+        for each in elements:
+            name = name_of(each, self.source)
+            if name in names:
+                raise InputError(f"{self.source}: has two elements <{each.tag}> with the name {name!r}")
+            names.add(name)
+        return names
+
+    def description(self) -> Description:
+        """Return the robot."""
+        children: dict[str, list[tuple[str, str]]] = {}
+        parents: dict[str, str] = {}
+        for name, element in self.elements.items():
+            where = f"{self.source}: joint {name}"
+            parent, child = (link_of(element, tag, self.links, where) for tag in ("parent", "child"))
+            if child in parents:
+                raise InputError(f"{where}: its child {child!r} is the child of the joint {parents[child]} already")
+            parents[child] = name
+            children.setdefault(parent, []).append((name, child))
+        roots = [
+            name
+            for name in dict.fromkeys(name_of(e, self.source) for e in self.root.findall("link"))
+            if name not in parents
+        ]
+        if len(roots) != 1:
+            raise InputError(f"{self.source}: must have one root link; it has {listing(roots[:10])}")
+        self.bodies.append(Body(roots[0], "", Frame()))
+        waiting = [(roots[0], Frame())]
+        while waiting:
+            link, place = waiting.pop()
+            found = [(child, self._add(name, link, child, place)) for name, child in children.get(link, [])]
+            waiting += reversed(found)
+        if len(self.bodies) < len(self.links):
+            lost = sorted(self.links - {body.name for body in self.bodies})
+            raise InputError(
+                f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root"
+            )
+        closures, notes = self._closures()
+        return Description(
+            name=self.name,
+            source=self.source,
+            root=roots[0],
+            bodies=tuple(self.bodies),
+            joints=tuple(self.joints),
+            closures=tuple(closures),
+            couplings=tuple(self._couplings()),
+            driven=frozenset(self._driven()),
+            notes=tuple(notes),
+        )
+
+    def _add(self, name: str, link: str, child: str, place: Frame) -> Frame:
+        """Add a joint with the link that it moves, and return the link's place."""
+        element = self.elements[name]
+        where = f"{self.source}: joint {name}"
+        kind = element.get("type", "")
+        if kind not in _TYPES:
+            raise InputError(f'{where}, type = "{kind[:60]}": must be one of {listing(_TYPES)}')
+        at = place @ origin_of(element, "origin", where)
+        other = self.loops.kinds.get(name, "") if self.loops else ""
+        parts = self._parts(element, kind, other, where)
+        if not parts:
+            self.bodies.append(Body(child, "", at))
+        parent = link
+        for k, (part, local) in enumerate(parts):
+            last = k == len(parts) - 1
+            moved = child if last else unique_name(f"{child} behind {name} {k + 1}", self.links)
+            own = name if last else unique_name(f"{name} {k + 1}", set(self.elements))
+            axis = at.rotation @ local if part in ("R", "P") else np.zeros(3)
+            limits = self._limits(element, kind, where) if len(parts) == 1 and part in ("R", "P") else None
+            self.joints.append(TreeJoint(own, part, moved, at.position, axis, limits))
+            self.bodies.append(Body(moved, parent, at))
+            parent = moved
+        return at
+
+    def _parts(self, element: Element, kind: str, other: str, where: str) -> list[tuple[ElementaryKind, FloatArray]]:
+        """Return the elementary joints of a joint, each with its axis in the joint's frame.
+
+        Args:
+            element: the joint.
+            kind: its type.
+            other: its type by the YAML file, which counts instead; empty for none.
+            where: the joint, for messages.
+        """
+        if other == "SPHERICAL":
+            return [("S", np.zeros(3))]
+        if other == "FIXED":
+            return [("weld", np.zeros(3))]
+        if other:
+            return [("R", np.eye(3)["XYZ".index(letter)]) for letter in other[-2:]]
+        parts = _TYPES[kind]
+        if kind == "planar":
+            normal = axis_of(element, "axis", where)
+            across = perpendiculars(normal)
+            return [("P", across[0]), ("P", across[1]), ("R", normal)]
+        if parts and parts[0] in ("R", "P"):
+            return [(parts[0], axis_of(element, "axis", where))]
+        return [(each, np.zeros(3)) for each in parts]
+
+    def _limits(self, element: Element, kind: str, where: str) -> tuple[float, float] | None:
+        """Return the range of a joint; None for one that has none."""
+        limit = element.find("limit")
+        if kind == "continuous" or limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib:
+            return None
+        place = f"{where}, limit"
+        return number_of(limit, "lower", 0.0, place), number_of(limit, "upper", 0.0, place)
+
+    def _closures(self) -> tuple[list[LoopClosure], list[str]]:
+        """Return the joints that close loops, and notes about them."""
+        places = {body.name: body.place for body in self.bodies}
+        links = {name: (name, Frame()) for name in places}
+        joints = {joint.name: (joint.body, Frame()) for joint in self.joints if joint.name not in links}
+        taken = {joint.name for joint in self.joints}
+        closures = closures_of_constraints(self.root, self.links, taken, self.source)
+        taken |= {each.name for each in closures}
+        if self.loops is not None:
+            return [*closures, *closures_of_pairs(self.loops, {**links, **joints})], []
+        # A frame is a link without size that is fixed to its parent.
+        fixed = {joint.body for joint in self.joints if joint.kind == "weld"}
+        frames = {name: (name, Frame()) for name in places if name in fixed}
+        found, notes = closures_of_frames(frames, sorted(taken), places)
+        # A hinge's second pair of frames lies on other links than the first, fixed to the same ones.
+        return [*closures, *found], notes
+
+    def _couplings(self) -> list[Coupling]:
+        """Return the joints that follow others (``mimic``), with the offset that URDF allows refused."""
+        found = []
+        for name, element in self.elements.items():
+            mimic = element.find("mimic")
+            if mimic is None:
+                continue
+            place = f"{self.source}: joint {name}, mimic"
+            other = mimic.get("joint", "")
+            if other not in self.elements or other == name:
+                raise InputError(f'{place} = "{other[:60]}": must be another joint')
+            if number_of(mimic, "offset", 0.0, place) != 0:
+                raise InputError(f"{place}, offset: must be 0: with all joints at 0 it would not hold")
+            factor = number_of(mimic, "multiplier", 1.0, place)
+            found.append(Coupling(f"{name} mimic", ((name, 1.0), (other, -factor))))
+        return found
+
+    def _driven(self) -> set[str]:
+        """Return the driven joints: those of the YAML file, of transmissions and of ``ros2_control``."""
+        if self.loops is not None and self.loops.driven is not None:
+            for name in self.loops.driven:
+                if name not in self.elements:
+                    raise InputError(f'{self.loops.path}: name_mot = "{name[:60]}": is no joint of the URDF')
+            return set(self.loops.driven)
+        named = [each.get("name", "") for each in self.root.iterfind("transmission/joint")]
+        named += [
+            each.get("name", "")
+            for each in self.root.iterfind("ros2_control/joint")
+            if each.find("command_interface") is not None
+        ]
+        return {name for name in named if name in self.elements}

@@ -1,0 +1,198 @@
+"""The three ways in which URDF files state closed loops.
+
+- a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the driven joints
+  ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
+  (github.com/Gepetto/example-parallel-robots),
+- frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair ``closing_NAME_1_z`` for a hinge
+  (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
+- elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the same for ``child``, as
+  github.com/ros/urdfdom/pull/264 proposes (open: which types there are is not agreed).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from ...errors import InputError, listing
+from .description import Closing, LoopClosure, axis_frame, common_name, unique_name
+from .extra import required
+from .frames import Frame
+from .urdfelements import axis_of, link_of, name_of, origin_of
+from .xmltext import read_limited
+
+#: Largest YAML file, bytes: those that are published have 2 kB.
+_LARGEST_YAML = 2**20
+_CLOSING_FRAME = re.compile(r"(closing_.+)_1")
+_PAIR_TYPES = {"3d": Closing.BALL, "6d": Closing.WELD}
+_CONSTRAINTS = {
+    "spherical": Closing.BALL,
+    "ball": Closing.BALL,
+    "fixed": Closing.WELD,
+    "revolute": Closing.HINGE,
+    "continuous": Closing.HINGE,
+    "prismatic": Closing.SLIDE,
+    "cylindrical": Closing.CYLINDER,
+    "universal": Closing.UNIVERSAL,
+}
+_JOINT_TYPE = re.compile(r"SPHERICAL|FIXED|UJOINT_[XYZ][XYZ]")
+
+
+@dataclass(frozen=True)
+class LoopFile:
+    """A YAML file of loops.
+
+    Attributes:
+        path: the file.
+        pairs: names of the two frames of each loop, with its kind.
+        driven: names of the driven joints; None where the file does not say.
+        kinds: joints of another kind than the URDF has, ``SPHERICAL``, ``FIXED`` or ``UJOINT_XY``.
+    """
+
+    path: Path
+    pairs: tuple[tuple[str, str, Closing], ...]
+    driven: tuple[str, ...] | None
+    kinds: Mapping[str, str]
+
+
+def read_loop_file(path: Path) -> LoopFile:
+    """Return a YAML file of loops.
+
+    Raises:
+        InputError: it cannot be read, or its keys are not those of such a file.
+    """
+    yaml = required("yaml", "YAML files of loops", "pyyaml")
+    try:
+        tables = yaml.safe_load(read_limited(path, _LARGEST_YAML))
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        reason = str(error).splitlines() or [""]
+        raise InputError(f"{path}: is not valid YAML: {reason[0]}") from None
+    if not isinstance(tables, dict):
+        raise InputError(f"{path}: is not a table of loops with the key closed_loop")
+    pairs = tables.get("closed_loop") or []
+    if not isinstance(pairs, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
+        raise InputError(f"{path}: closed_loop: must be a list of pairs of names")
+    kinds = _texts(path, tables, "type") or ["6d"] * len(pairs)
+    if len(kinds) != len(pairs):
+        raise InputError(f"{path}: type: has {len(kinds)} entries for {len(pairs)} loops")
+    for kind in kinds:
+        if kind.lower() not in _PAIR_TYPES:
+            raise InputError(f'{path}: type = "{kind[:60]}": must be 3d or 6d')
+    names, types = _texts(path, tables, "joint_name") or [], _texts(path, tables, "joint_type") or []
+    if len(names) != len(types):
+        raise InputError(f"{path}: joint_type: has {len(types)} entries for {len(names)} joints in joint_name")
+    for kind in types:
+        if not _JOINT_TYPE.fullmatch(kind):
+            fault = "must be SPHERICAL, FIXED or UJOINT_ with two of the letters X, Y and Z"
+            raise InputError(f'{path}: joint_type = "{kind[:60]}": {fault}')
+    driven = _texts(path, tables, "name_mot")
+    return LoopFile(
+        path,
+        tuple((str(a), str(b), _PAIR_TYPES[kind.lower()]) for (a, b), kind in zip(pairs, kinds, strict=True)),
+        None if driven is None else tuple(driven),
+        dict(zip(names, types, strict=True)),
+    )
+
+
+def _texts(path: Path, tables: Mapping[str, object], key: str) -> list[str] | None:
+    """Return a list of texts; None where the key is missing."""
+    value = tables.get(key)
+    if value is None:
+        return None
+    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+        raise InputError(f"{path}: {key}: must be a list of names")
+    return value
+
+
+def closures_of_pairs(loops: LoopFile, frames: Mapping[str, tuple[str, Frame]]) -> list[LoopClosure]:
+    """Return the closures of a YAML file.
+
+    Args:
+        loops: the file.
+        frames: places that a name may mean: those of links, and of joints as they move.
+
+    Raises:
+        InputError: a name means no frame.
+    """
+    found: list[LoopClosure] = []
+    for first, second, closing in loops.pairs:
+        for name in (first, second):
+            if name not in frames:
+                raise InputError(f'{loops.path}: closed_loop = "{name[:60]}": is no link or joint of the URDF')
+        (one, one_frame), (other, other_frame) = frames[first], frames[second]
+        name = unique_name(
+            common_name([first, second]) or f"{first} {second}", {each.name for each in found} | set(frames)
+        )
+        found.append(LoopClosure(name, closing, one, other, one_frame, other_frame))
+    return found
+
+
+def closures_of_frames(
+    frames: Mapping[str, tuple[str, Frame]], taken: Sequence[str], places: Mapping[str, Frame]
+) -> tuple[list[LoopClosure], list[str]]:
+    """Return the closures that frames ``closing_NAME_1`` and ``closing_NAME_2`` mean, and notes about them.
+
+    Args:
+        frames: named places on links, as name of the link and the frame there.
+        taken: names that are given already.
+        places: the links' frames in the world.
+    """
+    found: list[LoopClosure] = []
+    notes: list[str] = []
+    for name, (one, one_frame) in frames.items():
+        match = _CLOSING_FRAME.fullmatch(name)
+        if match is None or f"{match[1]}_2" not in frames:
+            continue
+        other, other_frame = frames[f"{match[1]}_2"]
+        closing, first_frame, second_frame = Closing.BALL, one_frame, other_frame
+        if {f"{name}_z", f"{match[1]}_2_z"} <= set(frames):
+            # The second pair lies on the hinge's axis.
+            closing = Closing.HINGE
+            first_frame = _towards(one_frame, one, frames[f"{name}_z"], places)
+            second_frame = _towards(other_frame, other, frames[f"{match[1]}_2_z"], places)
+        else:
+            notes.append(f"{match[1]} is taken for a ball joint: its two frames do not say its kind")
+        chosen = unique_name(match[1], {*taken, *(each.name for each in found)})
+        found.append(LoopClosure(chosen, closing, one, other, first_frame, second_frame))
+    return found, notes
+
+
+def _towards(frame: Frame, link: str, end: tuple[str, Frame], places: Mapping[str, Frame]) -> Frame:
+    """Return a frame of a link with its axis z towards another frame's point; the same frame where they coincide."""
+    at = places[link].inverse() @ places[end[0]] @ end[1]
+    direction = at.position - frame.position
+    return axis_frame(frame.position, direction) if np.linalg.norm(direction) > 0 else frame
+
+
+def closures_of_constraints(root: Element, links: set[str], taken: set[str], source: str) -> list[LoopClosure]:
+    """Return the closures of the elements ``<constraint>``.
+
+    Raises:
+        InputError: a link or type is unknown, or a number is none.
+    """
+    found: list[LoopClosure] = []
+    for element in root.findall("constraint"):
+        name = name_of(element, source)
+        place = f"{source}: constraint {name}"
+        kind = element.get("type", "")
+        if kind not in _CONSTRAINTS:
+            raise InputError(f'{place}, type = "{kind[:60]}": must be one of {listing(_CONSTRAINTS)}')
+        first = link_of(element, "parent", links, place)
+        second = link_of(element, "child", links, place)
+        frames = []
+        for side in ("parent", "child"):
+            origin = origin_of(element, f"{side}_origin", place)
+            axis = axis_of(element, f"{side}_axis", place)
+            frames.append(Frame(origin.position, origin.rotation @ axis_frame(np.zeros(3), axis).rotation))
+        closing = _CONSTRAINTS[kind]
+        if closing is Closing.WELD:
+            frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
+        found.append(
+            LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames)
+        )
+    return found

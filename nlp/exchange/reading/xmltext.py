@@ -1,0 +1,80 @@
+"""XML files as elements: what costs memory or time without end, or reaches out of the file, is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from ...errors import InputError
+
+#: Largest description, bytes: twenty times the largest of those that robots' makers publish (without meshes).
+LARGEST_FILE = 16 * 2**20
+#: Deepest element: a chain of 60 bodies needs 62.
+_DEEPEST = 400
+#: Most elements of a description.
+_MOST_ELEMENTS = 200_000
+
+
+class _RefusedError(Exception):
+    """A reason to stop reading, as a clause."""
+
+
+def read_xml(path: Path) -> Element:
+    """Return the root element of an XML file, without comments.
+
+    Raises:
+        InputError: the file cannot be read, is too large or too deep, is no XML, or declares a document type, by which
+            entities could grow without end or bring in other files.
+    """
+    content = read_limited(path)
+    builder = TreeBuilder()
+    parser = expat.ParserCreate()
+    depth, count = 0, 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if depth > _DEEPEST:
+            raise _RefusedError(f"its elements are nested more than {_DEEPEST} deep")
+        if count > _MOST_ELEMENTS:
+            raise _RefusedError(f"it has more than {_MOST_ELEMENTS} elements")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def refuse(*_: object) -> None:
+        raise _RefusedError("it declares a document type or entities, which are not read")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(content, True)
+        return builder.close()
+    except _RefusedError as refused:
+        raise InputError(f"{path}: cannot be read: {refused}") from None
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: is not valid XML: {error}") from None
+
+
+def read_limited(path: Path, largest: int = LARGEST_FILE) -> bytes:
+    """Return the bytes of a regular file.
+
+    Raises:
+        InputError: it cannot be read, is no file, or is larger than ``largest``.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: cannot be read: it is no file")
+        with path.open("rb") as file:
+            content = file.read(largest + 1)
+    except (OSError, ValueError) as error:
+        fault = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(f"{path}: cannot be read: {fault}") from None
+    if len(content) > largest:
+        raise InputError(f"{path}: cannot be read: it is larger than {largest // 2**20} MB")
+    return content

@@ -1,0 +1,67 @@
+"""Ranges of joints from the limits of a case, counted from the pose that is exported.
+
+Ranges come from ``leg_length``, from ``actuator_angle`` and ``actuator_length``, and from ranges of joints. Other
+limits (cones, strokes, clearances, rates) are no ranges of one joint.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ....models.limbjoints import LimbJoint
+from ...case.case import Case
+from .chains import Step
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: A slide with one side of a range has this many times the robot's size as the other: no loop of the robot is as long.
+_FAR = 100.0
+
+
+def joint_range(
+    case: Case, step: Step, joint: LimbJoint | None, value: float, lengths: Mapping[str, float], size: float
+) -> tuple[float, float] | None:
+    """Return the smallest and the largest coordinate of a joint from the exported pose; None without a limit.
+
+    Args:
+        case: with its limits.
+        step: the joint.
+        joint: the joint of the robot file that it is part of; None for a leg.
+        value: its coordinate from home at the exported pose, radians or length.
+        lengths: of the legs at that pose, by limb.
+        size: length of the order of the robot's own.
+    """
+    if not case.limits or step.kind == "S" or step.follows:
+        return None
+    # The classes of limits need pydantic, which a case without limits does not load.
+    from ...case.limits.legs import LegLength  # noqa: PLC0415
+    from ...case.limits.motions import JointMotion  # noqa: PLC0415
+    from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
+
+    is_slide = step.kind == "P"
+    lower, upper = -math.inf, math.inf
+    for limit in case.limits:
+        at = None
+        if isinstance(limit, LegLength) and step.actuated and step.actuator in lengths:
+            at = lengths[step.actuator]
+        elif isinstance(limit, QuantityLimit) and step.actuated and joint is not None:
+            measure = "actuator_length" if is_slide else "actuator_angle"
+            at = value if limit.measure == measure else None
+        elif isinstance(limit, JointMotion) and joint is not None and joint.is_called(limit.joint):
+            at = value if limit.part == step.part else None
+        if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
+            lower = max(lower, -math.inf if limit.min is None else limit.min - at)
+            upper = min(upper, math.inf if limit.max is None else limit.max - at)
+    if math.isinf(lower) and math.isinf(upper):
+        return None
+    # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.
+    far = _FAR * size if is_slide else math.pi
+    middle = 0.0 if is_slide else -value
+    return max(lower, middle - far), min(upper, middle + far)
+
+
+def joints_by_label(joints: tuple[LimbJoint, ...]) -> dict[str, LimbJoint]:
+    """Return joints by their labels."""
+    return {joint.label: joint for joint in joints}

@@ -1,0 +1,61 @@
+"""The numbers of a result as settings of its case, as ``--set`` has them."""
+
+from __future__ import annotations
+
+from ..case.case import Case
+from ..case.overrides import Settings
+from ..case.pose import Free, Pose
+from ..errors import InputError
+from .data import CombinedResult, SolveResult
+from .evaluation import EvaluationResult
+from .parts import PoseData, RobotData
+from .reading import Result
+
+
+def robot_of(result: Result, source: str, case: Case) -> RobotData:
+    """Return the robot of a result of a case.
+
+    Args:
+        result: the result.
+        source: name of its file, for messages.
+        case: the case.
+
+    Raises:
+        InputError: the result is of another kind, of another case, or no answer.
+    """
+    if not isinstance(result, SolveResult | CombinedResult | EvaluationResult):
+        raise InputError(f"{source}: is no result of solve or evaluate")
+    stated = result.head.case, result.head.model
+    if stated != (case.name, case.model.name):
+        fault = f"is a result of the case {stated[0]!r} with the robot {stated[1]!r}"
+        raise InputError(f"{source}: {fault}, not of {case.name!r} with {case.model.name!r}")
+    if isinstance(result, CombinedResult):
+        point = result.combined.method_point
+        robot = None if point is None else point.robot
+    else:
+        robot = result.robot
+    if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
+        raise InputError(f"{source}: holds no answer: its solve gave none")
+    return robot
+
+
+def settings_of(robot: RobotData, case: Case) -> Settings:
+    """Return the numbers of a robot by the names that they have in its case, in the case's units."""
+    found: dict[str, float | list[float]] = {}
+    for name, value in robot.parameters.items():
+        found[case.parameter_name(name)] = list(value) if isinstance(value, tuple) else value
+    stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
+    for prefix, pose, data in zip(case.pose_prefixes, case.poses, stated, strict=True):
+        found |= _pose_settings(prefix, pose, data)
+    return found
+
+
+def _pose_settings(prefix: str, pose: Pose, data: PoseData) -> Settings:
+    """Return the numbers of a pose; those of a rotation only where it is free."""
+    found: dict[str, float | list[float]] = {
+        f"{prefix}p_{axis}": value for axis, value in zip("xyz", data.position, strict=True)
+    }
+    if isinstance(pose.rotation.angle, Free) or pose.rotation.axis is None:
+        found[f"{prefix}angle"] = data.angle
+        found[f"{prefix}axis"] = list(data.axis)
+    return found

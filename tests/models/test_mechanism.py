@@ -1,0 +1,349 @@
+"""Robots of any topology in numbers: against the symbolic form, MuJoCo's Jacobians, and known singularities."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+import tomllib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from mechanism_robots import Engine, four_bar_delta, geared, projector, turn, without
+from mujoco_robots import Oracle, scaled_twists
+from robot_files import robot_of
+
+import screwsynth.models
+from screwsynth.models import Model, Substitution, axis_angle_from_matrix, instantiate, robot
+from screwsynth.models.mechanism import (
+    Coupling,
+    Mechanism,
+    MechanismError,
+    MechanismJoint,
+    MechanismLink,
+    SingularityType,
+    check_mechanism,
+    close,
+    generic_ranks,
+    limbs_of,
+    links_of,
+    mechanism_of,
+    robot_tables,
+    singularities_of,
+    wrenches_of,
+)
+from screwsynth.nlp.evidence.assembly import unknowns_from_home
+
+GALLERY = Path(screwsynth.models.__file__).parent / "robots"
+NAMES = sorted(path.stem for path in GALLERY.glob("*.toml"))
+CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
+LENGTH = 0.7
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    return tomllib.loads((GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def driven(mechanism: Mechanism, seed: int, reach: float = 0.05) -> dict[str, float]:
+    rng = np.random.default_rng(seed)
+    return {joint.name: float(rng.uniform(-reach, reach)) for joint in mechanism.joints if joint.actuated}
+
+
+def value_at_home(tables: dict[str, Any]) -> float:
+    """F of the symbolic model at home."""
+    model = robot(**tables)
+    own = Substitution.identity(model)
+    F = instantiate(model, own, ca.SX(LENGTH), [ca.SX(CHI)]).F
+    typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
+    return float(ca.Function("F", own.all, [F])(typical, np.zeros(len(model.unknowns)), np.eye(3), model.home))
+
+
+def values_of(model: Model, plate: MechanismLink) -> tuple[list[float], list[Any]]:
+    """F and the actuators' screws (6, a) of the symbolic model at home, and at a pose along the path from there."""
+    own = Substitution.identity(model)
+    instance = instantiate(model, own, ca.SX(LENGTH), [ca.SX(CHI)])
+    function = ca.Function("F", own.all, [instance.F, ca.densify(instance.actuators)])
+    typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
+    axis, angle = axis_angle_from_matrix(plate.rotation)
+    unknowns = unknowns_from_home(model, typical, np.concatenate([angle * axis, plate.position]))
+    assert unknowns is not None
+    home = function(typical, np.zeros(len(model.unknowns)), np.eye(3), model.home)
+    there = function(typical, unknowns, plate.rotation, plate.position)
+    return [float(home[0]), float(there[0])], [home[1].full(), there[1].full()]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gallery_at_home_and_driven_is_that_of_the_engine(name: str) -> None:
+    """Universal joints are two hinges here, and parallelograms four, in a loop of their own."""
+    oracle, mechanism = Oracle(robot_of(table(name)), LENGTH), mechanism_of(table(name))
+    for seed in (0, 1):
+        if seed:
+            values = driven(mechanism, seed)
+            oracle.drive(list(values.values()))
+            mechanism = close(mechanism, actuators=values).mechanism
+        found, ranks = wrenches_of(mechanism, LENGTH), oracle.ranks()
+        assert found.objective(CHI) == pytest.approx(oracle.objective(CHI), rel=1e-9)
+        for own, member in zip(found.members, oracle.members(), strict=True):
+            np.testing.assert_allclose(own.projector, member.projector, rtol=0, atol=1e-9)
+            # The rows span the same wrenches, and are orthonormal in scaled coordinates.
+            assert np.sum((own.rows @ CHI[[3, 4, 5, 0, 1, 2]]) ** 2) == pytest.approx(
+                np.sum(own.resisted(CHI) ** 2), abs=1e-9
+            )
+        feasible = oracle.feasible(CHI)
+        rates = list(found.rates(feasible).values())
+        np.testing.assert_allclose(rates, oracle.rates(feasible), rtol=1e-9, atol=1e-9)
+        assert tuple(each.wrenches for each in found.members) == ranks.W
+        assert tuple(each.constraints for each in found.members) == ranks.C
+        own_ranks = found.ranks
+        assert (own_ranks.jacobian, own_ranks.constraints) == (ranks.J, ranks.constraints)
+        assert (own_ranks.freedoms, own_ranks.locked) == (ranks.freedoms, ranks.locked)
+
+
+def test_every_robot_of_the_gallery_comes_back_as_limbs() -> None:
+    """Parallelograms of four hinges become Pa again; F of the model from the tables is that of the numbers."""
+    for name in ["3-rps", "delta", "delta-parallelogram"]:
+        mechanism = mechanism_of(table(name))
+        tables = limbs_of(mechanism)
+        assert tables == robot_tables(mechanism)
+        types = [joint["type"] for limb in tables["limb"] for joint in limb.get("joints", [])]
+        assert ("Pa" in types) == (name == "delta-parallelogram")
+        assert value_at_home(tables) == pytest.approx(wrenches_of(mechanism, LENGTH).objective(CHI), rel=1e-9)
+        # Joints that are given from the platform's side are turned over.
+        flipped = replace(
+            mechanism,
+            joints=tuple(
+                replace(each, inner=each.outer, outer=each.inner, axis=-each.axis) if k % 2 else each
+                for k, each in enumerate(mechanism.joints)
+            ),
+        )
+        assert value_at_home(limbs_of(flipped)) == pytest.approx(value_at_home(tables), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delta-parallelogram", "four-bar delta", "geared"])
+def test_nested_loops_and_couplings_against_the_engines_jacobians(name: str) -> None:
+    tables = {"four-bar delta": four_bar_delta(), "geared": geared()}.get(name)
+    mechanism = mechanism_of(tables or table(name))
+    for seed in (0, 1):
+        mechanism = close(mechanism, actuators=driven(mechanism, seed, 0.1 * seed)).mechanism
+        found, engine = wrenches_of(mechanism, LENGTH), Engine(mechanism)
+        free = engine.platform_twists(locked=False)
+        assert (found.ranks.freedoms, found.ranks.locked) == (
+            free.shape[1],
+            engine.platform_twists(locked=True).shape[1],
+        )
+        np.testing.assert_allclose(found.feasible - free @ (free.T @ found.feasible), 0, atol=1e-9)
+        chi = free @ (free.T @ CHI)
+        np.testing.assert_allclose(list(found.rates(chi).values()), engine.rates(chi), rtol=1e-9, atol=1e-9)
+        total = 0.0
+        for member in found.members:
+            # The member alone: without the links of all others.
+            others = {
+                link
+                for other in found.members
+                if other is not member
+                for each in mechanism.joints
+                if each.name in other.joints
+                for link in (each.inner, each.outer)
+            }
+            own = {link for each in mechanism.joints if each.name in member.joints for link in (each.inner, each.outer)}
+            alone = Engine(without(mechanism, others - own - {mechanism.base, mechanism.platform}))
+            P = projector(alone.platform_twists(locked=True), member.centre, LENGTH)
+            np.testing.assert_allclose(member.projector, P, rtol=0, atol=1e-9)
+            scaled = np.concatenate([CHI[3:] + np.cross(CHI[:3], member.centre), LENGTH * CHI[:3]])
+            total += float(np.sum((P @ scaled) ** 2))
+        assert found.objective(CHI) == pytest.approx(total, rel=1e-9)
+
+
+def test_the_symbolic_form_of_nested_loops_has_the_numbers_of_the_mechanism() -> None:
+    for tables in (four_bar_delta(), geared(), links_of(mechanism_of(table("delta-parallelogram")))):
+        mechanism = mechanism_of(tables)
+        found = wrenches_of(mechanism, LENGTH)
+        model = robot(**tables)
+        there = close(mechanism, actuators=driven(mechanism, 2)).mechanism
+        plate = next(link for link in there.links if link.name == there.platform)
+        for configuration, F, actuators in zip((mechanism, there), *values_of(model, plate), strict=True):
+            own = wrenches_of(configuration, LENGTH)
+            assert pytest.approx(own.objective(CHI), rel=1e-9) == F
+            # Screws of actuators may differ by what the members allow.
+            driving = list(own.actuators)
+            for member in own.members:
+                columns = [driving.index(name) for name in member.actuators]
+                scaled = scaled_twists(member.centre, LENGTH) @ actuators[:, columns]
+                np.testing.assert_allclose(member.projector @ scaled, member.actuation, rtol=0, atol=1e-9)
+        assert model.generic is not None
+        assert (model.generic.jacobian, model.generic.constraints) == (found.ranks.jacobian, found.ranks.constraints)
+        assert [each.wrenches for each in model.structure] == [each.wrenches for each in found.members]
+        assert {name for each in model.structure for name in each.nested} == {each.name for each in mechanism.joints}
+
+
+def test_numbers_do_not_depend_on_frame_tree_or_order() -> None:
+    """Moved in the world, with links in another order, and joints given from the other side."""
+    R, t = turn(np.array([1.0, 2, -1]), 70), np.array([3.0, -2, 1])
+    for name in ("delta", "delta-parallelogram", "exechon"):
+        mechanism = mechanism_of(table(name))
+        moved = replace(
+            mechanism,
+            links=tuple(
+                replace(each, position=R @ each.position + t, rotation=R @ each.rotation)
+                for each in mechanism.links[::-1]
+            ),
+            joints=tuple(
+                replace(e, point=R @ e.point + t, axis=-(R @ e.axis), inner=e.outer, outer=e.inner)
+                for e in mechanism.joints[::-1]
+            ),
+        )
+        chi = np.concatenate([R @ CHI[:3], R @ CHI[3:] + np.cross(t, R @ CHI[:3])])
+        one, other = wrenches_of(mechanism, LENGTH), wrenches_of(moved, LENGTH)
+        assert other.objective(chi) == pytest.approx(one.objective(CHI), rel=1e-9)
+        assert other.rates(chi) == pytest.approx(dict(one.rates(CHI)), rel=1e-9)
+        assert sorted(other.ranks.passive) == sorted(one.ranks.passive)
+
+
+def snu() -> dict[str, Any]:
+    changed = copy.deepcopy(table("3-upu"))
+    for k in (0, 2):
+        joint = changed["limb"][0]["joints"][k]
+        joint["axes"] = ["x" if axis == "y" else "cross(x, A - B)" for axis in joint["axes"]]
+    return changed
+
+
+def with_points(name: str, **points: Any) -> dict[str, Any]:  # noqa: ANN401 - expressions
+    changed = copy.deepcopy(table(name))
+    for limb in changed["limb"]:
+        limb["points"].update(points)
+    return changed
+
+
+def stretched() -> dict[str, Any]:
+    changed = copy.deepcopy(table("planar-3-rrr"))
+    others = copy.deepcopy(changed["limb"][0])
+    changed["limb"][0]["repeat"], others["repeat"] = {"angles": [0]}, {"angles": [120, 240]}
+    changed["limb"][0]["points"]["E"] = ["(rb + ax)/2", "ay/2", 0]
+    changed["limb"].append(others)
+    return changed
+
+
+def along_first_axis() -> dict[str, Any]:
+    changed = copy.deepcopy(table("6-ups"))
+    for limb in changed["limb"]:
+        limb["joints"][0]["axes"] = ["A - B", "cross(A - B, y)"]
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("tables", "dimensions", "kinds"),
+    [
+        (snu(), {}, {SingularityType.CONSTRAINT}),
+        (with_points("planar-3-rrr", E=["2*ax", "2*ay", 0]), {}, {SingularityType.ACTUATION}),
+        (table("five-bar"), {"reach": math.sqrt(0.25**2 - 0.1**2)}, {SingularityType.ACTUATION}),
+        (table("delta"), {"rb": 0.3, "arm": 0.4, "tilt": 60, "rp": 0.5, "rod": 0.9}, {SingularityType.CONSTRAINT}),
+        (stretched(), {}, {SingularityType.SERIAL}),
+        (along_first_axis(), {}, {SingularityType.PASSIVE}),
+        (table("3-rps"), {}, set()),
+    ],
+    ids=["snu", "planar", "five-bar", "delta", "stretched", "passive", "regular"],
+)
+def test_singularities_are_told_apart(
+    tables: dict[str, Any], dimensions: dict[str, float], kinds: set[SingularityType]
+) -> None:
+    mechanism = mechanism_of(tables, dimensions)
+    ranks = wrenches_of(mechanism).ranks
+    assert {each.type for each in singularities_of(ranks, generic_ranks(mechanism))} == kinds
+
+
+def test_closing_at_a_pose_and_at_actuators_agree_and_reach_what_is_wanted() -> None:
+    for name in ("delta", "3-rps", "6-rus"):
+        mechanism = mechanism_of(table(name))
+        wanted = driven(mechanism, 3, 0.1)
+        there = close(mechanism, actuators=wanted)
+        assert there.residual < 1e-13
+        assert {key: there.coordinates[key] for key in wanted} == pytest.approx(wanted, abs=1e-14)
+        plate = next(link for link in there.mechanism.links if link.name == "platform")
+        by_pose = close(mechanism, position=plate.position, rotation=plate.rotation)
+        assert {key: by_pose.coordinates[key] for key in wanted} == pytest.approx(wanted, abs=1e-9)
+        assert 0.1 < by_pose.nearness < 10
+        # A loop that the description leaves open is closed first.
+        first = mechanism.joints[-1]
+        opened = replace(mechanism, joints=(*mechanism.joints[:-1], replace(first, outer_point=first.point + 1e-4)))
+        assert close(opened).residual < 1e-13
+    with pytest.raises(MechanismError, match="do not close"):
+        close(mechanism, position=plate.position + 50)
+
+
+def test_a_mechanism_of_sixty_joints_takes_well_under_a_second() -> None:
+    """A 6-RUS with 36 links that hang on one joint each: 60 joints."""
+    tables = table("6-rus")
+    mechanism = mechanism_of(tables)
+    joints, links = list(mechanism.joints), list(mechanism.links)
+    for k, each in enumerate(mechanism.joints[:9]):
+        for n in range(4):
+            links.append(MechanismLink(f"extra {k} {n}"))
+            joints.append(replace(each, name=f"extra {k} {n}", outer=f"extra {k} {n}", actuated=False))
+    large = replace(mechanism, joints=tuple(joints), links=tuple(links))
+    assert len(large.joints) >= 60
+    start = time.process_time()
+    found = wrenches_of(large, LENGTH)
+    assert time.process_time() - start < 1.0
+    # Links that hang on one joint carry nothing.
+    assert found.objective(CHI) == pytest.approx(wrenches_of(mechanism, LENGTH).objective(CHI), rel=1e-9)
+
+
+def broken(**changes: Any) -> Mechanism:  # noqa: ANN401 - any field
+    return replace(mechanism_of(table("planar-3-rrr")), **changes)
+
+
+def test_a_mechanism_that_contradicts_itself_is_refused_in_one_sentence() -> None:
+    good = broken()
+    first, *rest = good.joints
+    cases = [
+        (broken(base="ground"), "base: is 'ground', which is no link"),
+        (broken(platform="base"), "platform: is 'base', which is the base"),
+        (broken(joints=tuple(replace(j, actuated=False) for j in good.joints)), "actuated: is given at no joint"),
+        (broken(joints=(replace(first, axis=np.zeros(3)), *rest)), "joint 1:1, axis: is zero; a direction is needed"),
+        (broken(joints=(replace(first, axis=2 * first.axis), *rest)), "has length 2; a unit vector is needed"),
+        (broken(joints=(replace(first, outer="none"), *rest)), "has the link 'none', which is unknown"),
+        (broken(joints=(replace(first, outer=first.inner), *rest)), "joins the link 'base' to itself"),
+        (broken(joints=(first, *good.joints)), "joint 1:1: is given twice"),
+        (broken(joints=(replace(first, kind="S"), *rest)), "joint 1:1 (S): is actuated; only R, P and H can be"),
+        (broken(joints=(replace(first, point=np.full(3, np.nan)), *rest)), "has a point that is not finite"),
+        (broken(links=(*good.links, MechanismLink("loose"))), "link loose: is joined to the base by no joint"),
+        (broken(joints=good.joints[:3], links=tuple(e for e in good.links if e.name[5:6] in ("", "1", "o"))), "chain"),
+        (broken(couplings=(Coupling("c", (("1:1", 1.0),)),)), "coupling c: couples fewer than two joints"),
+        (broken(couplings=(Coupling("c", (("1:1", 1.0), ("9", 1.0))),)), "has the joint '9', which is unknown"),
+        (broken(joints=(replace(first, range=(1.0, 0.0)), *rest)), "range: is (1.0, 0.0)"),
+    ]
+    for mechanism, sentence in cases:
+        with pytest.raises(MechanismError) as error:
+            check_mechanism(mechanism)
+        assert sentence in str(error.value)
+        assert str(error.value).isprintable()
+    with pytest.raises(MechanismError, match=r"^joints .*motor1.*are no limb with branches: "):
+        limbs_of(mechanism_of(four_bar_delta()))
+
+
+def test_welds_and_locked_actuators_make_one_body() -> None:
+    """A link that is split by a weld changes nothing; a joint directly between base and platform is a member."""
+    mechanism = mechanism_of(table("tricept"))
+    last = mechanism.joints[-1]
+    split = replace(
+        mechanism,
+        links=(*mechanism.links, MechanismLink("flange")),
+        joints=(
+            *mechanism.joints[:-1],
+            replace(last, outer="flange"),
+            MechanismJoint("bolts", "weld", "flange", "platform", np.zeros(3)),
+        ),
+    )
+    assert wrenches_of(split).objective(CHI) == pytest.approx(wrenches_of(mechanism).objective(CHI), rel=1e-12)
+    pinned = replace(
+        mechanism, joints=(*mechanism.joints, MechanismJoint("pin", "S", "base", "platform", np.array([0.0, 0, 1])))
+    )
+    added = wrenches_of(pinned).objective(CHI) - wrenches_of(mechanism).objective(CHI)
+    velocity = CHI[3:] + np.cross(CHI[:3], [0, 0, 1])
+    assert added == pytest.approx(float(velocity @ velocity), rel=1e-12)

@@ -1,0 +1,357 @@
+"""The solved robot in other programs' formats: MuJoCo finds the same wrenches and rates, and an import the same J."""
+
+import csv
+import io
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import ezdxf
+import mujoco
+import numpy as np
+import pytest
+from mujoco_trees import Tree
+from numpy.typing import NDArray
+
+from screwsynth.models import WrenchKind, robot, robot_function
+from screwsynth.models.catalog import gallery_names
+from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
+from screwsynth.nlp import (
+    Case,
+    InputError,
+    Nlp,
+    Task,
+    case_from_tables,
+    evaluate,
+    formulate,
+)
+from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.exchange.reading.importing import Request, import_robot
+from screwsynth.nlp.exchange.reading.reduction import Ends
+from screwsynth.nlp.exchange.solved.mechanism_of import Exported, mechanism_of
+from screwsynth.nlp.exchange.writing.folder import exported_files
+from screwsynth.nlp.exchange.writing.mjcf import mjcf_text
+from screwsynth.nlp.exchange.writing.numbers import quaternion, roll_pitch_yaw
+from screwsynth.nlp.exchange.writing.urdf import urdf_of
+
+Array = NDArray[np.float64]
+Run = Callable[..., tuple[int, str, str]]
+
+ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
+#: One of each kind of limb and of closing, for tests that build the robot again.
+SOME = ("3-rps", "delta-parallelogram", "three-upu")
+OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
+
+
+def starter(name: str) -> Case:
+    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
+
+
+@cache
+def placed(name: str, seed: int) -> tuple[Nlp, Array]:
+    """A robot's program, and a closed point of it: its start for seed 0, else a random one near it."""
+    nlp = formulate(starter(name))
+    start = closed_start(nlp)
+    if seed == 0:
+        return nlp, start
+    # A tenth of the range to each side, of unknowns a hundredth: from there, loops close in the same assembly.
+    part = np.array([0.01 if each.name.startswith("q") else 0.1 for each in nlp.program.variables])
+    random = np.random.default_rng(seed).uniform(-1, 1, nlp.n)
+    x = close_equations(nlp, start + part * random * (nlp.upper - nlp.lower))
+    assert loops_are_closed(nlp, x), name
+    return nlp, x
+
+
+@cache
+def exported(name: str, seed: int) -> Exported:
+    return mechanism_of(*placed(name, seed))
+
+
+def work_rates(J: Array) -> Array:
+    """J'J, from which F of every twist follows, in parts of its largest entry."""
+    squares = J.T @ J
+    return squares / np.abs(squares).max()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
+    for name in ROBOTS:
+        nlp, x = placed(name, seed)
+        found, state = exported(name, seed), evaluate(nlp, x)
+        tree = Tree(mjcf_text(found.mechanism), found.size)
+        assert tree.open <= 1e-9, name
+        body = tree.data.body("platform")
+        np.testing.assert_allclose(body.xpos, state.position, atol=1e-12 * found.size)
+        np.testing.assert_allclose(body.xmat.reshape(3, 3), state.rotation, atol=1e-12)
+        limbs = [row.limb for row in nlp.program.model.rows]
+        words = {joint.name: joint.label.partition(":")[0].partition(".")[0] for joint in found.joints}
+        wrenches = tree.wrenches(words.__getitem__)
+        J = state.jacobian / np.array([1.0, 1.0, 1.0, *[found.size] * 3])
+        for limb in dict.fromkeys(limbs):
+            rows = J[[k for k, each in enumerate(limbs) if each == limb]]
+            own = wrenches.pop(limb)
+            assert own.shape[1] == len(rows), (name, limb)
+            basis = np.linalg.qr(own)[0]
+            assert np.linalg.matrix_rank(basis.T @ rows.T, 1e-9) == np.linalg.matrix_rank(rows, 1e-9)
+            np.testing.assert_allclose(rows - rows @ basis @ basis.T, 0.0, atol=1e-10, err_msg=f"{name} {limb}")
+        assert all(rest.shape[1] == 0 for rest in wrenches.values()), name
+
+
+def test_actuator_rates_in_mujoco_are_those_of_the_result() -> None:
+    chi = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
+    for name in ROBOTS:
+        nlp, x = placed(name, 1)
+        found = exported(name, 1)
+        tree = Tree(mjcf_text(found.mechanism), found.size)
+        basis = tree.feasible_twists()
+        twist = basis @ (basis.T @ chi)
+        motion, rest = tree.motion(twist)
+        assert rest <= 1e-9 * found.size, name
+        twisted = formulate(replace(nlp.case, tasks=[Task(tuple(twist))]))
+        state = evaluate(twisted, x)
+        mobility = mobility_of(twisted, x, state)
+        if mobility is None:
+            rows = zip(nlp.program.model.rows, state.rates, strict=True)
+            rates = {row.limb: rate for row, rate in rows if row.kind is WrenchKind.FORCE}
+        else:
+            assert mobility.constrained <= 1e-9, name
+            rates = dict(mobility.actuator_rates)
+        expected = [rates[joint.actuator] for joint in found.joints if joint.actuator]
+        np.testing.assert_allclose(motion[tree.driven], expected, atol=1e-8 * found.size, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["delta", "stewart-gough"])
+def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(name: str) -> None:
+    found = exported(name, 1)
+    tree = Tree(mjcf_text(found.mechanism), found.size)
+    basis = tree.feasible_twists()
+    twist = basis @ basis.T @ np.array([0.0, 0.0, 0.1 / found.size, 0.3, 0.2, -0.4])
+    motion, _ = tree.motion(twist)
+    # So small a way that the twist is the same along it to a part of a thousand; the ramp begins and ends at rest.
+    amount, seconds = 1e-3 * found.size / np.linalg.norm(twist[3:]), 0.5
+    start = tree.data.body("platform").xpos.copy()
+    steps = round(seconds / tree.model.opt.timestep)
+    for k in range(9 * steps):  # the aligned platform turns slowly to where its legs hold it
+        part = min(1.0, (k + 1) / steps)
+        tree.data.ctrl[:] = amount * motion[tree.driven] * part**2 * (3 - 2 * part)
+        mujoco.mj_step(tree.model, tree.data)
+    moved = tree.data.body("platform").xpos - start
+    wanted = amount * (twist[3:] + np.cross(twist[:3], start))
+    assert np.linalg.norm(moved - wanted) <= 2e-3 * np.linalg.norm(wanted)
+    assert tree.open <= 1e-8
+
+
+def test_export_import_export_import_keeps_the_rows_of_every_robot(tmp_path: Path) -> None:
+    for name in ROBOTS:
+        for seed in (0, 1):
+            nlp, x = placed(name, seed)
+            J = work_rates(evaluate(nlp, x).jacobian)
+            mechanism = exported(name, seed).mechanism
+            for _ in range(2):
+                (tmp_path / "robot.xml").write_text(mjcf_text(mechanism), encoding="utf-8")
+                mechanism = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
+            again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+            np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
+        urdf = urdf_of(exported(name, 1).mechanism)
+        (tmp_path / "robot.urdf").write_text(urdf.text, encoding="utf-8")
+        (tmp_path / "robot.yaml").write_text(urdf.loops_text(exported(name, 1).mechanism), encoding="utf-8")
+        mechanism = import_robot(Request(tmp_path / "robot.urdf", Ends("platform"))).mechanism
+        again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+        np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=f"{name}, URDF")
+
+
+def rebuilt(tables: dict[str, object], nlp: Nlp) -> Nlp:
+    """The program of a robot file's tables at its home, with the task and length of another program."""
+    model = robot(**tables)  # type: ignore[arg-type] # the tables of a robot file
+    tasks, length = nlp.case.tasks, nlp.case.characteristic_length
+    case = Case(model=model, parameters={}, position=model.home, tasks=tasks, characteristic_length=length)
+    return formulate(case)
+
+
+@pytest.mark.parametrize("name", [*SOME, *[pytest.param(each, marks=pytest.mark.slow) for each in OTHERS]])
+def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(name: str, tmp_path: Path) -> None:
+    for seed in (0, 1):
+        nlp, x = placed(name, seed)
+        state = evaluate(nlp, x)
+        program, point = nlp, x
+        for _ in range(2):
+            text = exported_files(mechanism_of(program, point), ["mjcf"])["robot.xml"]
+            (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
+            tables = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).tables
+            program = rebuilt(tables, nlp)
+            point = np.zeros(program.n)
+            again = evaluate(program, point)
+            assert again.jacobian.shape == state.jacobian.shape
+            np.testing.assert_allclose(work_rates(again.jacobian), work_rates(state.jacobian), atol=1e-10)
+            assert abs(again.F - state.F) <= 1e-10 * state.size
+
+
+def test_urdf_loads_in_mujoco_and_its_loop_frames_coincide() -> None:
+    for name in ROBOTS:
+        found = exported(name, 1)
+        urdf = urdf_of(found.mechanism)
+        # MuJoCo merges links that are fixed to others, unless it is told not to.
+        kept = urdf.text.replace("<link", '<mujoco><compiler fusestatic="false"/></mujoco>\n  <link', 1)
+        model = mujoco.MjModel.from_xml_string(kept)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        assert urdf.loops, name
+        for loop in urdf.loops:
+            first, second = data.body(loop.first), data.body(loop.second)
+            np.testing.assert_allclose(first.xpos, second.xpos, atol=1e-9 * found.size)
+            if loop.kind == "6d":
+                np.testing.assert_allclose(first.xmat, second.xmat, atol=1e-9)
+        platform = next(link for link in found.mechanism.links if link.name == "platform")
+        np.testing.assert_allclose(data.body("platform").xpos, platform.position, atol=1e-9 * found.size)
+        np.testing.assert_allclose(data.body("platform").xmat.reshape(3, 3), platform.rotation, atol=1e-9)
+
+
+def test_screws_couplings_and_welds_of_any_mechanism_are_written() -> None:
+    links = tuple(MechanismLink(name) for name in ("base", "a", "b", "c", "platform"))
+    x, z = np.eye(3)[0], np.eye(3)[2]
+    joints = (
+        MechanismJoint("screw", "H", "base", "a", np.zeros(3), z, pitch=0.25, actuated=True, range=(-1.0, 2.0)),
+        MechanismJoint("slide", "P", "base", "b", x, z),
+        MechanismJoint("hinge", "R", "base", "c", -x, x),
+        MechanismJoint("fixed", "weld", "a", "platform", z),
+        MechanismJoint("ball", "S", "b", "platform", x + z),
+    )
+    couplings = (Coupling("two", (("screw", 0.5), ("slide", -2.0))),)
+    three = (*couplings, Coupling("three", (("screw", 1.0), ("slide", 2.0), ("hinge", 3.0))))
+    model = mujoco.MjModel.from_xml_string(mjcf_text(Mechanism("any", links, joints, "base", "platform", three)))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert (model.neq, model.ntendon, model.nu) == (4, 1, 1)
+    np.testing.assert_allclose(model.actuator_ctrlrange, [[-1.0, 2.0]])
+    assert model.body("platform").parentid == model.body("a").id
+    urdf = urdf_of(Mechanism("any", links, joints, "base", "platform", couplings))
+    factors = {
+        m[1]: (m[2], float(m[3]))
+        for m in re.finditer(
+            r'<joint name="(\w+)"(?:(?!</joint>).)*<mimic joint="(\w+)" multiplier="([^"]+)"', urdf.text, re.DOTALL
+        )
+    }
+    assert factors == {"screw_slide": ("screw", 0.25), "slide": ("screw", 0.25)}
+    with pytest.raises(InputError, match="'three' cannot be written as URDF: it has 3 joints"):
+        urdf_of(Mechanism("any", links, joints, "base", "platform", three))
+
+
+def test_ranges_count_from_the_pose_and_reach_the_actuators() -> None:
+    text = starter_case(robot_function("3-rps")()).replace("actuator_length", "# actuator_length")
+    tables = tomllib.loads(text)
+    tables["limits"] = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
+    nlp = formulate(case_from_tables(tables, name="rps", source="rps"))
+    found = mechanism_of(nlp, closed_start(nlp))
+    state = evaluate(nlp, closed_start(nlp))
+    joints = {joint.name: joint for joint in found.mechanism.joints}
+    for k in range(3):
+        at = state.quantities["actuator_length"][k]
+        np.testing.assert_allclose(joints[f"joint_{k + 1}_2"].range, [-0.4 - at, 0.5 - at], atol=1e-12)
+    hinge = joints["joint_1_1"]
+    assert hinge.range is not None
+    words = {joint.name: joint for joint in found.joints}
+    assert hinge.range[1] == pytest.approx(np.radians(30) - words["joint_1_1"].coordinate, abs=1e-12)
+    assert joints["joint_2_1"].range is None
+    model = mujoco.MjModel.from_xml_string(mjcf_text(found.mechanism))
+    expected = [joints[f"joint_{k + 1}_2"].range for k in range(3)]
+    np.testing.assert_allclose(model.actuator_ctrlrange, expected, atol=1e-15)
+
+
+def test_tables_hold_the_joints_in_every_frame() -> None:
+    found = exported("tricept", 1)
+    units = found.case.units
+    files = exported_files(found, ["csv"])
+    assert list(files) == ["README.md", "joints.csv", "links.csv", "plates.csv"]
+    frames = {}
+    for row in csv.DictReader(io.StringIO(files["links.csv"])):
+        origin = np.array([float(row[f"{c} [{units.length}]"]) for c in "xyz"])
+        axes = np.array([[float(row[f"{own} axis {c}"]) for c in "xyz"] for own in "xyz"]).T
+        np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-14)
+        frames[row["link"]] = origin, axes
+    rows = list(csv.DictReader(io.StringIO(files["joints.csv"])))
+    assert len(rows) == len(found.mechanism.joints)
+    for row, joint in zip(rows, found.mechanism.joints, strict=True):
+        for frame, link in (("base", "base"), ("platform", "platform"), ("inner", joint.inner), ("outer", joint.outer)):
+            origin, axes = frames[link]
+            place = np.array([float(row[f"{c} in {frame} [{units.length}]"]) for c in "xyz"])
+            np.testing.assert_allclose(origin + axes @ place, joint.point, atol=1e-12)
+            if joint.kind != "S":
+                axis = np.array([float(row[f"axis {c} in {frame}"]) for c in "xyz"])
+                np.testing.assert_allclose(axes @ axis, joint.axis, atol=1e-12)
+
+
+def test_plates_are_drawn_to_scale_with_their_unit_and_their_offsets(tmp_path: Path) -> None:
+    found = exported("hexapod", 1)
+    moved = [
+        replace(each, point=each.point + np.array([0, 0, 0.5])) if each.name == "joint_1_1_first" else each
+        for each in found.mechanism.joints
+    ]
+    tilted = replace(found, mechanism=replace(found.mechanism, joints=tuple(moved)))
+    files = exported_files(tilted, ["dxf"])
+    assert files == exported_files(tilted, ["dxf"])
+    assert "joint centres of the base are not in one plane" in " ".join(files["README.md"].split())
+    rows = list(csv.DictReader(io.StringIO(files["plates.csv"])))
+    offsets = [float(row["offset from plane [cm]"]) for row in rows if row["plate"] == "base"]
+    assert max(map(abs, offsets)) > 0.02
+    for plate in ("base", "platform"):
+        (tmp_path / "plate.dxf").write_text(files[f"{plate}.dxf"], encoding="utf-8")
+        document = ezdxf.readfile(tmp_path / "plate.dxf")
+        assert document.units == 5
+        assert not document.audit().errors
+        circles = np.array([each.dxf.center for each in document.modelspace().query("CIRCLE")])
+        own = [row for row in rows if row["plate"] == plate]
+        stated = [[float(row[f"{c} in drawing [cm]"]) for c in "xy"] for row in own]
+        np.testing.assert_allclose(circles[:, :2], stated, atol=1e-9)
+        (outline,) = document.modelspace().query("LWPOLYLINE")
+        assert outline.closed
+        assert len(outline) == 6
+
+
+def test_rotations_survive_their_three_forms() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        R *= np.linalg.det(R)
+        if rng.uniform() < 0.5:  # half a turn, and a pitch of 90 degrees, where the forms have their seams
+            R = R @ np.diag([1.0, -1.0, -1.0]) @ R.T if rng.uniform() < 0.5 else _pitched(rng.uniform(-3, 3))
+        found = np.zeros(9)
+        mujoco.mju_quat2Mat(found, quaternion(R))
+        np.testing.assert_allclose(found.reshape(3, 3), R, atol=1e-14)
+        roll, pitch, yaw = roll_pitch_yaw(R)
+        np.testing.assert_allclose(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), R, atol=1e-14)
+
+
+def _about(axis: int, angle: float) -> Array:
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[one, one] = R[other, other] = np.cos(angle)
+    R[other, one], R[one, other] = np.sin(angle), -np.sin(angle)
+    return R
+
+
+def _pitched(yaw: float) -> Array:
+    return _about(2, yaw) @ _about(1, np.pi / 2)
+
+
+def test_links_that_are_limbs_are_exported_and_coupled_joints_are_refused() -> None:
+    nlp, _ = placed("3-rps", 0)
+    found = exported("3-rps", 0)
+    tables = links_of(found.mechanism)
+    program = rebuilt(tables, nlp)
+    again = mechanism_of(program, closed_start(program))
+    assert [(joint.label, joint.actuator) for joint in again.joints] == [
+        (joint.label, joint.actuator) for joint in found.joints
+    ]
+    for one, other in zip(again.mechanism.joints, found.mechanism.joints, strict=True):
+        np.testing.assert_allclose(one.point, other.point, atol=1e-12)
+    program = rebuilt(tables | {"coupling": [{"factors": {"joint_1_1": 0.5, "joint_1_2": 1.0}}]}, nlp)
+    fault = "joints joint_1_1, joint_1_2, joint_1_3 are no limb with branches (its joints are coupled)"
+    with pytest.raises(InputError, match=re.escape(fault)):
+        mechanism_of(program, closed_start(program))

@@ -1,0 +1,162 @@
+"""The command ``export``: its files, cases that it takes and refuses, and results instead of a solve."""
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import pytest
+import yaml
+from mujoco_trees import Tree
+
+from screwsynth.models import robot, robot_function
+from screwsynth.nlp import Case, InputError, Task, case_from_tables, export_robot, formulate, load_case, solve
+from screwsynth.nlp.case.starter import starter_case
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
+    out = tmp_path / "robot"
+    words = ("export", "paper-4.4-max", "--starts", "2", "--format", "mjcf", "--format", "csv", "--out", str(out))
+    status, said, wrong = cli(*words)
+    assert (status, wrong) == (0, "")
+    assert said.startswith("5 files in ")
+    files = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert set(files) == {"README.md", "robot.xml", "joints.csv", "links.csv", "plates.csv", "screwsynth-files.txt"}
+    assert cli(*words)[0] == 0
+    assert files == {path.name: path.read_bytes() for path in out.iterdir()}
+    solution = solve(load_case("paper-4.4-max"), starts=2)
+    again = export_robot(solution, ["mjcf"])
+    assert again["robot.xml"].encode() == files["robot.xml"]
+    tree = Tree(again["robot.xml"], 50.0)
+    assert tree.open <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["paper-4.2", "free-wrist", "drilling-spindle"])
+def test_shipped_cases_at_their_last_pose(name: str) -> None:
+    solution = solve(load_case(name), starts=2)
+    case = solution.case
+    text = export_robot(solution, ["mjcf"], pose=case.pose_count)["robot.xml"]
+    assert Tree(text, 50.0).open <= 1e-9
+
+
+def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "robot"
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine", encoding="utf-8")
+    case = "paper-4.1-helical"
+    for words, fault in {
+        ("--format", "stl", "--out", str(out)): "--format stl: is no format; allowed: mjcf, urdf, csv, dxf, all",
+        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
+        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
+    }.items():
+        status, said, wrong = cli("export", case, *words)
+        assert (status, said) == (2, ""), words
+        assert fault in wrong
+        assert wrong.count("\n") == 1
+    monkeypatch.setattr("screwsynth.nlp.exchange.writing.dxf.find_spec", lambda _: None)
+    status, _, wrong = cli("export", case, "--format", "all", "--out", str(out))
+    assert status == 2
+    assert "ezdxf, which is not installed: pip install 'screwsynth[robots]'" in wrong
+    assert not out.exists()
+    assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
+
+
+def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
+    text = starter_case(robot_function("hexapod")())
+    (tmp_path / "case.toml").write_text(text + "\n[limits]\nleg_length = { max = 1 }\n", encoding="utf-8")
+    out = tmp_path / "robot"
+    status, _, wrong = cli(
+        "export", str(tmp_path / "case.toml"), "--format", "mjcf", "--out", str(out), "--starts", "2"
+    )
+    assert status == 1
+    assert "the solve is infeasible: nothing is exported" in wrong
+    assert not out.exists()
+    nlp = formulate(case_from_tables(tomllib.loads(text), name="hexapod", source="hexapod"))
+    fixed = [
+        f"--set={each.name}={value}"
+        for each, value in zip(nlp.program.variables, nlp.start, strict=True)
+        if not each.name.startswith("q")
+    ]
+    status, _, wrong = cli(
+        "export",
+        str(tmp_path / "case.toml"),
+        "--format",
+        "mjcf",
+        "--out",
+        str(out),
+        *fixed,
+        "--set=angle=0",
+        "--set=axis=0,0,1",
+    )
+    assert (status, wrong) == (0, "")
+
+
+def test_a_result_is_exported_without_a_solve(tmp_path: Path, cli: Run) -> None:
+    # A robot given joint by joint away from home, two tasks combined, and several poses.
+    (tmp_path / "3-rps.toml").write_text(starter_case(robot_function("3-rps")()), encoding="utf-8")
+    cases = (str(tmp_path / "3-rps.toml"), ()), ("paper-4.2", ()), ("flight-simulator", ("--pose", "7"))
+    for case, words in cases:
+        result = tmp_path / "result.json"
+        assert cli("solve", case, "--starts", "2", "--json", str(result))[0] == 0
+        texts = []
+        for k, more in enumerate((("--starts", "2"), ("--of", str(result)))):
+            out = tmp_path / f"{Path(case).stem}{k}"
+            status, _, wrong = cli("export", case, "--format", "mjcf", "--out", str(out), *words, *more)
+            assert (status, wrong) == (0, ""), case
+            texts.append((out / "robot.xml").read_text(encoding="utf-8"))
+        one, other = (Tree(text, 1.0).model.body_pos for text in texts)
+        assert abs(one - other).max() <= 1e-9 * abs(one).max(), case
+
+
+def test_a_result_of_another_case_or_assembly_is_refused(tmp_path: Path, cli: Run) -> None:
+    result, out = tmp_path / "result.json", tmp_path / "robot"
+    words = ("--format", "mjcf", "--out", str(out), "--of", str(result))
+    assert cli("evaluate", "paper-4.1-helical", "--json", str(result))[0] == 0
+    assert cli("export", "paper-4.1-helical", *words)[0] == 0
+    status, _, wrong = cli("export", "free-wrist", *words)
+    assert status == 2
+    assert "is a result of the case 'paper-4.1-helical' with the robot 'stewart-gough', not of 'free-wrist'" in wrong
+    data = json.loads(result.read_text(encoding="utf-8"))
+    data["jacobian"][0][0] += 1e-3
+    result.write_text(json.dumps(data), encoding="utf-8")
+    status, _, wrong = cli("export", "paper-4.1-helical", *words)
+    assert status == 2
+    assert "another assembly of its joints" in wrong
+    result.write_text("{}", encoding="utf-8")
+    assert cli("export", "paper-4.1-helical", *words)[0] == 2
+
+
+def test_names_of_any_letters_become_names_that_every_format_takes() -> None:
+    limbs = [
+        {
+            "name": name,
+            "points": {"r": f"cos({k}*2*pi/3)*x + sin({k}*2*pi/3)*y", "A": "0.6*r + z"},
+            "joints": [
+                {"type": "R", "at": "r", "axis": "cross(z, r)"},
+                {"type": "P", "at": "r", "axis": "A - r", "actuated": True},
+                {"type": "S", "at": "A"},
+            ],
+        }
+        for k, name in enumerate(("a b", "a_b", "d&'e'|<f>"))
+    ]
+    model = robot('<"&é>', limb=limbs, home=(0.0, 0.0, 1.0))
+    case = Case(model=model, parameters={}, position=model.home, tasks=[Task((0, 0, 0, 0, 0, 1))], name="a|b")
+    files = export_robot(solve(case))
+    joints = Tree(files["robot.xml"], 1.0).model
+    names = [joints.joint(k).name for k in range(joints.njnt)]
+    assert names[:4] == ["joint_a_b_1", "joint_a_b_2", "joint_a_b_3", "joint_a_b_1_"]
+    assert len(set(names)) == len(names) == 7
+    loops = yaml.safe_load(files["robot.yaml"])
+    assert loops["name_mot"] == ["joint_a_b_2", "joint_a_b_2_", "joint_d__e___f__2"]
+    assert mujoco.MjModel.from_xml_string(files["robot.urdf"]).nbody > 7
+
+
+def test_solutions_that_are_no_answer_or_pose_are_refused() -> None:
+    solution = solve(load_case("free-wrist"), starts=2)
+    with pytest.raises(InputError, match="--pose 2: the case has 1 pose"):
+        export_robot(solution, ["mjcf"], pose=2)
+    with pytest.raises(InputError, match="--format step: is no format"):
+        export_robot(solution, ["step"])

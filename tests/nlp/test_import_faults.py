@@ -1,0 +1,167 @@
+"""Models that cannot be imported: each is refused in one sentence, and nothing is written."""
+
+# ruff: noqa: E501 - each fault is a row of a table
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import reachy
+
+Run = Callable[..., tuple[int, str, str]]
+
+HEAD = reachy.mjcf()
+URDF = reachy.urdf("constraints")
+BODY = ("--platform", "head")
+ALL = ("--platform", "head", "--actuated", *(f"stewart_{k}" for k in range(1, 7)))
+ENTITIES = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10))
+BOMB = f'<?xml version="1.0"?><!DOCTYPE mujoco [<!ENTITY e0 "ha">{ENTITIES}]><mujoco model="&e9;"/>'
+OUTSIDE = '<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY e SYSTEM "file:///etc/hostname">]><robot name="&e;"/>'
+ARM = (
+    '<mujoco><worldbody><body name="arm"><joint name="a" type="hinge"/><body name="hand"><joint name="b" type="hinge"/>'
+    '</body></body></worldbody><actuator><motor joint="a"/></actuator></mujoco>'
+)
+PAIRS = "closed_loop: [[loop1_A, loop1_B]]\ntype: [3d]\nname_mot: [stewart_1]\n"
+
+#: Name of the file, its text, arguments, and words of the sentence.
+FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
+    # Platform, base and actuators.
+    ("m.xml", HEAD, (), "--platform: is missing: name the body that is the platform"),
+    ("m.xml", HEAD, ("--platform", "haed"), "--platform haed: no such body or frame; did you mean 'head'?"),
+    ("m.xml", HEAD, ("--platform", ""), "--platform: is missing"),
+    ("m.xml", HEAD, (*BODY, "--base", "tors"), "--base tors: no such body; did you mean 'torso'?"),
+    ("m.xml", HEAD, ("--platform", "torso"), "--platform torso: is rigidly joined to the base world"),
+    ("m.xml", ARM, ("--platform", "hand"), "--platform hand: is at the end of an open chain of 2 joints from the base world; a parallel robot has two or more"),
+    ("m.xml", HEAD.replace("<equality>", "<equality><!--").replace("</equality>", "--></equality>"), BODY, "no joints lead to it from the base world; choose the base by --base"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "stewart_7"), "--actuated stewart_7: is no joint between base and platform; did you mean 'stewart_6'?"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "ear"), "--actuated ear: is no joint between base and platform"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "passive_1"), "the ball joint passive_1 has an actuator; hinges and slides may have one"),
+    ("m.urdf", URDF, BODY, "no joint between base and platform has an actuator; name them by --actuated, of stewart_1"),
+    ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is for URDF files"),
+    # Loops.
+    ("m.xml", reachy.mjcf(lift=0.001), BODY, "the loop loop_1 is open by 0.001 and 0 deg, more than 1e-06 of the robot's size 0.117; --close closes it by Newton's method"),
+    ("m.xml", reachy.mjcf(lift=0.5).replace('<freejoint/>', '<joint type="slide" axis="1 0 0"/>'), (*BODY, "--close"), "Newton's method did not close it"),
+    # Hostile and broken files.
+    ("m.xml", BOMB, BODY, "it declares a document type or entities, which are not read"),
+    ("m.urdf", OUTSIDE, BODY, "it declares a document type or entities, which are not read"),
+    ("m.xml", "<mujoco>" + " " * 17 * 2**20, BODY, "it is larger than 16 MB"),
+    ("m.xml", "<body>" * 500, BODY, "its elements are nested more than 400 deep"),
+    ("m.xml", f"<mujoco>{'<a/>' * 200_001}</mujoco>", BODY, "it has more than 200000 elements"),
+    ("m.xml", "<mujoco", BODY, "is not valid XML"),
+    ("m.xml", b"\xff\xfe\x00", BODY, "is not valid XML"),
+    ("m.xml", "", BODY, "is not valid XML"),
+    ("m.xml", "<sdf/>", BODY, "begins with <sdf>; <mujoco> of MJCF or <robot> of URDF is needed"),
+    # MJCF.
+    ("m.xml", '<mujoco><include file="m.xml"/></mujoco>', BODY, "includes m.xml, which includes itself"),
+    ("m.xml", '<mujoco><include file="n.xml"/></mujoco>', BODY, "includes n.xml, which cannot be found"),
+    ("m.xml", "<mujoco><include/></mujoco>", BODY, "an include names no file"),
+    ("m.xml", '<mujoco><worldbody><replicate count="99999999"><body/></replicate></worldbody></mujoco>', BODY, "replicate count = 99999999: at most 2000 copies in all are read"),
+    ("m.xml", '<mujoco><worldbody><attach model="arm" prefix="a"/></worldbody></mujoco>', BODY, "attaches 'arm'; write the model as one file first"),
+    ("m.xml", HEAD.replace('name="passive_2"', 'name="passive_1"'), BODY, "MuJoCo cannot read it: "),
+    ("m.xml", HEAD.replace('axis="', 'axis="nan '), BODY, "MuJoCo cannot read it: "),
+    ("m.xml", HEAD.replace('joint="stewart_3"', 'joint="stewart_9"'), BODY, "an actuator drives 'stewart_9', which is no joint that can be driven"),
+    ("m.xml", HEAD.replace("<equality>", '<equality><joint joint1="stewart_1" joint2="stewart_2" polycoef="0 1 2 0 0"/>'), BODY, "has a polynomial"),
+    ("m.xml", HEAD.replace('name="rod_1"', 'name="rod&#10;1"'), BODY, r"the body 'rod\n1' has a name with characters that cannot be shown"),
+    ("m.xml", HEAD.replace('model="head"', 'model="a&#9;b"'), BODY, r"the robot 'a\tb' has a name with characters that cannot be shown"),
+    ("m.xml", HEAD.replace('model="head"', 'model="a&#27;[31mb"'), BODY, "is not valid XML"),
+    # URDF.
+    ("m.urdf", URDF.replace('type="spherical"', 'type="rod"', 1), ALL, 'constraint closing_1, type = "rod": must be one of spherical, ball, fixed'),
+    ("m.urdf", URDF.replace('<parent link="rod_1"/><parent_origin', '<parent link="rod_9"/><parent_origin'), ALL, 'constraint closing_1, parent = "rod_9": must be one of the links'),
+    ("m.urdf", URDF.replace('type="revolute"', 'type="hinge"', 1), ALL, 'type = "hinge": must be one of revolute'),
+    ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="0 0 0"', 1), ALL, 'axis = "0 0 0": must be a direction'),
+    ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0"', 1), ALL, 'axis, xyz = "1 0": must be three finite numbers'),
+    ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "has a coordinate above 1e+09, or one that is no number"),
+    ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0 inf"', 1), ALL, "must be three finite numbers"),
+    ("m.urdf", URDF.replace('<link name="rod_2"/>', '<link name="rod_1"/>'), ALL, "has two elements <link> with the name 'rod_1'"),
+    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have one root link; it has torso, spare"),
+    ("m.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>', ALL, "has elements of xacro: write it out as plain URDF first"),
+    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have one root link; it has none"),
+    ("m.urdf", URDF.replace('<child link="horn_1"/>', '<child link="horn_1"/><mimic joint="x"/>'), ALL, 'mimic = "x": must be another joint'),
+    # Dimensions.
+    ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint or offer; did you mean 'circle3'?"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1", "stewart_1"), "--free stewart_1: the place of stewart_1 is a dimension already"),
+    ("m.xml", HEAD, (*BODY, "--free", "passive_1.axis"), "--free passive_1.axis: the joint is of the type S, which has no axis alone"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1=a", "circle2=a"), "--free: the dimension a would be given twice"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1=sin"), "the robot file would not be read: "),
+]  # fmt: skip
+
+
+def test_each_fault_is_one_sentence_and_nothing_is_written(
+    tmp_path: Path, cli: Run, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for number, (name, text, arguments, words) in enumerate(FAULTS):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
+        out = folder / "robot.toml"
+        code, shown, err = cli("import", str(folder / name), "--out", str(out), *arguments)
+        place = f"fault {number}: {err}"
+        assert (code, shown) == (2, ""), place
+        assert words in err, place
+        assert err.startswith("screwsynth: "), place
+        assert err.count("\n") == 1, place
+        assert "\x1b" not in err, place
+        assert sorted(path.name for path in folder.iterdir()) == [name], place
+    # Neither parser wrote past the command's own streams.
+    assert capfd.readouterr() == ("", "")
+
+
+def test_yaml_of_loops_is_checked(tmp_path: Path, cli: Run) -> None:
+    model, loops, out = tmp_path / "m.urdf", tmp_path / "loops.yaml", tmp_path / "robot.toml"
+    model.write_text(reachy.urdf("pairs"), encoding="utf-8")
+    for text, words in [
+        ("closed_loop: [[a, b]", "is not valid YAML"),
+        ("[1, 2]", "is not a table of loops"),
+        ("closed_loop: [[a]]", "closed_loop: must be a list of pairs of names"),
+        (PAIRS.replace("loop1_A", "loop9_A"), 'closed_loop = "loop9_A": is no link or joint of the URDF'),
+        (PAIRS.replace("3d", "4d"), 'type = "4d": must be 3d or 6d'),
+        (PAIRS.replace("[3d]", "[3d, 3d]"), "type: has 2 entries for 1 loops"),
+        (PAIRS.replace("[stewart_1]", "[stewart_x]"), 'name_mot = "stewart_x": is no joint of the URDF'),
+        (
+            PAIRS + "joint_name: [stewart_2]\njoint_type: [BALL]\n",
+            'joint_type = "BALL": must be SPHERICAL, FIXED or UJOINT_',
+        ),
+        (PAIRS + "joint_name: [stewart_2]\n", "joint_type: has 0 entries for 1 joints"),
+        ("x: &a [1]\n" + "y: " + "[" * 1100, "is not valid YAML"),
+        (" " * (2**20 + 1), "it is larger than 1 MB"),
+    ]:
+        loops.write_text(text, encoding="utf-8")
+        code, shown, err = cli("import", str(model), *BODY, "--out", str(out), "--loops", str(loops))
+        assert (code, shown, err.count("\n")) == (2, "", 1), text[:60]
+        assert words in err
+        assert not out.exists()
+
+
+def test_the_extra_that_is_missing_is_named(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, urdf, out = tmp_path / "m.xml", tmp_path / "m.urdf", tmp_path / "robot.toml"
+    model.write_text(HEAD, encoding="utf-8")
+    urdf.write_text(URDF, encoding="utf-8")
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    code, shown, err = cli("import", str(model), *BODY, "--out", str(out))
+    assert (code, shown) == (2, "")
+    assert err == "screwsynth: MJCF files need mujoco, which is not installed: pip install 'screwsynth[robots]'\n"
+    # URDF needs neither, until a YAML file states its loops.
+    assert cli("import", str(urdf), *ALL, "--out", str(out))[0] == 0
+    urdf.with_suffix(".yaml").write_text(PAIRS, encoding="utf-8")
+    code, shown, err = cli("import", str(urdf), *ALL, "--out", str(tmp_path / "second.toml"))
+    assert (code, shown) == (2, "")
+    assert "YAML files of loops need pyyaml, which is not installed: pip install 'screwsynth[robots]'" in err
+
+
+def test_inputs_are_not_written_over(tmp_path: Path, cli: Run) -> None:
+    model = tmp_path / "m.xml"
+    model.write_text(HEAD, encoding="utf-8")
+    code, _, err = cli("import", str(model), *BODY, "--out", str(model))
+    assert code == 2
+    assert "is the model that is read, which would be lost" in err
+    assert model.read_text(encoding="utf-8") == HEAD
+    code, _, err = cli("import", str(tmp_path / "none.xml"), *BODY, "--out", str(tmp_path / "o.toml"))
+    assert code == 2
+    assert "none.xml: cannot be read: No such file or directory" in err
+    code, _, err = cli("import", str(model), *BODY)
+    assert code == 2
+    assert "--out: is missing" in err
