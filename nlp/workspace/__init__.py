@@ -1,0 +1,8 @@
+"""A robot judged over a whole box of poses: proofs, counterexamples, and the boxes that are left open.
+
+The modules import each other in this order:
+
+* ``posebox`` (a box of poses in the coordinates of the search), ``machine`` (a robot with its dimensions);
+* regular poses: ``rows`` and ``regularity`` (the examination of boxes in NumPy), ``engines`` (the same in C), ``exact``
+  (signs of determinants without rounding), ``verdict`` and ``search``.
+"""

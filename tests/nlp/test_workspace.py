@@ -1,0 +1,362 @@
+"""Workspaces: a robot judged over a whole box of poses."""
+
+import json
+import math
+import tomllib
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, CaseError, Free, load_result
+from screwsynth.nlp.case.reader import case_from_tables, load_case
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.workspace import WorkspaceResult
+from screwsynth.nlp.workspace import exact, rows
+from screwsynth.nlp.workspace.boundsearch import Oracle, prove_minimum
+from screwsynth.nlp.workspace.clearance import Clearance
+from screwsynth.nlp.workspace.engines import kernel, rank_engine
+from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.posebox import PoseBox, pose_box, scaled
+from screwsynth.nlp.workspace.regularity import Rank
+from screwsynth.nlp.workspace.scale import largest_scale
+from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.verdict import Outcome
+
+needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
+
+#: The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
+TEXT = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 0, x4 = 5 }
+[pose]
+position = [0, 0, 20]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+leg_length = { min = 17, max = 44 }
+actuator = { stroke_max = 30 }
+platform_joint_angle = { max = 60, about = "home" }
+home = { position = [0, 0, 20] }
+[workspace]
+position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }]
+rotation = { angle = { min = -20, max = 20 } }
+"""
+POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("workspace") / "machine.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def case(machine: Path) -> Case:
+    return load_case(str(machine))
+
+
+def turned(kind: TurnKind, degrees: float) -> Workspace:
+    """The machine's positions with rotations up to an angle: about any axis, about one, or by roll, pitch and yaw."""
+    angle = Free(-math.radians(degrees), math.radians(degrees))
+    return Workspace(POSITION, Turns(kind, (angle,) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1), (0.6, 0.0, 0.8)))
+
+
+def legs(case: Case) -> Legs:
+    found = legs_of(case)
+    assert found is not None
+    return found
+
+
+def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
+    """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
+    w, x, y, z = (quaternions := np.array([box.quaternion(each) for each in points])).T / np.linalg.norm(
+        quaternions, axis=1
+    )
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)
+    arm = np.einsum("kij,lj->kli", turn, robot.platform)
+    span = points[:, None, :3] + arm - robot.base
+    return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))
+
+
+@pytest.mark.parametrize("engine", [pytest.param("c", marks=needs_kernel), "numpy"])
+@pytest.mark.parametrize(
+    ("kind", "degrees", "outcome", "most"),
+    [
+        (TurnKind.ANY_AXIS, 20, Outcome.PROVED, 3919),
+        (TurnKind.ANY_AXIS, 25, Outcome.PROVED, 10071),
+        (TurnKind.ANY_AXIS, 30, Outcome.PROVED, 10071),
+        (TurnKind.ANY_AXIS, 40, Outcome.REFUTED, 20000),
+        (TurnKind.ROLL_PITCH_YAW, 30, Outcome.REFUTED, 20000),
+    ],
+)
+def test_the_machine_is_regular_up_to_an_angle(
+    case: Case, kind: TurnKind, degrees: float, outcome: Outcome, most: int, engine: str
+) -> None:
+    box = pose_box(turned(kind, degrees))
+    found = prove_regular(legs(case), box, engine=engine)
+    assert (found.outcome, found.engine) == (outcome, engine)
+    assert found.boxes <= most
+    if outcome is Outcome.REFUTED:
+        assert found.sides is not None
+        assert found.y is not None
+        # Confirmed by rotation matrices and a singular value decomposition, which the search does not use.
+        positive, negative = determinants(legs(case), box, found.sides)
+        assert positive * negative < 0
+        assert all(box.holds(y) for y in found.sides)
+        pose = box.pose(found.y)
+        arm = legs(case).platform @ pose.rotation.T
+        span = pose.position + arm - legs(case).base
+        J = np.hstack([span, np.cross(arm, span)]) / np.linalg.norm(span, axis=1, keepdims=True)
+        values = np.linalg.svd(J, compute_uv=False)
+        assert values[-1] < 1e-10 * values[0]
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind: TurnKind) -> None:
+    rng = np.random.default_rng(7)
+    box, robot = pose_box(turned(kind, 50)), legs(case)
+    centre = box.random(40, rng)
+    half = (box.upper - box.lower) * rng.uniform(0, 0.2, (40, 1))
+    expansion = rows.expand(robot, box, centre, half)
+    wrong, unrounded = 0, 0
+    for k in range(40):
+        e = np.where(rng.uniform(size=6) < 0.5, np.sign(rng.normal(size=6)), rng.uniform(-1, 1, 6))
+        y = [
+            Fraction(float(c)) + Fraction(float(h)) * Fraction(float(s))
+            for c, h, s in zip(centre[k], half[k], e, strict=True)
+        ]
+        exactly = np.array(exact._rows(robot, box, y), dtype=object)
+        step = [a - Fraction(float(c)) for a, c in zip(y, centre[k], strict=True)]
+        second = [step[3 + i] * step[3 + j] for i, j in zip(rows.FIRST, rows.SECOND, strict=True)]
+        factors = [Fraction(1), *step, *second, *(step[3 + i // 3] * step[i % 3] for i in range(9))]
+        terms = np.vectorize(Fraction)(expansion.terms[k])
+        value = sum(terms[:, t] * factors[t] for t in range(rows.TERMS))
+        off = np.abs(exactly - value).astype(float)
+        assert (off <= expansion.rest[k]).all()
+        wrong += (off > 0.5 * (expansion.rest[k] - _rounding(expansion.rest[k]))).any()
+        unrounded += (off > 0).any()
+    # Without the bound of the other terms, or without rounding, the enclosure would not hold: the test can fail.
+    assert wrong or kind is TurnKind.ROLL_PITCH_YAW
+    assert unrounded
+
+
+def _rounding(rest: FloatArray) -> FloatArray:
+    """A little more than the share of rounding in the bounds of further terms."""
+    return np.minimum(rest, 1e-6 * rest.max())
+
+
+@needs_kernel
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_both_engines_agree_box_by_box(case: Case, kind: TurnKind) -> None:
+    rng = np.random.default_rng(1)
+    box = pose_box(turned(kind, 45))
+    lower = box.random(1500, rng)
+    upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.4, (1500, 1))
+    ours, theirs = (rank_engine(legs(case), box, name).examine(lower, upper) for name in ("c", "numpy"))
+    assert (ours.verdict == theirs.verdict).mean() > 0.999
+    assert (ours.sign == theirs.sign).mean() > 0.999
+    assert np.array_equal(ours.lower, theirs.lower)
+    assert {Rank.OPEN, Rank.REGULAR} <= set(ours.verdict.tolist())
+
+
+def test_random_robots_are_never_called_regular_where_the_determinant_changes_its_sign() -> None:
+    """200 robots and boxes, against dense sampling and the determinant along paths between the samples."""
+    rng = np.random.default_rng(3)
+    outcomes = []
+    for _ in range(200):
+        robot = Legs(
+            np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
+            np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
+        )
+        kind = list(TurnKind)[int(rng.integers(3))]
+        size = float(rng.uniform(0.02, 0.5))
+        turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
+        near = rng.uniform((-3, -3, 9), (3, 3, 15))
+        place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
+        box = pose_box(Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8))))
+        found = prove_regular(robot, box, most_boxes=3000)
+        outcomes.append(found.outcome)
+        corners = box.clipped(box.random(30, rng) + rng.choice([-1, 1], (30, 6)) * (box.upper - box.lower))
+        ends = np.concatenate([box.random(30, rng), corners])
+        along = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
+        values = determinants(robot, box, along)
+        if found.outcome is Outcome.PROVED:
+            assert (values > 0).all() or (values < 0).all()
+        if found.outcome is Outcome.REFUTED:
+            assert found.sides is not None
+            positive, negative = determinants(robot, box, found.sides)
+            assert positive > 0 > negative
+    assert outcomes.count(Outcome.PROVED) > 30
+    assert outcomes.count(Outcome.REFUTED) > 30
+
+
+@pytest.mark.parametrize("name", ["smallest singular value", "condition number", "clearance"])
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str) -> None:
+    rng = np.random.default_rng(5)
+    box, robot = pose_box(turned(kind, 25)), legs(case)
+    oracle: Oracle = Clearance(robot, box, 1, 2)
+    if name != "clearance":
+        oracle = SingularValues(robot, box, 11.5, is_condition=name == "condition number")
+    lower = box.random(150, rng)
+    upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (150, 6)), box.upper)
+    bound = oracle.bounds(lower, upper).lower
+    least = np.full(150, np.inf)
+    for _ in range(40):
+        share = rng.uniform(size=(150, 6))
+        share = np.where(rng.uniform(size=share.shape) < 0.4, np.round(share), share)
+        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+    assert (bound <= least + 1e-12).all()
+    # The bounds say something: half of these boxes have one that is less than a fifth off.
+    assert np.median((least - bound) / np.abs(least)) < 0.2
+
+
+def test_the_smallest_clearance_is_met_within_the_gap(case: Case) -> None:
+    box, robot = pose_box(turned(TurnKind.ANY_AXIS, 20)), legs(case)
+    found = prove_minimum(Clearance(robot, box, 1, 2), box, gap=0.05)
+    assert found.value - 0.05 <= found.bound <= found.value
+    samples = Clearance(robot, box, 1, 2).values(box.random(100_000, np.random.default_rng(0)))
+    assert samples.min() >= found.bound
+
+
+def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
+    judged = judge_workspace(case, with_objective=False)
+    assert judged.is_proved
+    points = pose_box(judged.workspace).random(100_000, np.random.default_rng(2))
+    robot, box = legs(case), pose_box(judged.workspace)
+    form = rows.turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
+    rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    span = points[:, None, :3] + np.einsum("bij,lj->bli", rotation, robot.platform) - robot.base
+    lengths = np.linalg.norm(span, axis=2)
+    by_name = {(each.name, each.sense.value): each for each in judged.extremes}
+    for i, leg in enumerate(case.model.legs):
+        short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in ("min", "max"))
+        assert short.bound <= lengths[:, i].min()
+        assert long.bound >= lengths[:, i].max()
+        assert short.reached - 1e-3 * short.reached <= short.bound <= short.reached
+        assert long.reached <= long.bound <= long.reached + 1e-3 * long.reached
+        stroke = by_name[f"actuator.stroke_max limb {leg.name}", "max"]
+        assert stroke.bound == pytest.approx(long.bound - short.bound)
+
+
+def test_roll_pitch_and_yaw_have_the_same_poses_in_both_searches(case: Case) -> None:
+    angles = (Free(-0.3, 0.1), Free(0.0, 0.25), Free(-0.1, 0.4))
+    workspace = Workspace((0.5, Free(-1.0, 1.0), 20.0), Turns(TurnKind.ROLL_PITCH_YAW, angles))
+    judged = judge_workspace(case, workspace=workspace, with_objective=False)
+    box, robot = pose_box(workspace), legs(case)
+    points = box.random(5000, np.random.default_rng(4))
+    lengths = np.array(
+        [np.linalg.norm(p.position + robot.platform @ p.rotation.T - robot.base, axis=1) for p in map(box.pose, points)]
+    )
+    long = [each for each in judged.extremes if each.key == "leg_length.max"]
+    for each, most in zip(long, lengths.max(axis=0), strict=True):
+        assert most <= each.bound <= 1.02 * most
+
+
+def test_the_largest_box_is_found_to_a_hundredth(case: Case) -> None:
+    found = largest_scale(case, time_limit=20)
+    assert found.refuted
+    assert found.factor < found.failed <= 1.011 * found.factor
+    assert judge_workspace(
+        case, workspace=scaled(turned(TurnKind.ANY_AXIS, 20), found.factor), with_objective=False
+    ).is_proved
+
+
+def test_the_command_proves_and_refutes(machine: Path, tmp_path: Path) -> None:
+    target = tmp_path / "result.json"
+    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--json", str(target)])
+    assert run.exit_code == 0, run.output
+    assert "J has full rank at every pose" in run.output
+    assert "everything is proved" in run.output
+    result = load_result(target)
+    assert isinstance(result, WorkspaceResult)
+    assert result.proved
+    jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
+    shorter = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--set", "limits.leg_length.max=40"])
+    assert shorter.exit_code == 1
+    assert "refuted" in shorter.output
+
+
+def test_dimensions_come_from_a_result(machine: Path, tmp_path: Path) -> None:
+    result = tmp_path / "result.json"
+    free = tmp_path / "free.toml"
+    free.write_text(TEXT.replace("x2 = 11.543", "x2 = { min = 8, max = 15 }"), encoding="utf-8")
+    runner = CliRunner()
+    refused = runner.invoke(app, ["workspace", str(free)])
+    assert "robot.parameters.x2: is free" in str(refused.exception)
+    solved = runner.invoke(app, ["evaluate", str(machine), "--json", str(result)])
+    assert solved.exit_code in (0, 1)
+    run = runner.invoke(app, ["workspace", str(free), "--gap", "0.01", "--of", str(result)])
+    assert run.exit_code == 0, run.output
+
+
+def test_a_refuted_claim_is_seen_with_evaluate(machine: Path) -> None:
+    wide = ["--set", "limits.leg_length.max=40"]
+    run = CliRunner().invoke(app, ["workspace", str(machine), *wide, "--gap", "0.01", "--json", "-"])
+    extremes = json.loads(run.stdout)["extremes"]
+    worst = next(each for each in extremes if each["key"] == "leg_length.max" and each["outcome"] == "refuted")
+    pose = worst["pose"]
+    settings = [f"{name}={value!r}" for name, value in zip(("p_x", "p_y", "p_z"), pose["position"], strict=True)]
+    settings += [f"axis={','.join(map(repr, pose['axis']))}", f"angle={pose['angle']!r}"]
+    shown = CliRunner().invoke(
+        app, ["evaluate", str(machine), *wide, *(part for each in settings for part in ("--set", each)), "--json", "-"]
+    )
+    lengths = json.loads(shown.stdout)["quantities"]["leg_length"]
+    limb = worst["name"].removeprefix("leg_length limb ")
+    assert lengths[limb] == pytest.approx(worst["reached"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"position": [0, 0, 20]}, "workspace: is one pose"),
+        ({"position": [0, 0, {"min": 5, "max": 4}]}, "workspace.position[2].min"),
+        ({"position": [0, 0, 20], "rotation": {"angle": 10}}, "workspace.rotation.angle"),
+        ({"position": [0, 0, 20], "rotation": {"angle": {"min": -5, "max": 9}}}, "workspace.rotation.angle"),
+        ({"position": [0, 0, 20], "rotation": {"roll": 5, "axis": [0, 0, 1]}}, "workspace.rotation.roll"),
+        (
+            {"position": [0, 0, 20], "rotation": {"axis": [0, 0, 0], "angle": {"min": 0, "max": 9}}},
+            "workspace.rotation.axis",
+        ),
+        ({"position": [0, 0, 20], "rotation": {"pitch": {"min": 0, "max": 170}}}, "workspace.rotation.pitch.max"),
+        ({"position": [0, 0, 20], "rotation": {}}, "workspace.rotation.angle: is missing"),
+        ({"position": [0, 0]}, "workspace.position"),
+        ({"place": [0, 0, 0]}, "workspace.place: no such key"),
+    ],
+)
+def test_bad_workspaces_are_refused(table: dict[str, object], message: str) -> None:
+    tables = tomllib.loads(TEXT) | {"workspace": table}
+    with pytest.raises(CaseError) as refused:
+        case_from_tables(tables, name="bad", source="bad.toml")
+    assert message in str(refused.value).replace(" = ", ": ") or message in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_a_workspace_is_written_and_read_again(case: Case, kind: TurnKind) -> None:
+    workspace = turned(kind, 25)
+    written = replace(case, workspace=replace(workspace, turns=replace(workspace.turns, axis=(0.0, 0.0, 1.0))))
+    again = case_from_tables(tomllib.loads(written.to_toml()), name="again", source="")
+    assert again.workspace == written.workspace
