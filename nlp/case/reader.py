@@ -149,7 +149,11 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         over_poses=over_poses,
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
-        workspace=workspace_of(written.workspace, units),
+        workspace=workspace_of(
+            written.workspace,
+            units,
+            has_limits=written.limits is not None and written.limits.over == "workspace",
+        ),
         tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,

@@ -16,7 +16,7 @@ from .pose import Free, Value
 
 if TYPE_CHECKING:
     from .toml import TomlValue
-    from .workspacetable import SpanTable, WorkspaceTable
+    from .workspacetable import SpanTable, WorkspaceRotationTable, WorkspaceTable
 
 #: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
 #: angle, grow without bound towards half a turn.
@@ -56,6 +56,7 @@ class Workspace:
     Attributes:
         position: origin of the platform frame in the world frame, length; fixed or free components.
         turns: rotations.
+        has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
 
     Raises:
         CaseError: a number is not allowed; the key is in the words of a case file.
@@ -63,6 +64,7 @@ class Workspace:
 
     position: Sequence[Value]
     turns: Turns = field(default_factory=Turns)
+    has_limits: bool = False
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
@@ -115,30 +117,41 @@ class Workspace:
         }
 
 
-def workspace_of(written: WorkspaceTable | None, units: Units) -> Workspace | None:
+def workspace_of(written: WorkspaceTable | None, units: Units, *, has_limits: bool = False) -> Workspace | None:
     """Return the workspace that a case file states; None where it states none.
 
     Args:
         written: its table.
         units: the file's units.
+        has_limits: whether the limits of the case hold over the workspace.
+
+    Raises:
+        CaseError: the axis is zero, or limits hold over a workspace that is not stated.
+    """
+    if written is None:
+        if has_limits:
+            raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
+        return None
+    position = [_value(value, units, Dimension.LENGTH) for value in written.position]
+    return Workspace(position, _turns(written.rotation, units), has_limits)
+
+
+def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
+    """Return the rotations that a case file states.
 
     Raises:
         CaseError: the axis is zero.
     """
-    if written is None:
-        return None
-    position = [_value(value, units, Dimension.LENGTH) for value in written.position]
-    rotation = written.rotation
     if rotation is None:
-        return Workspace(position)
+        return Turns()
     if rotation.angle is None:
         angles = [_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in _TURNS]
-        return Workspace(position, Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles)))
+        return Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))
     angle = _value(rotation.angle, units, Dimension.ANGLE)
     if rotation.axis is None:
-        return Workspace(position, Turns(TurnKind.ANY_AXIS, (angle,)))
+        return Turns(TurnKind.ANY_AXIS, (angle,))
     x, y, z = unit_vector(check_direction(rotation.axis, "workspace.rotation.axis")).tolist()
-    return Workspace(position, Turns(TurnKind.AXIS, (angle,), (x, y, z)))
+    return Turns(TurnKind.AXIS, (angle,), (x, y, z))
 
 
 def _value(written: float | SpanTable, units: Units, dimension: Dimension) -> Value:

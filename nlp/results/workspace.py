@@ -13,6 +13,7 @@ from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
 if TYPE_CHECKING:
+    from ..solver.exchange import WorkspaceProof
     from ..workspace.extremes import Extreme
     from ..workspace.judge import Judgement
     from ..workspace.posebox import PoseNumbers
@@ -129,6 +130,63 @@ class WorkspaceResult(JsonObject):
     extremes: tuple[ExtremeData, ...]
     scale: Absent[ScaleData]
     versions: VersionsData
+
+
+class BindingData(JsonObject):
+    """A pose at which a claim is a constraint of the program.
+
+    Attributes:
+        claim: that the pose refuted.
+        pose: the pose.
+    """
+
+    claim: str
+    pose: WorkspacePose
+
+
+class DesignData(JsonObject):
+    """A design on the way to the proven one.
+
+    Attributes:
+        F: of the design.
+        unproved: number of claims about the workspace that it does not keep, or that stay open.
+    """
+
+    F: float
+    unproved: int
+
+
+class WorkspaceProofData(JsonObject):
+    """Proof of a design over its workspace, by exchange of poses.
+
+    Attributes:
+        proved: whether J is regular at every pose, and every limit holds there.
+        designs: each design that was judged; the last is the answer.
+        poses: of the constraints.
+        regular: whether J has full rank at every pose.
+        extremes: smallest and largest values.
+    """
+
+    proved: bool
+    designs: tuple[DesignData, ...]
+    poses: tuple[BindingData, ...]
+    regular: RegularData | None
+    extremes: tuple[ExtremeData, ...]
+
+
+def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
+    """Return the proof of a solved design as a result."""
+    if proof is None:
+        return None
+    judged = proof.judgement
+    units = judged.case.units
+    return WorkspaceProofData(
+        proved=proof.is_proved,
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
+        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
+        regular=None if judged.regularity is None else _regular_data(judged.regularity, units),
+        extremes=tuple(_extreme_data(each, units) for each in judged.extremes),
+    )
 
 
 def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> WorkspaceResult:

@@ -13,7 +13,14 @@ from .text import Line, TextTable, Tone
 from .wording import title_line
 
 if TYPE_CHECKING:
-    from .workspace import ExtremeData, RegularData, ScaleData, WorkspacePose, WorkspaceResult
+    from .workspace import (
+        ExtremeData,
+        RegularData,
+        ScaleData,
+        WorkspacePose,
+        WorkspaceProofData,
+        WorkspaceResult,
+    )
 
 _TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
 
@@ -57,6 +64,22 @@ def setting_words(pose: WorkspacePose) -> str:
     return " ".join(
         [*words, f"--set axis={','.join(f'{part:.10g}' for part in pose.axis)}", f"--set angle={pose.angle:.10g}"]
     )
+
+
+def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
+    """Yield the proof of a solved design over its workspace."""
+    if proof is None:
+        return
+    if proof.proved:
+        yield Line("proved: regular and within the limits at every pose", label="workspace", tone=Tone.ANSWER)
+    else:
+        count = proof.designs[-1].unproved
+        words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
+        yield Line(words, label="workspace", tone=Tone.NO_ANSWER)
+    steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
+    yield Line(f"F = {steps}", label="designs")
+    count = len(proof.poses)
+    yield Line(f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints", label="exchange")
 
 
 def _pose_words(case: Case, pose: WorkspacePose) -> str:

@@ -1,7 +1,7 @@
 """Determinants of the rows of six legs without rounding, and the singular pose between two poses of opposite sign.
 
-The coordinates of a pose and the joint centres are doubles, hence fractions of whole numbers. The rows of :mod:`.rows` are
-polynomials in them: the sign of their determinant is computed with whole numbers. The rows are built here from a
+The coordinates of a pose and the joint centres are doubles, hence fractions of whole numbers. The rows of :mod:`.rows`
+are polynomials in them: the sign of their determinant is computed with whole numbers. The rows are built here from a
 quaternion and not from the formulas of the search.
 """
 
