@@ -112,7 +112,7 @@ def solve_over_workspace(
     found = solve_one(nlp, ())
     while found.status.is_answer:
         design = design_of(case, nlp, found.x)
-        judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, with_objective=False)
+        judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, jobs=1, with_objective=False)
         first = judged if first is None else first
         faults = _faults(judged)
         history.append((found.F, len(faults)))

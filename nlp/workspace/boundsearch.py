@@ -21,9 +21,9 @@ from .posebox import PoseBox
 #: Number of boxes examined at once.
 _BLOCK = 256
 #: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
-_POINTS, _STEPS, _AROUND = 2048, 60, 32
+_POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
-_SHRINK = 0.85
+_SHRINK = 0.7
 _SEED = 0
 
 

@@ -14,10 +14,11 @@ import pytest
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, load_result
+from screwsynth.nlp import Case, CaseError, Free, json_data, load_result, solve
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
 from screwsynth.nlp.workspace import rows
@@ -278,10 +279,7 @@ def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
     assert judged.is_proved
     points = pose_box(judged.workspace).random(100_000, np.random.default_rng(2))
     robot, box = legs(case), pose_box(judged.workspace)
-    form = rows.turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
-    rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
-    span = points[:, None, :3] + np.einsum("bij,lj->bli", rotation, robot.platform) - robot.base
-    lengths = np.linalg.norm(span, axis=2)
+    lengths = np.linalg.norm(spans(robot, box, points), axis=2)
     by_name = {(each.name, each.sense.value): each for each in judged.extremes}
     for i, leg in enumerate(case.model.legs):
         short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in ("min", "max"))
@@ -392,3 +390,97 @@ def test_a_workspace_is_written_and_read_again(case: Case, kind: TurnKind) -> No
     written = replace(case, workspace=replace(workspace, turns=replace(workspace.turns, axis=(0.0, 0.0, 1.0))))
     again = case_from_tables(tomllib.loads(written.to_toml()), name="again", source="")
     assert again.workspace == written.workspace
+
+
+#: The machine with free dimensions, for the best design that keeps its limits over a smaller workspace.
+FREE = (
+    TEXT.replace("x1 = 26.5, x2 = 11.543", "x1 = { min = 20, max = 32 }, x2 = { min = 8, max = 15 }")
+    .replace("[limits]", '[limits]\nover = "workspace"')
+    .replace("min = 17, max = 44", "min = 20, max = 38")
+    .replace("stroke_max = 30", "stroke_max = 17")
+    .replace('platform_joint_angle = { max = 60, about = "home" }\n', "")
+    .replace("home = { position = [0, 0, 20] }\n", "")
+    .replace("min = -5, max = 5", "min = -4, max = 4")
+    .replace("min = 15, max = 25", "min = 17, max = 23")
+    .replace("min = -20, max = 20", "min = -12, max = 12")
+    .replace("axis = [0, 0, 1]\npitch = inf", "axis = [1, 2, 6]\npoint = [3, 1, 12]\npitch = 0.1")
+)
+
+
+def test_limits_over_a_workspace_end_with_a_proof() -> None:
+    case = case_from_tables(tomllib.loads(FREE), name="free", source="free.toml")
+    solution = solve(case, starts=4, jobs=1)
+    proof = solution.workspace
+    assert proof is not None
+    assert proof.is_proved
+    assert not proof.first.is_proved
+    assert solution.status.is_answer
+    # The constraints of the exchange cost something: the first design, without them, has a larger F.
+    assert proof.history[0][0] > solution.F
+    design = proof.judgement.case
+    robot, box = legs(design), pose_box(proof.judgement.workspace)
+    points = box.random(100_000, np.random.default_rng(9))
+    span = spans(robot, box, points)
+    lengths = np.linalg.norm(span, axis=2)
+    assert lengths.min() >= 20
+    assert lengths.max() <= 38
+    assert np.ptp(lengths, axis=0).max() <= 17
+    # The design was pushed up to its limits: within a hundredth of one of them.
+    assert np.ptp(lengths, axis=0).max() > 0.9 * 17 or lengths.min() < 1.01 * 20
+    result = json_data(result_of(solution))
+    assert result["workspace"]["proved"] is True  # type: ignore[index, call-overload]
+    jsonschema.validate(result, result_schema())
+    assert "[workspace]" in design.to_toml()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[workspace]", "[workspaces]", "workspaces: no such key"),
+        ('over = "workspace"', 'over = "everything"', "limits.over"),
+        (
+            "[pose]\nposition = [0, 0, 20]",
+            "[[pose]]\nposition = [0, 0, 20]\n[[pose]]\nposition = [0, 0, 21]",
+            "limits.over",
+        ),
+    ],
+)
+def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> None:
+    with pytest.raises(CaseError) as refused:
+        solve(case_from_tables(tomllib.loads(FREE.replace(old, new)), name="free", source="free.toml"), starts=1)
+    assert message in str(refused.value)
+    without = FREE[: FREE.index("[workspace]")]
+    with pytest.raises(CaseError, match=r"needs the table \[workspace\]"):
+        case_from_tables(tomllib.loads(without), name="free", source="free.toml")
+
+
+@pytest.mark.slow
+def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
+    proof = solve(load_case("hexapod-workspace")).workspace
+    assert proof is not None
+    assert proof.is_proved
+    robot, box = legs(proof.judgement.case), pose_box(proof.judgement.workspace)
+    rng = np.random.default_rng(10)
+    least, most = np.full(6, np.inf), np.zeros(6)
+    for _ in range(20):
+        points = box.random(50_000, rng)
+        span = spans(robot, box, points)
+        lengths = np.linalg.norm(span, axis=2)
+        least, most = np.minimum(least, lengths.min(axis=0)), np.maximum(most, lengths.max(axis=0))
+        arm = span - points[:, None, :3] + robot.base
+        assert (np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2)) < 0).all()
+        home = np.add(robot.platform, (0, 0, 20)) - robot.base
+        cosine = (span * home).sum(axis=2) / lengths / np.linalg.norm(home, axis=1)
+        assert cosine.min() >= math.cos(math.radians(25))
+        for one, other in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0)):
+            assert Clearance(robot, box, one, other).values(points[:2000]).min() >= 3
+    assert least.min() >= 20
+    assert most.max() <= 38
+    assert (most - least).max() <= 17
+
+
+def spans(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
+    """Vectors (K, 6, 3) of the legs at points (K, 6)."""
+    form = rows.turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
+    rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    return points[:, None, :3] + np.einsum("bij,lj->bli", rotation, robot.platform) - robot.base
