@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .numbers import Number
-from .options import CaseName, Jobs, JsonFile, SettingTexts, console, read_settings, write_json
+from .options import CaseName, Jobs, JsonFile, SettingTexts, check_picture, console, read_settings, write_json
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..workspace.judge import Judgement
+    from ..workspace.slices import Slice
 
 
 def workspace(
@@ -35,6 +36,10 @@ def workspace(
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
+    ] = None,
 ) -> None:
     """Prove a machine regular and within its limits at every pose of its workspace."""
     from ..case.reader import read_case
@@ -53,7 +58,13 @@ def workspace(
     given = {} if of is None else settings_of_result(of)
     loaded, _, inputs = read_case(case, {**given, **read_settings(settings)})
     workspace_of_case(loaded)
-    check_outputs(inputs, {"--json": json_file})
+    check_picture(plot)
+    check_outputs(inputs, {"--json": json_file, "--plot": plot})
+    slices: tuple[Slice, ...] = ()
+    if plot is not None:
+        from ..workspace.slices import slices_of
+
+        slices = slices_of(loaded)
     judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, jobs)
     largest = None
     if scale:
@@ -64,6 +75,12 @@ def workspace(
     result = workspace_of(judged, largest)
     if json_file is not None:
         write_json(json_file, result)
+    if plot is not None:
+        from ..output.files import write_bytes
+        from ..output.pictures.requirements import ending_of
+        from ..output.pictures.workspaceslices import slices_picture
+
+        write_bytes(plot, slices_picture(loaded, slices, ending_of(plot)))
     if json_file != "-":
         from ..output.terminal import show
         from ..results.workspacewording import workspace_summary

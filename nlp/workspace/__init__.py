@@ -7,5 +7,5 @@ The modules import each other in this order:
   (signs of determinants without rounding), ``verdict`` and ``search``;
 * numbers: ``posed`` (a case as expressions of the pose), ``claims``, ``extremes`` (bounds by the certificate's search),
   ``boundsearch``, ``singular`` and ``clearance`` (searches of their own), ``ownsearches``;
-* ``judge`` (all claims about a machine) and ``scale`` (the largest box).
+* ``judge`` (all claims about a machine), ``scale`` (the largest box) and ``slices`` (for pictures).
 """

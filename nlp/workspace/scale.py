@@ -53,7 +53,7 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
     """
     workspace = workspace_of_case(case)
     proved, failed, fault = 0.0, float("inf"), None
-    factor, most = 1.0, min(_MOST, _largest_factor(workspace))
+    factor, most = 1.0, min(_MOST, largest_factor(workspace))
     while (failed == float("inf") or failed - proved > ACCURACY * failed) and not is_requested():
         judged = judge_workspace(
             case,
@@ -109,7 +109,7 @@ def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     return f"{name} {'is refuted' if is_refuted else 'stays open'}", pose, is_refuted
 
 
-def _largest_factor(workspace: Workspace) -> float:
+def largest_factor(workspace: Workspace) -> float:
     """Return the largest factor at which every angle has coordinates."""
     factors = [_MOST]
     for angle in workspace.turns.angles:

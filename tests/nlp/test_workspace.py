@@ -32,6 +32,7 @@ from screwsynth.nlp.workspace.regularity import Rank
 from screwsynth.nlp.workspace.scale import largest_scale
 from screwsynth.nlp.workspace.search import prove_regular
 from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.slices import Region, slices_of
 from screwsynth.nlp.workspace.verdict import Outcome
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
@@ -484,3 +485,28 @@ def spans(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     form = rows.turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
     rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
     return points[:, None, :3] + np.einsum("bij,lj->bli", rotation, robot.platform) - robot.base
+
+
+def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: Path, tmp_path: Path) -> None:
+    wide = replace(case, workspace=turned(TurnKind.ROLL_PITCH_YAW, 30))
+    assert wide.workspace is not None
+    slices = slices_of(wide)
+    assert [each.names for each in slices][-1] == ("pitch", "yaw")
+    tilts = next(each for each in slices if each.names == ("roll", "pitch"))
+    assert set(tilts.regions) == set(Region)
+    middle = 0.5 * (tilts.boxes[:, :2] + tilts.boxes[:, 2:])
+    points = np.column_stack(
+        [np.zeros((len(middle), 2)), np.full(len(middle), 20.0), np.tan(middle / 2), np.zeros(len(middle))]
+    )
+    values = determinants(legs(case), pose_box(wide.workspace), points)
+    for region, sign in ((Region.REGULAR, -1), (Region.BEYOND, 1)):
+        assert (np.sign(values[[each is region for each in tilts.regions]]) == sign).all()
+    # The boxes cover the slice.
+    area = np.prod(np.diff(np.tan(tilts.boxes.reshape(-1, 2, 2) / 2), axis=1), axis=2).sum()
+    assert area == pytest.approx(np.prod(np.diff(np.tan(tilts.whole / 2), axis=0)))
+    picture = tmp_path / "slices.svg"
+    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.05", "--plot", str(picture)])
+    assert run.exit_code == 0, run.output
+    text = picture.read_text(encoding="utf-8")
+    assert 'id="workspace"' in text
+    assert f'id="{Region.REGULAR.value}"' in text
