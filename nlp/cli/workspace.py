@@ -33,6 +33,15 @@ def workspace(
         float,
         typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop each search then, with the bound reached."),
     ] = 20.0,
+    leg_error: Annotated[
+        float,
+        typer.Option(
+            "--leg-error",
+            parser=Number("--leg-error"),
+            metavar="LENGTH",
+            help="Largest error of a leg's length: bounds the errors of the pose.",
+        ),
+    ] = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
@@ -41,7 +50,7 @@ def workspace(
         typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
     ] = None,
 ) -> None:
-    """Prove a machine regular and within its limits at every pose of its workspace."""
+    """Prove regular poses and limits over a whole workspace."""
     from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
@@ -54,6 +63,8 @@ def workspace(
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     if not time > 0:
         raise InputError(f"--time {time:g}: must be positive")
+    if not 0 <= leg_error < float("inf"):
+        raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
     answer_after(Milestone.BOUND)
     given = {} if of is None else settings_of_result(of)
     loaded, _, inputs = read_case(case, {**given, **read_settings(settings)})
@@ -65,7 +76,7 @@ def workspace(
         from ..workspace.slices import slices_of
 
         slices = slices_of(loaded)
-    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, jobs)
+    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs)
     largest = None
     if scale:
         from ..results.workspacescale import scale_data
@@ -89,14 +100,16 @@ def workspace(
     raise typer.Exit(0 if result.proved else 1)
 
 
-def _judge_with_progress(case: Case, quantities: list[str], gap: float, time: float, jobs: int | None) -> Judgement:
+def _judge_with_progress(
+    case: Case, quantities: list[str], gap: float, time: float, leg_error: float, jobs: int | None
+) -> Judgement:
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
     import sys
 
     from ..workspace.judge import judge_workspace
 
     if not sys.stderr.isatty():
-        return judge_workspace(case, quantities=quantities, gap=gap, time_limit=time, jobs=jobs)
+        return judge_workspace(case, quantities=quantities, gap=gap, time_limit=time, leg_error=leg_error, jobs=jobs)
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress, SpinnerColumn, TextColumn
@@ -118,6 +131,7 @@ def _judge_with_progress(case: Case, quantities: list[str], gap: float, time: fl
             quantities=quantities,
             gap=gap,
             time_limit=time,
+            leg_error=leg_error,
             jobs=jobs,
             rank_progress=show_boxes,
             progress=show_number,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from ..interruption import is_requested
 from .claims import claims_of
 from .extremes import GAP, Extreme, prove_extreme
 from .machine import legs_of, workspace_of_case
-from .ownsearches import own_searches, strokes
+from .ownsearches import own_searches, pose_errors, strokes
 from .posebox import pose_box
 from .posed import posed_layout
 from .search import RankProgress, prove_regular
@@ -63,6 +64,7 @@ def judge_workspace(
     with_limits: bool = True,
     with_objective: bool = True,
     until_fault: bool = False,
+    leg_error: float = 0.0,
     rank_progress: RankProgress | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Judgement:
@@ -78,6 +80,8 @@ def judge_workspace(
         engine: ``"c"`` or ``"numpy"`` for the search of singular poses; left out, the C kernel where it was built.
         with_limits: whether numbers are bounded at all, and not regularity alone.
         with_objective: whether F of each task is bounded.
+        leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
+            the errors of the platform's pose are bounded, where F is.
         until_fault: whether the work ends at the first claim that is not proved.
         rank_progress: called during the search for singular poses.
         progress: called before each number with its name, the number of those done, and of all.
@@ -110,4 +114,8 @@ def judge_workspace(
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
+    eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
+    if legs is not None and with_limits and with_objective and eps > 0:
+        shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
+        extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
     return Judgement(case, workspace, regularity, tuple(extremes))

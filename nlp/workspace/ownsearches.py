@@ -1,10 +1,12 @@
-"""Claims that have searches of their own: singular values, distances between legs, and strokes of legs."""
+"""Claims that have searches of their own: singular values, distances between legs, strokes, errors of the pose."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
@@ -17,6 +19,7 @@ from .clearance import Clearance
 from .extremes import Extreme
 from .machine import Legs
 from .posebox import PoseBox
+from .poseerror import PoseErrors, WorstError, displaced, with_rest
 from .singular import SingularValues
 from .verdict import Outcome
 
@@ -24,6 +27,8 @@ from .verdict import Outcome
 _ON_LIMIT = 1e-9
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
 _NEAR_ZERO = 0.1
+#: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
+_ERROR_GAP = 0.1
 
 
 def own_searches(
@@ -156,3 +161,53 @@ def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: flo
         seconds=0.0,
         reason="the limit is closer than the gap of the lengths" if outcome is Outcome.OPEN else "",
     )
+
+
+def pose_errors(
+    legs: Legs,
+    box: PoseBox,
+    eps: float,
+    shortest: float,
+    *,
+    time_limit: float | None,
+    interrupted: Callable[[], bool],
+) -> Iterator[Extreme]:
+    """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
+
+    Args:
+        legs: joint centres.
+        box: the poses.
+        eps: largest error of a leg's length, those of its joint centres included, length.
+        shortest: proven shortest length of a leg over the poses.
+        time_limit: seconds for each search.
+        interrupted: whether the work is requested to stop.
+    """
+    searches = [WorstError(legs, box, is_rotation=is_rotation) for is_rotation in (False, True)]
+    found = []
+    for each in searches:
+        size = abs(float(each.values(0.5 * (box.lower + box.upper)[None])[0]))
+        found.append(prove_minimum(each, box, gap=_ERROR_GAP * size, time_limit=time_limit, interrupted=interrupted))
+    first = PoseErrors(*(-eps * each.bound for each in found))
+    reach = float(np.linalg.norm(legs.platform, axis=1).max())
+    whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
+    names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
+    for k, (name, dimension) in enumerate(names):
+        y, bound = found[k].y, whole[k]
+        # To first order both signs give the same error.
+        reached = max(displaced(legs, box, y, sign * eps * searches[k].worst(y))[k] for sign in (-1.0, 1.0))
+        is_proved = math.isfinite(bound) and not found[k].reason
+        reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
+        yield Extreme(
+            name=name,
+            sense=Sense.MAX,
+            dimension=dimension,
+            key="",
+            limit=None,
+            bound=bound,
+            reached=reached,
+            pose=box.pose(y),
+            outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
+            boxes=found[k].boxes,
+            seconds=found[k].seconds,
+            reason="" if is_proved else reason,
+        )

@@ -28,6 +28,7 @@ from screwsynth.nlp.workspace.engines import kernel, rank_engine
 from screwsynth.nlp.workspace.judge import judge_workspace
 from screwsynth.nlp.workspace.machine import Legs, legs_of
 from screwsynth.nlp.workspace.posebox import PoseBox, pose_box, scaled
+from screwsynth.nlp.workspace.poseerror import WorstError
 from screwsynth.nlp.workspace.regularity import Rank
 from screwsynth.nlp.workspace.scale import largest_scale
 from screwsynth.nlp.workspace.search import prove_regular
@@ -510,3 +511,96 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: P
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
     assert f'id="{Region.REGULAR.value}"' in text
+
+
+def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:
+    """Errors of the pose (count,), in position and rotation, of random machines at random poses, by Newton's method.
+
+    Half of eps is the error of the legs' lengths, and half that of both joint centres.
+    """
+    rng = np.random.default_rng(11)
+    points = box.random(count, rng)
+    if extreme:
+        points = np.where(
+            rng.uniform(size=points.shape) < 0.8,
+            np.where(points > 0.5 * (box.lower + box.upper), box.upper, box.lower),
+            points,
+        )
+        points = box.clipped(points)
+    form = rows.turn_form(box, points[:, 3:], np.zeros((count, 3))).terms[:, 0]
+    start = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    turn, position = start.copy(), points[:, :3].copy()
+    span = position[:, None] + np.einsum("kij,lj->kli", turn, robot.platform) - robot.base
+    lengths = np.linalg.norm(span, axis=2)
+    if extreme:
+        signs = rng.choice([-1.0, 1.0], (count, 6))
+        wanted = lengths + eps / 2 * signs
+        along = np.einsum("kji,klj->kli", turn, span / lengths[:, :, None])
+        base, platform = (
+            robot.base + eps / 4 * signs[:, :, None] * span / lengths[:, :, None],
+            robot.platform - eps / 4 * signs[:, :, None] * along,
+        )
+    else:
+        wanted = lengths + eps / 2 * rng.uniform(-1, 1, (count, 6))
+        directions = rng.normal(size=(2, count, 6, 3))
+        directions *= eps / 4 / np.linalg.norm(directions, axis=3, keepdims=True)
+        base, platform = robot.base + directions[0], robot.platform + directions[1]
+    for _ in range(6):
+        arm = np.einsum("kij,klj->kli", turn, platform)
+        span = position[:, None] + arm - base
+        now = np.linalg.norm(span, axis=2)
+        unit = span / now[:, :, None]
+        step = np.linalg.solve(np.concatenate([unit, np.cross(arm, unit)], axis=2), (wanted - now)[:, :, None])[:, :, 0]
+        position += step[:, :3]
+        half = np.concatenate([np.full((count, 1), 2.0), step[:, 3:]], axis=1)
+        w, x, y, z = half.T / np.linalg.norm(half, axis=1)
+        turn = (
+            np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                ]
+            ).transpose(2, 0, 1)
+            @ turn
+        )
+    change = turn @ start.transpose(0, 2, 1)
+    vector = np.stack(
+        [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0], change[:, 1, 0] - change[:, 0, 1]]
+    )
+    return np.linalg.norm(position - points[:, :3], axis=1), np.arcsin(np.linalg.norm(vector, axis=0) / 2)
+
+
+@pytest.mark.parametrize("joint", [0.0005, pytest.param(0.05, marks=pytest.mark.slow)])
+def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(case: Case, joint: float) -> None:
+    angle = Free(-math.radians(10), math.radians(10))
+    workspace = Workspace((Free(-2.0, 2.0), Free(-2.0, 2.0), Free(18.0, 22.0)), Turns(TurnKind.ANY_AXIS, (angle,)))
+    built = replace(case, joint_centre_tolerance=joint)
+    judged = judge_workspace(built, workspace=workspace, gap=0.05, leg_error=2 * joint)
+    position, rotation = judged.extremes[-2:]
+    assert (position.name, rotation.name) == ("position error", "rotation error")
+    robot, box = legs(case), pose_box(workspace)
+    many = random_errors(robot, box, 4 * joint, 100_000, extreme=False)
+    worst = random_errors(robot, box, 4 * joint, 30_000, extreme=True)
+    for found, sampled, extreme in zip((position, rotation), many, worst, strict=True):
+        assert found.outcome is Outcome.PROVED
+        assert sampled.max() <= extreme.max() <= found.bound <= 1.5 * extreme.max()
+        assert extreme.max() <= 1.02 * found.reached
+        assert found.reached <= found.bound
+
+
+@pytest.mark.parametrize("is_rotation", [False, True])
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, is_rotation: bool) -> None:
+    rng = np.random.default_rng(6)
+    box = pose_box(turned(kind, 25))
+    oracle = WorstError(legs(case), box, is_rotation=is_rotation)
+    lower = box.random(100, rng)
+    upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (100, 6)), box.upper)
+    bound = oracle.bounds(lower, upper).lower
+    least = np.zeros(100)
+    for _ in range(30):
+        share = np.round(rng.uniform(size=(100, 6)), int(rng.integers(2)) * 3)
+        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+    assert (bound <= least).all()
+    assert np.median(bound / least) < 1.1
