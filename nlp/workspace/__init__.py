@@ -6,6 +6,6 @@ The modules import each other in this order:
 * regular poses: ``rows`` and ``regularity`` (the examination of boxes in NumPy), ``engines`` (the same in C), ``exact``
   (signs of determinants without rounding), ``verdict`` and ``search``;
 * numbers: ``posed`` (a case as expressions of the pose), ``claims``, ``extremes`` (bounds by the certificate's search),
-  ``boundsearch``, ``singular``, ``clearance`` and ``poseerror`` (searches of their own), ``ownsearches``;
+  ``boundsearch``, ``clearance``, ``inverse``, ``singular`` and ``poseerror`` (searches of their own), ``ownsearches``;
 * ``judge`` (all claims about a machine), ``scale`` (the largest box) and ``slices`` (for pictures).
 """

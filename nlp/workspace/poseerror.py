@@ -4,9 +4,8 @@ A leg's length changes by at most ``eps = leg error + 2 joint error`` when its j
 error, at every pose: by the triangle inequality. To first order the platform's origin and its rotation are off by
 ``J^-1 d`` with ``|d_i| <= eps``, and the largest size is met where every ``d_i`` is eps or -eps.
 
-Over a box ``J^-1`` is ``C - C (J - J0) C + ...``: its part of first order is affine in the coordinates, sizes are
-convex, and so largest at a corner of the box. With ``B >= |C (J - J0)|`` the terms of higher order are at most ``B^2
-(I - B)^-1 |C|``.
+Over a box ``J^-1`` is affine in the coordinates but for a rest (:mod:`.inverse`). Sizes are convex, and so largest at
+a corner of the box.
 
 For the rest of the pose error, let the error found be P eps in position and Q eps in rotation. By Taylor's formula the
 lengths at the true pose differ from those to first order by at most
@@ -19,7 +18,6 @@ machine comes continuously from the one without errors, and so its errors are th
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -27,16 +25,15 @@ import numpy as np
 
 from ...models import FloatArray
 from .boundsearch import Bounds
-from .machine import LEGS, Legs
+from .inverse import CORNERS, inverse_over, inverses
+from .machine import Legs
 from .posebox import PoseBox
-from .rows import FIRST, SECOND, expand
+from .rows import expand
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10
-#: Signs (64, 6) of the coordinates at the corners of a box, and (6, 32) of the errors of legs: a pair of opposite
-#: signs has one size.
-_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
-_ERRORS = _CORNERS[:32].T
+#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+_ERRORS = CORNERS[:32].T
 #: Steps in the search of the smallest r.
 _STEPS = 200
 #: Steps of Newton's method for a pose whose errors are small.
@@ -70,44 +67,17 @@ class WorstError:
         rows = expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0]
         lengths = np.linalg.norm(rows[:, :, :3], axis=2)
         with np.errstate(all="ignore"):
-            return np.asarray(_inverses(rows)[:, self._part] * lengths[:, None, :])
+            return np.asarray(inverses(rows)[:, self._part] * lengths[:, None, :])
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
-        centre = 0.5 * lower + 0.5 * upper
-        half = np.maximum(upper - centre, centre - lower) * (1 + 2.0**-51)
-        terms, rest = expand(self._legs, self._box, centre, half)
-        mixed = (half[:, 3:, None] * half[:, None, :3]).reshape(-1, 9)
-        factor = np.concatenate([half[:, 3 + FIRST] * half[:, 3 + SECOND], mixed], axis=1)
+        inverse = inverse_over(self._legs, self._box, lower, upper)
         with np.errstate(all="ignore"):
-            C = _inverses(terms[:, :, 0])
-            slopes = np.einsum("bij,bjkl->bkil", C, terms[:, :, 1:7]) * half[:, :, None, None]
-            second = np.abs(C) @ (rest + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:])))
-            second += _ROUNDING * (np.abs(C) @ np.abs(terms[:, :, 0]))
-            B = np.abs(slopes).sum(axis=1) + second
-            # |J^-1| <= X with (I - B) X >= |C|.
-            X = np.linalg.solve(np.where(np.isfinite(B), np.eye(LEGS) - B, np.eye(LEGS)), np.abs(C)) * (1 + 1e-6)
-            is_bound = (X >= 0).all(axis=(1, 2)) & (np.abs(C) <= X - B @ X).all(axis=(1, 2))
-            further = (second + B @ B) @ X
-            force = terms[:, :, 0, :3]
-            size = np.linalg.norm(force, axis=2)
-            moved = terms[:, :, 1:7, :3] * half[:, None, :, None]
-            left = (rest[:, :, :3] + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:, :3]))).sum(axis=2)
-            far = np.linalg.norm(np.abs(moved).sum(axis=2), axis=2) + left
-            # |f + g| <= |f| + f.g / |f| + |g|^2 / 2|f|, and |J^-1| times a length.
-            slope = np.einsum("bli,blki->blk", force / size[:, :, None], moved)
-            off = left + far**2 / (2 * size) + _ROUNDING * size
-            part = self._part
-            fixed = C[:, part] * size[:, None, :]
-            linear = -np.einsum("bkij,bjl->bkil", slopes, C)[:, :, part] * size[:, None, None, :]
-            linear += C[:, None, part] * slope.transpose(0, 2, 1)[:, :, None, :]
-            most = np.abs(C)[:, part] * off[:, None, :] + further[:, part] * (size + far)[:, None, :]
-            most += np.abs(slopes).sum(axis=1)[:, part] @ np.abs(C) * far[:, None, :]
-            corners = fixed[:, None] + np.einsum("bkil,ck->bcil", linear, _CORNERS)
+            corners = inverse.at_corners(self._part)
             worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))
-            worst += np.linalg.norm(most.sum(axis=2), axis=1)
-        bound = np.where(is_bound & np.isfinite(worst), -worst * (1 + _ROUNDING), -np.inf)
-        return Bounds(bound, np.nan_to_num((slopes**2).sum(axis=(2, 3))))
+            worst += np.linalg.norm(inverse.rest[:, self._part].sum(axis=2), axis=1)
+        bound = np.where(np.isfinite(worst), -worst * (1 + _ROUNDING), -np.inf)
+        return Bounds(bound, inverse.shares)
 
 
 class PoseErrors(NamedTuple):
@@ -141,14 +111,6 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
             return PoseErrors(position, rotation)
         r = needed * (1 + 1e-6)
     return PoseErrors(math.inf, math.inf)
-
-
-def _inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, 6, 6); NaN for singular ones."""
-    good = np.isfinite(matrices).all(axis=(1, 2)) & (np.linalg.det(np.nan_to_num(matrices)) != 0)
-    found: FloatArray = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
-    return found
 
 
 def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors:

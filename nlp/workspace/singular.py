@@ -1,12 +1,10 @@
 """Bounds of the singular values of J over boxes of poses: J with unit rows, moments divided by a length.
 
-Over a box every entry of J is ``c + a.e + [-r, r]`` with ``|e_i| <= 1``: the rows of :mod:`.rows` divided by the
-length of their force. With ``L(e)`` the affine part,
-
-    smallest singular value >= sqrt(smallest eigenvalue of L(0)'L(0) + its first-order change) - |r|,
-
-because ``(L - L(0))'(L - L(0))`` is positive semidefinite. The eigenvalue is concave in e, and so is least at a corner
-of the box; the largest singular value of ``L(e)`` is convex in e, and largest at a corner. |r| is the Frobenius norm.
+The smallest singular value is 1 over the largest of the inverse, which is affine in the coordinates but for a rest
+(:mod:`.inverse`). The norm ``(tr (P P')^m)^(1/2m)`` is convex in P, not below the largest singular value and close to
+it, so that its largest value over the affine part is that at a corner of a box. The largest singular value of J itself
+is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i| <= 1``, the rows of :mod:`.rows`
+divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
 """
 
 from __future__ import annotations
@@ -17,14 +15,15 @@ import numpy as np
 
 from ...models import FloatArray
 from .boundsearch import Bounds
+from .inverse import CORNERS, Inverse, inverse_over
 from .machine import Legs
 from .posebox import PoseBox
 from .rows import FIRST, SECOND, expand
 
 #: Part of its size by which a computed eigenvalue is moved outwards: rounding of products and of LAPACK.
 _ROUNDING = 1e-12
-#: Signs (64, 6) of the coordinates at the corners of a box.
-_SIGNS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 6)).reshape(6, -1).T
+#: Squarings in the norm of an inverse: its m is 2 to this power. Two equal singular values make it 2 % too large.
+_SQUARINGS = 4
 
 
 class _Affine(NamedTuple):
@@ -66,10 +65,11 @@ class SingularValues:
         """Return lower bounds over boxes (B, 6)."""
         with np.errstate(all="ignore"):
             J = self._unit_rows(lower, upper)
-            least = _smallest(J)
-            found = -_largest(J) / least if self._is_condition else least
-        bound = np.where(np.isnan(found) | (np.isinf(found) & (found > 0)), -np.inf, found)
-        return Bounds(bound, np.nan_to_num((J.a**2).sum(axis=(1, 2))))
+            inverse = inverse_over(self._legs, self._box, lower, upper)
+            norm = _norm_of_inverse(inverse, self._length)
+            found = -_largest(J) * norm if self._is_condition else 1 / norm
+        bound = np.where(np.isnan(found), -np.inf, found)
+        return Bounds(bound if self._is_condition else np.maximum(bound, 0.0), inverse.shares)
 
     def _unit_rows(self, lower: FloatArray, upper: FloatArray) -> _Affine:
         """Return J, (B, 6, 6)."""
@@ -115,22 +115,23 @@ def _product(one: _Affine, other: _Affine) -> _Affine:
     return _Affine(c, a, rest + _ROUNDING * (np.abs(c) + np.abs(a).sum(axis=-1)))
 
 
-def _smallest(J: _Affine) -> FloatArray:
-    """Return a lower bound (B,) of the smallest singular value, not negative."""
-    constant = J.c.transpose(0, 2, 1) @ J.c
-    half = np.einsum("bij,bilk->bjlk", J.c, J.a)
-    change = half + half.transpose(0, 2, 1, 3)
-    known = np.isfinite(change).all(axis=(1, 2, 3)) & np.isfinite(constant).all(axis=(1, 2))
-    corners = np.nan_to_num(constant)[:, None] + np.einsum("bjlk,sk->bsjl", np.nan_to_num(change), _SIGNS)
-    least = np.linalg.eigvalsh(corners).min(axis=(1, 2))
-    size = np.abs(constant).sum(axis=(1, 2)) + np.abs(change).sum(axis=(1, 2, 3))
-    found = np.sqrt(np.maximum(least - _ROUNDING * size, 0.0)) * (1 - _ROUNDING) - _norm(J.r)
-    return np.where(known, np.maximum(found, 0.0), 0.0)
+def _norm_of_inverse(inverse: Inverse, length: float) -> FloatArray:
+    """Return an upper bound (B,) of the largest singular value of the inverse of J, moments divided by a length."""
+    scale = np.array([1.0, 1.0, 1.0, length, length, length])[:, None]
+    corners = inverse.at_corners(slice(0, 6)) * scale
+    square = corners @ corners.transpose(0, 1, 3, 2)
+    trace = np.trace(square, axis1=2, axis2=3)
+    power = square / trace[:, :, None, None]
+    for _ in range(_SQUARINGS):
+        power = power @ power
+    # A norm of Schatten: convex, and not below the largest singular value.
+    norm = np.sqrt(trace) * np.trace(power, axis1=2, axis2=3) ** (0.5 / 2**_SQUARINGS)
+    return np.asarray(norm.max(axis=1) * (1 + _ROUNDING) + _norm(inverse.rest * scale))
 
 
 def _largest(J: _Affine) -> FloatArray:
     """Return an upper bound (B,) of the largest singular value."""
-    corners = J.c[:, None] + np.einsum("bilk,sk->bsil", J.a, _SIGNS)
+    corners = J.c[:, None] + np.einsum("bilk,sk->bsil", J.a, CORNERS)
     known = np.isfinite(corners).all(axis=(1, 2, 3))
     values = np.linalg.svd(np.nan_to_num(corners), compute_uv=False).max(axis=(1, 2))
     return np.where(known, values * (1 + _ROUNDING) + _norm(J.r), np.inf)
