@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.case import Case
@@ -42,14 +42,7 @@ def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | Te
         yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
     else:
         yield from _regular_lines(case, result.regular)
-    limited = [each for each in result.extremes if each.limit is not None]
-    others = [each for each in result.extremes if each.limit is None]
-    for name, title, rows in (
-        ("limits", "limits over every pose", limited),
-        ("ranges", "numbers over every pose", others),
-    ):
-        if rows:
-            yield _table(case, name, title, rows)
+    yield from _tables(case, result.extremes)
     yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
@@ -80,6 +73,21 @@ def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     yield Line(f"F = {steps}", label="designs")
     count = len(proof.poses)
     yield Line(f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints", label="exchange")
+
+
+def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
+    """Yield the limits and numbers of a solved design over its workspace."""
+    yield from _tables(case, proof.extremes)
+
+
+def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+    """Yield the numbers with a limit, and those without."""
+    limited = [each for each in extremes if each.limit is not None]
+    others = [each for each in extremes if each.limit is None]
+    titles = (("limits", "limits over every pose", limited), ("ranges", "numbers over every pose", others))
+    for name, title, rows in titles:
+        if rows:
+            yield _table(case, name, title, rows)
 
 
 def _pose_words(case: Case, pose: WorkspacePose) -> str:
