@@ -147,6 +147,9 @@ def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: flo
         outcome = Outcome.REFUTED
     elif math.isfinite(bound) and sign * (bound - limit) <= slack:
         outcome = Outcome.PROVED
+    reason = "the limit is closer than the gap of the lengths"
+    if not math.isfinite(bound):
+        reason = "the leg's lengths are not bounded"
     return Extreme(
         name=name,
         sense=sense,
@@ -159,7 +162,7 @@ def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: flo
         outcome=outcome,
         boxes=0,
         seconds=0.0,
-        reason="the limit is closer than the gap of the lengths" if outcome is Outcome.OPEN else "",
+        reason=reason if outcome is Outcome.OPEN else "",
     )
 
 

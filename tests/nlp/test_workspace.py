@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, json_data, load_result, solve
+from screwsynth.nlp import Case, CaseError, Free, InputError, json_data, load_result, solve
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
@@ -604,3 +604,40 @@ def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, i
         least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
     assert (bound <= least).all()
     assert np.median(bound / least) < 1.1
+
+
+def test_other_robots_are_bounded_and_stay_open(tmp_path: Path) -> None:
+    runner, file = CliRunner(), tmp_path / "robot.toml"
+    text = runner.invoke(app, ["new", "three-upu"]).output
+    place = "position = [{ min = -2, max = 2 }, 0, { min = 45, max = 50 }]"
+    box = f"[workspace]\n{place}\nrotation = {{ roll = {{ min = -5, max = 5 }} }}"
+    file.write_text(f"{text}\n{box}\n", encoding="utf-8")
+    run = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--json", "-"])
+    assert run.exit_code == 1
+    result = json.loads(run.stdout)
+    assert result["regular"] is None
+    assert not result["proved"]
+    # Lengths and F are bounded all the same.
+    assert {each["outcome"] for each in result["extremes"]} == {"proved"}
+    drawn = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--plot", str(tmp_path / "x.png")])
+    assert "six straight legs" in str(drawn.exception)
+    assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize("option", [["--gap", "2"], ["--time", "0"], ["--leg-error", "-1"], ["--of-quantity", "mass"]])
+def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str]) -> None:
+    run = CliRunner().invoke(app, ["workspace", str(machine), *option])
+    assert isinstance(run.exception, InputError)
+    assert str(run.exception).startswith(option[0])
+
+
+def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = iter([False] * 6)
+    monkeypatch.setattr("screwsynth.nlp.workspace.judge.is_requested", lambda: next(calls, True))
+    judged = judge_workspace(case, gap=0.05)
+    assert judged.regularity is not None
+    assert judged.regularity.outcome is Outcome.PROVED
+    assert judged.extremes[0].outcome is Outcome.PROVED
+    assert [each.reason for each in judged.extremes].count("interrupted") > 3
+    assert judged.extremes[-1].outcome is Outcome.OPEN
+    assert not judged.is_proved
