@@ -94,9 +94,7 @@ def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     regular, faults = judged.regularity, []
     if regular is not None and regular.outcome is not Outcome.PROVED:
         pose = None if regular.y is None else regular.box.pose(regular.y)
-        faults.append(
-            (regular.outcome, "J is singular" if regular.outcome is Outcome.REFUTED else "regular poses", pose)
-        )
+        faults.append((regular.outcome, "regular", pose))
     faults += [
         (each.outcome, f"{each.name}: {each.key}", each.pose)
         for each in judged.extremes
@@ -106,7 +104,7 @@ def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
         return "regular poses", None, False
     outcome, name, pose = min(faults, key=lambda each: each[0] is not Outcome.REFUTED)
     is_refuted = outcome is Outcome.REFUTED
-    return f"{name} {'is refuted' if is_refuted else 'stays open'}", pose, is_refuted
+    return f"{name}, {outcome.value}", pose, is_refuted
 
 
 def largest_factor(workspace: Workspace) -> float:
