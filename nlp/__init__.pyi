@@ -38,6 +38,9 @@ from .case.source import shipped_cases as shipped_cases
 from .case.task import Method as Method
 from .case.task import Sense as Sense
 from .case.task import Task as Task
+from .case.workspace import TurnKind as TurnKind
+from .case.workspace import Turns as Turns
+from .case.workspace import Workspace as Workspace
 from .certificate.branchandbound import certify_program as certify_program
 from .certificate.certificate import Certificate as Certificate
 from .certificate.certificate import CertificateStatus as CertificateStatus
@@ -101,3 +104,10 @@ from .solver.tradeoff import Tradeoff as Tradeoff
 from .solver.tradeoff import TradeoffPoint as TradeoffPoint
 from .solver.tradeoff import tradeoff as tradeoff
 from .units import Units as Units
+from .workspace.extremes import Extreme as Extreme
+from .workspace.judge import Judgement as Judgement
+from .workspace.judge import judge_workspace as judge_workspace
+from .workspace.scale import Scale as Scale
+from .workspace.scale import largest_scale as largest_scale
+from .workspace.verdict import Outcome as Outcome
+from .workspace.verdict import Regularity as Regularity

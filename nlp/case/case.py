@@ -25,6 +25,7 @@ from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
 from .task import Method, Sense, Task
+from .workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,7 @@ class Case(Whole, Shown):
         further: other stated poses, with their displacements. The robot's dimensions are the same at all poses.
         over_poses: combination of F over several poses.
         joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
+        workspace: poses for which a machine with these dimensions is judged; None for none.
         search: settings of the search.
         method: method that combines several tasks; the average is equation 15.
         title: one line for people.
@@ -71,6 +73,7 @@ class Case(Whole, Shown):
     further: Sequence[Pose] = ()
     over_poses: OverPoses = OverPoses.SUM
     joint_centre_tolerance: float | None = None
+    workspace: Workspace | None = None
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE
     title: str = ""
@@ -88,6 +91,8 @@ class Case(Whole, Shown):
         store(self, "tasks", _check_tasks(self))
         self.limits.check(self.as_limited)
         _check_tolerance(self)
+        if self.workspace is not None:
+            self.workspace.check(self.units)
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 

@@ -31,6 +31,7 @@ from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, read_text, tables_of
 from .task import Method, Sense, Task, unit_twist
 from .tomltext import toml_text
+from .workspace import workspace_of
 
 
 class CaseFile(NamedTuple):
@@ -148,6 +149,11 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         over_poses=over_poses,
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
+        workspace=workspace_of(
+            written.workspace,
+            units,
+            has_limits=written.limits is not None and written.limits.over == "workspace",
+        ),
         tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,

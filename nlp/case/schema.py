@@ -29,6 +29,7 @@ from .limits.registry import LimitsTable
 from .settings import Expectation, Published, Search
 from .table import Table, Vector
 from .task import Task
+from .workspacetable import WorkspaceTable
 
 #: Forms of a fixed rotation, each of which stands alone.
 _FIXED = ("rpy", "matrix", "quaternion")
@@ -316,6 +317,7 @@ class Document(Table):
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
+    workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
     solve: SolveTable = SolveTable()
     expect: ExpectTable = ExpectTable()
     published: list[PublishedTable] = Field(default_factory=list)

@@ -80,6 +80,8 @@ def _lines(case: Case) -> Iterator[str]:
     yield from toml_table("[combine]", _combination(case))
     yield from toml_table("[limits]", _limits(case))
     yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
+    if case.workspace is not None:
+        yield from toml_table("[workspace]", case.workspace.to_keys(case.units))
     search, default = case.search, Search()
     settings = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
     yield from toml_table("[solve]", {key: value for key, value in settings.items() if value != getattr(default, key)})
@@ -181,6 +183,8 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
         CaseError: two limits need different values of one key.
     """
     found: dict[str, TomlValue | None] = {}
+    if case.workspace is not None and case.workspace.has_limits:
+        found["over"] = "workspace"
     for limit in case.limits:
         _merge(found, limit.to_keys(case.model, case.units), "limits")
     return found

@@ -19,6 +19,7 @@ from .schema import schema
 from .solve import solve
 from .tradeoff import tradeoff
 from .verify_proof import verify_proof
+from .workspace import workspace
 
 app = typer.Typer(
     name="screwsynth",
@@ -31,7 +32,21 @@ app = typer.Typer(
 )
 
 # In the order in which help lists them.
-for command in (solve, report, tradeoff, certify, verify_proof, check, evaluate, codegen, export, models, schema, new):
+for command in (
+    solve,
+    report,
+    tradeoff,
+    certify,
+    verify_proof,
+    workspace,
+    check,
+    evaluate,
+    codegen,
+    export,
+    models,
+    schema,
+    new,
+):
     app.command()(command)
 app.command("import", cls=SeveralValues)(import_)
 

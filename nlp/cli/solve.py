@@ -85,4 +85,5 @@ def solve(
         from ..results.summary import case_summary
 
         show(console(), case_summary(loaded, result))
-    raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)
+    kept = solution.workspace is None or solution.workspace.is_proved
+    raise typer.Exit(0 if solution.status.is_answer and is_proved and kept else 1)

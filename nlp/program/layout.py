@@ -18,9 +18,9 @@ trajectory or a grid follow from it by fixed displacements.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -92,7 +92,7 @@ class Layout:
     families: tuple[PairFamily, ...] = ()
 
 
-class _StatedPoseSymbols(NamedTuple):
+class StatedPoseSymbols(NamedTuple):
     """A stated pose as symbols.
 
     Attributes:
@@ -114,12 +114,17 @@ class _StatedPoseSymbols(NamedTuple):
     displacements: tuple[Displacement, ...]
 
 
-def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
+#: Adds a stated pose, with the prefix of the names of its numbers, to a table of symbols.
+AddPose: TypeAlias = Callable[[Pose, str, SymbolTable], StatedPoseSymbols]
+
+
+def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) -> Layout:
     """Return symbols for every number that a case fixes or frees, and the robot's expressions in these symbols.
 
     Args:
         case: the case.
         tasks: tasks whose twists become arguments, one or more.
+        add_pose: adds a stated pose in other coordinates than those above.
 
     Raises:
         CaseError: an equation among fixed numbers does not hold.
@@ -129,7 +134,8 @@ def lay_out(case: Case, tasks: Sequence[Task]) -> Layout:
         table.add_each(case.component_names(item), item.dimension, _component_values(case, item))
         for item in model.parameters
     ]
-    stated = [_add_pose(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
+    add = _add_pose if add_pose is None else add_pose
+    stated = [add(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
     reference = _reference(case)
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
@@ -268,7 +274,7 @@ def _variable_constraints(
     return variable
 
 
-def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols:
+def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
     """Add the numbers of a stated pose, position, then rotation, and return its symbols.
 
     Args:
@@ -283,7 +289,7 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
         size = table.add(f"{prefix}angle", Dimension.ANGLE, angle)
         rotation = matrix_from_axis_angle(n.symbols, size.symbols)
         symbols, places = ca.vertcat(position.symbols, size.symbols), (*position.places, *size.places)
-        return _StatedPoseSymbols(
+        return StatedPoseSymbols(
             rotation, position.symbols, places, symbols, HeldRotation(size.places[0]), [], pose.displacements
         )
     smallest, largest = sizes_of_turn(angle)
@@ -291,7 +297,7 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
     if radius == 0:
         q = table.add_vector(f"{prefix}q", Dimension.NUMBER, (0.0, 0.0, 0.0)).symbols
         rotation = matrix_from_quaternion_vector(q)
-        return _StatedPoseSymbols(
+        return StatedPoseSymbols(
             rotation, position.symbols, position.places, position.symbols, None, [], pose.displacements
         )
     inner = math.sin(smallest / 2)
@@ -303,7 +309,7 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> _StatedPoseSymbols
     vector = table.add_vector(f"{prefix}q", Dimension.NUMBER, (Free(-bound, bound), Free(-bound, bound), along_z))
     ball = Constraint(f"{prefix}angle", ca.sumsqr(vector.symbols), ROTATION_ANGLE)
     x, y, z = (place.index for place in vector.places)
-    return _StatedPoseSymbols(
+    return StatedPoseSymbols(
         matrix_from_quaternion_vector(vector.symbols),
         position.symbols,
         position.places,

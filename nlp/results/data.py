@@ -23,6 +23,7 @@ from .parts import (
     VersionsData,
     ViolationData,
 )
+from .workspace import WorkspaceProofData
 
 
 class ReachedData(JsonObject):
@@ -160,6 +161,7 @@ class SolveResult(JsonObject):
         tolerance: loss by inexact joint centres; absent without an answer or where the case has no tolerance.
         starts: outcome of the starts.
         certificate: the proven bound; null where none was asked for.
+        workspace: proof over the workspace; absent where no limit holds there.
         seed: of the starting points.
         versions: of the programs.
         seconds: wall time.
@@ -179,6 +181,7 @@ class SolveResult(JsonObject):
     tolerance: Absent[ToleranceData]
     starts: StartsData
     certificate: CertificateData | None
+    workspace: Absent[WorkspaceProofData]
     seed: int
     versions: VersionsData
     seconds: float

@@ -18,8 +18,11 @@ from .jsondata import JsonObject, Mark, Size
 from .parts import SCHEMA
 from .schema import RESULTS
 from .tradeoff import TradeoffResult
+from .workspace import WorkspaceResult
 
-Result: TypeAlias = SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult | TradeoffResult
+Result: TypeAlias = (
+    SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult | TradeoffResult | WorkspaceResult
+)
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.
 _LARGEST = 64_000_000
@@ -47,7 +50,7 @@ class _WrongValueError(ValueError):
 
 
 def load_result(file: str | Path) -> Result:
-    """Read a result that ``solve``, ``evaluate``, ``certify``, ``check`` or ``tradeoff`` wrote with ``--json``.
+    """Read a result that a command, such as ``solve``, ``evaluate`` or ``workspace``, wrote with ``--json``.
 
     Args:
         file: path of the file.

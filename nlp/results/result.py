@@ -18,6 +18,7 @@ def result_of(found: Solution | Certified) -> CaseResult:
     solution = found if isinstance(found, Solution) else found.solution
     certificates = () if isinstance(found, Solution) else found.tasks
     if solution.combination is None:
-        return task_result(solution.outcomes[0].own, 0, certificates[0] if certificates else None)
+        certificate = certificates[0] if certificates else None
+        return task_result(solution.outcomes[0].own, 0, certificate, solution.workspace)
     combined = None if isinstance(found, Solution) else found.combined
     return combined_result(solution, solution.combination, certificates, combined)

@@ -15,6 +15,7 @@ from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import JsonObject, JsonValue, Mark, Size
 from .tradeoff import TradeoffResult
+from .workspace import WorkspaceResult
 
 #: Every kind of result.
 RESULTS: tuple[type[JsonObject], ...] = (
@@ -24,6 +25,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     CertifiedResult,
     ChecksResult,
     TradeoffResult,
+    WorkspaceResult,
 )
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -39,7 +41,7 @@ def result_schema() -> Schema:
     return {
         "$schema": _DIALECT,
         "title": "Result of screwsynth",
-        "description": "What --json writes of a solve (one task, or several), evaluate, certify, check and tradeoff.",
+        "description": "What --json writes of a solve, evaluate, certify, check, tradeoff and workspace.",
         "anyOf": kinds,
         "$defs": definitions,
     }

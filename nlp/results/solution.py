@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
@@ -14,15 +15,25 @@ from .design import limits_data, margins_data, relaxation_data, sensitivity_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none
 from .point import head_data, objective, robot_data, versions, violations
+from .workspace import proof_data
+
+if TYPE_CHECKING:
+    from ..solver.exchange import WorkspaceProof
 
 
-def task_result(solution: ProgramSolution, task: int = 0, certificate: Certificate | None = None) -> SolveResult:
+def task_result(
+    solution: ProgramSolution,
+    task: int = 0,
+    certificate: Certificate | None = None,
+    workspace: WorkspaceProof | None = None,
+) -> SolveResult:
     """Return the whole result of the program of one task.
 
     Args:
         solution: of the program.
         task: index of that task in the case.
         certificate: of the same program.
+        workspace: proof over the workspace.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
@@ -43,6 +54,7 @@ def task_result(solution: ProgramSolution, task: int = 0, certificate: Certifica
         tolerance=tolerance_data(nlp, x) if solved else None,
         starts=starts_data(solution),
         certificate=certificate_data(certificate),
+        workspace=proof_data(workspace),
         seed=solution.seed,
         versions=versions(),
         seconds=solution.seconds,

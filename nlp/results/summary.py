@@ -26,6 +26,7 @@ from .wording import (
     tolerance_line,
     violation_lines,
 )
+from .workspacewording import proof_lines
 
 if TYPE_CHECKING:
     from .certified import CertifiedResult
@@ -58,6 +59,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from singularity_lines(result.robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
+    yield from proof_lines(result.workspace)
 
 
 def _combined_summary(case: Case, result: CombinedResult) -> Summary:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ...models import FloatArray
 from ...models.shown import Shown
@@ -19,6 +20,9 @@ from .multistart import ProgramSolution
 from .optima import Optimum
 from .starts import Start
 from .status import Status
+
+if TYPE_CHECKING:
+    from .exchange import WorkspaceProof
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,8 @@ class Solution(Whole, Shown, Answer):
         outcomes: one for each task.
         combination: the combination of several tasks; None for one task.
         seconds: wall time.
+        workspace: proof that the design keeps its limits over the workspace; None where no limit holds there, or the
+            program has no answer.
     """
 
     case: Case
@@ -93,6 +99,7 @@ class Solution(Whole, Shown, Answer):
     outcomes: tuple[TaskOutcome, ...]
     combination: Combination | None
     seconds: float
+    workspace: WorkspaceProof | None = None
 
     def __repr__(self) -> str:
         if self.combination is None:

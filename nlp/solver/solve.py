@@ -56,8 +56,19 @@ def solve(
     began = time.perf_counter()
     search = case.search.but(starts, seed, compiled=compiled)
     phase(Phase.FORMULATING, 0, len(case.tasks))
-    nlps = formulate_each(case)
-    solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)
+    if case.workspace is not None and case.workspace.has_limits:
+        from .exchange import solve_over_workspace  # noqa: PLC0415 - other solves start without workspaces
+
+        after_start = None if progress is None else partial(progress, case.tasks[0].name)
+
+        def solve_one(nlp: Nlp, first: Sequence[FloatArray]) -> ProgramSolution:
+            return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
+
+        found = solve_over_workspace(case, solve_one)
+        solution = replace(solution_of_one_task(case, found.own), workspace=found.proof)
+    else:
+        nlps = formulate_each(case)
+        solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)
     return replace(solution, seconds=time.perf_counter() - began)
 
 

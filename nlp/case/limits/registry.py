@@ -6,9 +6,9 @@ case without limits does not load this module: the tables need pydantic, which t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from pydantic import ConfigDict, create_model
+from pydantic import ConfigDict, Field, create_model
 
 from ..table import Table
 from .actuator_rate import ActuatorRate
@@ -53,6 +53,10 @@ class _OpenTable(Table):
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, IntervalTable]
+
+    over: Literal["poses", "workspace"] = Field(
+        default="poses", description="whether the limits hold at the stated poses alone, or over the workspace too"
+    )
 
 
 if TYPE_CHECKING:

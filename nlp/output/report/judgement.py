@@ -10,6 +10,7 @@ from ...results.data import CertificateData, CombinedData, CombinedResult, Optim
 from ...results.rounding import number, size_of_F
 from ...results.tables import active_table
 from ...results.wording import certificate_lines, evidence_lines
+from ...results.workspacewording import proof_lines, proof_tables
 from .charts import Curve, Spot, line_chart
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
@@ -76,6 +77,18 @@ def certificate_section(report: Report) -> Markup:
         parts.append(paragraphs(certificate_lines(certificate)))
         parts += bound_chart(certificate.history)
     return join_markup(parts)
+
+
+def workspace_section(report: Report) -> Markup:
+    """Return the proof of the design over its workspace; empty where no limit holds there."""
+    result = report.result
+    if isinstance(result, CombinedResult) or result.workspace is None:
+        return Markup("")
+    tables = (
+        html_table(each, each.title, id=f"workspace-{each.name}")
+        for each in proof_tables(report.case, result.workspace)
+    )
+    return join_markup([paragraphs(proof_lines(result.workspace)), *tables])
 
 
 def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:

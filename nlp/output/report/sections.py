@@ -27,7 +27,7 @@ from ...results.wording import (
 from ..pictures.style import RATE_COLOURS
 from .exploration import optima, surroundings
 from .frames import ViewData
-from .judgement import certificate_section, evidence_section, published_section
+from .judgement import certificate_section, evidence_section, published_section, workspace_section
 from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
 from .poseviews import drawings, pose_controls
 from .report import Report
@@ -44,6 +44,7 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("around", "F around this point", surroundings(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
         ("certificate", "Certificate", certificate_section(report)),
+        ("workspace", "Workspace", workspace_section(report)),
         ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]

@@ -1,0 +1,168 @@
+"""The workspace of a case: a box of poses for which a machine is judged. Angles are radians."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ...models import Dimension, unit_vector
+from ..errors import CaseError
+from ..units import Units
+from .checks import check_direction, check_value
+from .pose import Free, Value
+
+if TYPE_CHECKING:
+    from .toml import TomlValue
+    from .workspacetable import SpanTable, WorkspaceRotationTable, WorkspaceTable
+
+#: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
+#: angle, grow without bound towards half a turn.
+LARGEST_TURN = math.radians(150)
+#: The three angles of a rotation by roll, pitch and yaw.
+_TURNS = ("roll", "pitch", "yaw")
+
+
+class TurnKind(enum.Enum):
+    """Coordinates of the rotations of a workspace."""
+
+    ANY_AXIS = "any axis"
+    AXIS = "axis"
+    ROLL_PITCH_YAW = "roll, pitch, yaw"
+
+
+@dataclass(frozen=True)
+class Turns:
+    """The rotations of a workspace.
+
+    Attributes:
+        kind: ``ANY_AXIS``: by at most the larger end of the one angle, about any axis; ``AXIS``: by an angle about the
+            axis; ``ROLL_PITCH_YAW``: ``Rz(yaw) Ry(pitch) Rx(roll)``.
+        angles: one value, or three, radians; fixed or free.
+        axis: (3,) unit axis of ``AXIS``, in the world frame.
+    """
+
+    kind: TurnKind = TurnKind.AXIS
+    angles: tuple[Value, ...] = (0.0,)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """A box of poses.
+
+    Attributes:
+        position: origin of the platform frame in the world frame, length; fixed or free components.
+        turns: rotations.
+        has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
+
+    Raises:
+        CaseError: a number is not allowed; the key is in the words of a case file.
+    """
+
+    position: Sequence[Value]
+    turns: Turns = field(default_factory=Turns)
+    has_limits: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.position) != 3:
+            raise CaseError("workspace.position", "must be a list of 3, each a number or { min, max }")
+        object.__setattr__(self, "position", tuple(self.position))
+
+    def check(self, units: Units) -> None:
+        """Refuse a number that is out of its range, and a box that is one pose.
+
+        Args:
+            units: units for people.
+
+        Raises:
+            CaseError: it is refused.
+        """
+        for index, value in enumerate(self.position):
+            check_value(value, f"workspace.position[{index}]", Dimension.LENGTH, units)
+        turns, key = self.turns, "workspace.rotation"
+        names = _TURNS if turns.kind is TurnKind.ROLL_PITCH_YAW else ("angle",)
+        domain = (-LARGEST_TURN, LARGEST_TURN)
+        for name, value in zip(names, turns.angles, strict=True):
+            check_value(value, f"{key}.{name}", Dimension.ANGLE, units, domain)
+        if turns.kind is TurnKind.ANY_AXIS:
+            angle = turns.angles[0]
+            whole = (
+                isinstance(angle, Free)
+                and angle.upper > 0
+                and (angle.lower == 0 or math.isclose(-angle.lower, angle.upper))
+            )
+            if not whole:
+                fault = (
+                    "must be { min = -a, max = a } or { min = 0, max = a }: with the axis free its sign means nothing"
+                )
+                raise CaseError(f"{key}.angle", fault)
+        if not any(isinstance(value, Free) for value in (*self.position, *turns.angles)):
+            raise CaseError("workspace", "is one pose: give at least one number as { min, max }")
+
+    def to_keys(self, units: Units) -> dict[str, TomlValue | None]:
+        """Return the table of a case file that states this workspace."""
+        turns = self.turns
+        angles = [_written(value, units, Dimension.ANGLE) for value in turns.angles]
+        rotation: dict[str, TomlValue | None] = {"angle": angles[0]}
+        if turns.kind is TurnKind.ROLL_PITCH_YAW:
+            rotation = dict(zip(_TURNS, angles, strict=True))
+        elif turns.kind is TurnKind.AXIS:
+            rotation = {"axis": list(turns.axis), "angle": angles[0]}
+        return {
+            "position": [_written(value, units, Dimension.LENGTH) for value in self.position],
+            "rotation": None if turns == Turns() else rotation,
+        }
+
+
+def workspace_of(written: WorkspaceTable | None, units: Units, *, has_limits: bool = False) -> Workspace | None:
+    """Return the workspace that a case file states; None where it states none.
+
+    Args:
+        written: its table.
+        units: the file's units.
+        has_limits: whether the limits of the case hold over the workspace.
+
+    Raises:
+        CaseError: the axis is zero, or limits hold over a workspace that is not stated.
+    """
+    if written is None:
+        if has_limits:
+            raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
+        return None
+    position = [_value(value, units, Dimension.LENGTH) for value in written.position]
+    return Workspace(position, _turns(written.rotation, units), has_limits)
+
+
+def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
+    """Return the rotations that a case file states.
+
+    Raises:
+        CaseError: the axis is zero.
+    """
+    if rotation is None:
+        return Turns()
+    if rotation.angle is None:
+        angles = [_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in _TURNS]
+        return Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))
+    angle = _value(rotation.angle, units, Dimension.ANGLE)
+    if rotation.axis is None:
+        return Turns(TurnKind.ANY_AXIS, (angle,))
+    x, y, z = unit_vector(check_direction(rotation.axis, "workspace.rotation.axis")).tolist()
+    return Turns(TurnKind.AXIS, (angle,), (x, y, z))
+
+
+def _value(written: float | SpanTable, units: Units, dimension: Dimension) -> Value:
+    """Return a fixed or free number, radians for an angle."""
+    if isinstance(written, float | int):
+        return units.to_internal(written, dimension)
+    return Free(units.to_internal(written.min, dimension), units.to_internal(written.max, dimension))
+
+
+def _written(value: Value, units: Units, dimension: Dimension) -> TomlValue:
+    """Return a fixed or free number in the case's unit."""
+    if not isinstance(value, Free):
+        return units.written(value, dimension)
+    return {"min": units.written(value.lower, dimension), "max": units.written(value.upper, dimension)}

@@ -1,0 +1,138 @@
+"""The command ``workspace``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .numbers import Number
+from .options import CaseName, Jobs, JsonFile, SettingTexts, check_picture, console, read_settings, write_json
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..workspace.judge import Judgement
+    from ..workspace.slices import Slice
+
+
+def workspace(
+    case: CaseName,
+    settings: SettingTexts = None,
+    of: Annotated[
+        str | None,
+        typer.Option("--of", metavar="RESULT", help="Take the dimensions from a result that solve --json wrote."),
+    ] = None,
+    of_quantity: Annotated[
+        list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
+    ] = None,
+    gap: Annotated[
+        float,
+        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of a value that its bound may be off by."),
+    ] = 1e-3,
+    time: Annotated[
+        float,
+        typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop each search then, with the bound reached."),
+    ] = 20.0,
+    leg_error: Annotated[
+        float,
+        typer.Option(
+            "--leg-error",
+            parser=Number("--leg-error"),
+            metavar="LENGTH",
+            help="Largest error of a leg's length: bounds the errors of the pose.",
+        ),
+    ] = 0.0,
+    scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
+    jobs: Jobs = None,
+    json_file: JsonFile = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
+    ] = None,
+) -> None:
+    """Prove regular poses and limits over a whole workspace."""
+    from ..case.reader import read_case
+    from ..errors import InputError
+    from ..interruption import Milestone, answer_after
+    from ..output.files import check_outputs
+    from ..results.workspace import workspace_of
+    from ..workspace.machine import workspace_of_case
+    from .dimensions import settings_of_result
+
+    if not 1e-9 <= gap < 1:
+        raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
+    if not time > 0:
+        raise InputError(f"--time {time:g}: must be positive")
+    if not 0 <= leg_error < float("inf"):
+        raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
+    answer_after(Milestone.BOUND)
+    given = {} if of is None else settings_of_result(of)
+    loaded, _, inputs = read_case(case, {**given, **read_settings(settings)})
+    workspace_of_case(loaded)
+    check_picture(plot)
+    check_outputs(inputs, {"--json": json_file, "--plot": plot})
+    slices: tuple[Slice, ...] = ()
+    if plot is not None:
+        from ..workspace.slices import slices_of
+
+        slices = slices_of(loaded)
+    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs)
+    largest = None
+    if scale:
+        from ..results.workspacescale import scale_data
+        from ..workspace.scale import largest_scale
+
+        largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
+    result = workspace_of(judged, largest)
+    if json_file is not None:
+        write_json(json_file, result)
+    if plot is not None:
+        from ..output.files import write_bytes
+        from ..output.pictures.requirements import ending_of
+        from ..output.pictures.workspaceslices import slices_picture
+
+        write_bytes(plot, slices_picture(loaded, slices, ending_of(plot)))
+    if json_file != "-":
+        from ..output.terminal import show
+        from ..results.workspacewording import workspace_summary
+
+        show(console(), workspace_summary(loaded, result))
+    raise typer.Exit(0 if result.proved else 1)
+
+
+def _judge_with_progress(
+    case: Case, quantities: list[str], gap: float, time: float, leg_error: float, jobs: int | None
+) -> Judgement:
+    """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
+    import sys
+
+    from ..workspace.judge import judge_workspace
+
+    if not sys.stderr.isatty():
+        return judge_workspace(case, quantities=quantities, gap=gap, time_limit=time, leg_error=leg_error, jobs=jobs)
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    from ..errors import one_line
+
+    columns = SpinnerColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("formulating", total=None)
+
+        def show_boxes(seconds: float, boxes: int, left: int) -> None:
+            bar.update(line, description=f"regular poses: {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
+
+        def show_number(name: str, done: int, total: int) -> None:
+            bar.update(line, description=f"{escape(one_line(name))}: {done} of {total} numbers done")
+
+        return judge_workspace(
+            case,
+            quantities=quantities,
+            gap=gap,
+            time_limit=time,
+            leg_error=leg_error,
+            jobs=jobs,
+            rank_progress=show_boxes,
+            progress=show_number,
+        )

@@ -1,0 +1,261 @@
+"""Verdicts on a workspace as a result: the types and their construction."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ...models import Dimension
+from ..case.task import Sense
+from ..units import Units
+from ..workspace.verdict import Outcome
+from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
+from .parts import HeadData, VersionsData
+from .point import head_data, versions
+
+if TYPE_CHECKING:
+    from ..solver.exchange import WorkspaceProof
+    from ..workspace.extremes import Extreme
+    from ..workspace.judge import Judgement
+    from ..workspace.posebox import PoseNumbers
+    from ..workspace.verdict import Regularity
+
+
+class WorkspacePose(JsonObject):
+    """A pose of the platform.
+
+    Attributes:
+        position: origin of the platform frame in the world frame.
+        axis: unit axis of the rotation; z without rotation.
+        angle: about it.
+    """
+
+    position: Vector3
+    axis: Vector3
+    angle: float
+
+
+class RegularData(JsonObject):
+    """Verdict on the claim that J has full rank at every pose.
+
+    Attributes:
+        outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
+            left.
+        pose: that pose; absent where the claim is proved.
+        between: two poses at which the determinant of the rows has opposite signs, without rounding; absent where the
+            claim is not refuted.
+        boxes: number of boxes examined.
+        open: number of boxes left.
+        share: part of the box of poses in boxes that are left.
+        seconds: wall time.
+        engine: ``c`` or ``numpy``.
+        reason: for stopping early; absent without one.
+    """
+
+    outcome: Outcome
+    pose: Absent[WorkspacePose]
+    between: Absent[tuple[WorkspacePose, ...]]
+    boxes: int
+    open: int
+    share: float
+    seconds: float
+    engine: str
+    reason: Absent[str]
+
+
+class ExtremeData(JsonObject):
+    """The smallest or the largest value of a number over the workspace.
+
+    Attributes:
+        name: of the number.
+        unit: of its values; empty for a plain number.
+        sense: whether the smallest or the largest value is meant.
+        bound: proven: no pose has a smaller, or larger, value; null where nothing is proved.
+        reached: the smallest or largest value known; null without one.
+        key: dotted key, below ``limits``, of the limit in the case; absent without one.
+        limit: the limit; absent without one.
+        outcome: of the limit, or, without one, of the gap asked for.
+        pose: at which the value is reached; null without one.
+        boxes: number of boxes examined.
+        seconds: wall time.
+        reason: for an open outcome; absent without one.
+    """
+
+    name: str
+    unit: str
+    sense: Sense
+    bound: float | None
+    reached: float | None
+    key: Absent[str]
+    limit: Absent[float]
+    outcome: Outcome
+    pose: WorkspacePose | None
+    boxes: int
+    seconds: float
+    reason: Absent[str]
+
+
+class ScaleData(JsonObject):
+    """The largest factor by which the box of poses can grow about its centre with everything proved.
+
+    Attributes:
+        factor: everything is proved for the box that is larger by this factor.
+        refuted: the smallest factor known at which something is refuted; null where there is none.
+        claim: the claim that is refuted there, or that stays open; empty without one.
+        pose: at which it is refuted; null without one.
+    """
+
+    factor: float
+    refuted: float | None
+    claim: str
+    pose: WorkspacePose | None
+
+
+class WorkspaceResult(JsonObject):
+    """Result of judging a machine over its workspace.
+
+    Attributes:
+        head: the case.
+        parameters: dimensions by name; three numbers for a point or direction.
+        proved: whether J is regular at every pose, every limit holds, and every number is bounded.
+        regular: whether J has full rank at every pose; null for a robot that is not six straight legs.
+        extremes: smallest and largest values.
+        scale: the largest box; absent where it was not asked for.
+        versions: of the programs.
+    """
+
+    head: Inline[HeadData]
+    parameters: Mapping[str, float | Vector]
+    proved: bool
+    regular: RegularData | None
+    extremes: tuple[ExtremeData, ...]
+    scale: Absent[ScaleData]
+    versions: VersionsData
+
+
+class BindingData(JsonObject):
+    """A pose at which a claim is a constraint of the program.
+
+    Attributes:
+        claim: that the pose refuted.
+        pose: the pose.
+    """
+
+    claim: str
+    pose: WorkspacePose
+
+
+class DesignData(JsonObject):
+    """A design on the way to the proven one.
+
+    Attributes:
+        F: of the design.
+        unproved: number of claims about the workspace that it does not keep, or that stay open.
+    """
+
+    F: float
+    unproved: int
+
+
+class WorkspaceProofData(JsonObject):
+    """Proof of a design over its workspace, by exchange of poses.
+
+    Attributes:
+        proved: whether J is regular at every pose, and every limit holds there.
+        designs: each design that was judged; the last is the answer.
+        poses: of the constraints.
+        regular: whether J has full rank at every pose.
+        extremes: smallest and largest values.
+    """
+
+    proved: bool
+    designs: tuple[DesignData, ...]
+    poses: tuple[BindingData, ...]
+    regular: RegularData | None
+    extremes: tuple[ExtremeData, ...]
+
+
+def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
+    """Return the proof of a solved design as a result."""
+    if proof is None:
+        return None
+    judged = proof.judgement
+    units = judged.case.units
+    return WorkspaceProofData(
+        proved=proof.is_proved,
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
+        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
+        regular=None if judged.regularity is None else _regular_data(judged.regularity, units),
+        extremes=tuple(_extreme_data(each, units) for each in judged.extremes),
+    )
+
+
+def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> WorkspaceResult:
+    """Return the verdicts on a machine as a result."""
+    case = judged.case
+    parameters: dict[str, float | Vector] = {}
+    for item in case.model.parameters:
+        values = tuple(case.units.shown(_fixed(value), item.dimension) for value in case.components(item.name))
+        parameters[item.name] = values[0] if len(values) == 1 else values
+    return WorkspaceResult(
+        head=head_data(case),
+        parameters=parameters,
+        proved=judged.is_proved,
+        regular=None if judged.regularity is None else _regular_data(judged.regularity, case.units),
+        extremes=tuple(_extreme_data(each, case.units) for each in judged.extremes),
+        scale=scale,
+        versions=versions(),
+    )
+
+
+def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
+    """Return a pose in a case's units."""
+    return WorkspacePose(
+        position=vector(pose.position), axis=vector(pose.axis), angle=units.shown(pose.angle, Dimension.ANGLE)
+    )
+
+
+def _fixed(value: object) -> float:
+    """Return a fixed number."""
+    if not isinstance(value, float):
+        raise TypeError("a judged machine has fixed dimensions")
+    return value
+
+
+def _regular_data(found: "Regularity", units: Units) -> RegularData:
+    """Return the verdict on regularity."""
+    sides = None
+    if found.sides is not None:
+        sides = tuple(pose_data(found.box.pose(y), units) for y in found.sides)
+    return RegularData(
+        outcome=found.outcome,
+        pose=None if found.y is None else pose_data(found.box.pose(found.y), units),
+        between=sides,
+        boxes=found.boxes,
+        open=found.open,
+        share=found.share,
+        seconds=found.seconds,
+        engine=found.engine,
+        reason=found.reason or None,
+    )
+
+
+def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
+    """Return an extreme in a case's units."""
+
+    def shown(value: float) -> float | None:
+        return units.shown(value, each.dimension) if math.isfinite(value) else finite_or_none(value)
+
+    return ExtremeData(
+        name=each.name,
+        unit=units.label(each.dimension),
+        sense=each.sense,
+        bound=shown(each.bound),
+        reached=shown(each.reached),
+        key=each.key or None,
+        limit=None if each.limit is None else units.shown(each.limit, each.dimension),
+        outcome=each.outcome,
+        pose=None if each.pose is None else pose_data(each.pose, units),
+        boxes=each.boxes,
+        seconds=each.seconds,
+        reason=each.reason or None,
+    )

@@ -1,0 +1,21 @@
+"""The largest proven workspace as a result."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .workspace import ScaleData, pose_data
+
+if TYPE_CHECKING:
+    from ..units import Units
+    from ..workspace.scale import Scale
+
+
+def scale_data(found: Scale, units: Units) -> ScaleData:
+    """Return the largest proven workspace in a case's units."""
+    return ScaleData(
+        factor=found.factor,
+        refuted=found.failed if found.refuted else None,
+        claim=found.claim,
+        pose=None if found.pose is None else pose_data(found.pose, units),
+    )

@@ -1,0 +1,149 @@
+"""Verdicts on a workspace in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from ..case.case import Case
+from ..case.task import Sense
+from ..workspace.verdict import Outcome
+from .rounding import number
+from .text import Line, TextTable, Tone
+from .wording import title_line
+
+if TYPE_CHECKING:
+    from .workspace import (
+        ExtremeData,
+        RegularData,
+        ScaleData,
+        WorkspacePose,
+        WorkspaceProofData,
+        WorkspaceResult,
+    )
+
+_TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
+
+
+def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
+    """Yield the lengths that the actuators of straight legs need."""
+    legs = [each for each in result.extremes if each.name.startswith("leg_length limb ") and each.bound is not None]
+    short = [each.bound for each in legs if each.sense is Sense.MIN and each.bound is not None]
+    long = [each.bound for each in legs if each.sense is Sense.MAX and each.bound is not None]
+    if short and long:
+        words = f"{number(min(short))} to {number(max(long))} {case.units.length}"
+        yield Line(words, label="lengths of legs", after=", at no pose shorter or longer")
+
+
+def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
+    """Yield the verdicts on a machine over its workspace."""
+    yield title_line(case)
+    if result.regular is None:
+        yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
+    else:
+        yield from _regular_lines(case, result.regular)
+    yield from _tables(case, result.extremes)
+    yield from _needs_line(case, result)
+    if result.scale is not None:
+        yield from _scale_lines(case, result.scale)
+    words = "everything is proved for every pose" if result.proved else "not everything is proved"
+    yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+
+
+def setting_words(pose: WorkspacePose) -> str:
+    """Return the options of ``evaluate`` that show a pose."""
+    values = zip(("p_x", "p_y", "p_z"), pose.position, strict=True)
+    words = [f"--set {name}={value:.10g}" for name, value in values]
+    return " ".join(
+        [*words, f"--set axis={','.join(f'{part:.10g}' for part in pose.axis)}", f"--set angle={pose.angle:.10g}"]
+    )
+
+
+def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
+    """Yield the proof of a solved design over its workspace."""
+    if proof is None:
+        return
+    if proof.proved:
+        yield Line("proved: regular and within the limits at every pose", label="workspace", tone=Tone.ANSWER)
+    else:
+        count = proof.designs[-1].unproved
+        words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
+        yield Line(words, label="workspace", tone=Tone.NO_ANSWER)
+    steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
+    yield Line(f"F = {steps}", label="designs")
+    count = len(proof.poses)
+    yield Line(f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints", label="exchange")
+
+
+def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
+    """Yield the limits and numbers of a solved design over its workspace."""
+    yield from _tables(case, proof.extremes)
+
+
+def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+    """Yield the numbers with a limit, and those without."""
+    limited = [each for each in extremes if each.limit is not None]
+    others = [each for each in extremes if each.limit is None]
+    titles = (("limits", "limits over every pose", limited), ("ranges", "numbers over every pose", others))
+    for name, title, rows in titles:
+        if rows:
+            yield _table(case, name, title, rows)
+
+
+def _pose_words(case: Case, pose: WorkspacePose) -> str:
+    """Return a pose in a few words."""
+    position = ", ".join(f"{value:.5g}" for value in pose.position)
+    if abs(pose.angle) <= 1e-9:  # rounding of a rotation that is none
+        return f"({position})"
+    axis = ", ".join(f"{part:.4g}" for part in pose.axis)
+    return f"({position}), {pose.angle:.5g} {case.units.angle} about ({axis})"
+
+
+def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line]:
+    """Yield the verdict on regularity."""
+    share = f"{100 * regular.share:.3g} % of the box"
+    words = {
+        Outcome.PROVED: ": J has full rank at every pose",
+        Outcome.REFUTED: ": J is singular at a pose",
+        Outcome.OPEN: f": {regular.open:,} boxes are left, {share} ({regular.reason or ''})",
+    }
+    yield Line(regular.outcome.value, label="regular", tone=_TONES[regular.outcome], after=words[regular.outcome])
+    if regular.pose is not None:
+        yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
+    if regular.outcome is Outcome.REFUTED and regular.pose is not None:
+        yield Line(f"evaluate {case.name} {setting_words(regular.pose)}", label="see it with")
+    word = "box" if regular.boxes == 1 else "boxes"
+    yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label="search")
+
+
+def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTable:
+    """Return a table of extremes."""
+    cells = []
+    for each in rows:
+        worst = "smallest" if each.sense is Sense.MIN else "largest"
+        known = [Line(each.outcome.value, tone=_TONES[each.outcome], after=f": {each.reason}" if each.reason else "")]
+        limit = [] if name == "ranges" else ["" if each.limit is None else number(each.limit)]
+        cells.append(
+            (
+                each.name,
+                each.unit,
+                worst,
+                *limit,
+                "" if each.bound is None else number(each.bound),
+                "" if each.reached is None else number(each.reached),
+                *known,
+                "" if each.pose is None else _pose_words(case, each.pose),
+            )
+        )
+    limits = () if name == "ranges" else ("limit",)
+    headers = ("number", "unit", "value", *limits, "proven bound", "reached", "outcome", "at")
+    return TextTable(headers, tuple(cells), name=name, title=title)
+
+
+def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
+    """Yield the largest box."""
+    yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=" times the box is proved")
+    if scale.claim:
+        beyond = "" if scale.refuted is None else f"at {scale.refuted:.4g} times: "
+        at = "" if scale.pose is None else f", at {_pose_words(case, scale.pose)}"
+        yield Line(f"{beyond}{scale.claim}{at}", label="beyond")

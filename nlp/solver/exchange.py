@@ -1,0 +1,286 @@
+"""A design that is regular and keeps its limits over a continuous workspace, by exchange of poses.
+
+A limit over a workspace is one constraint for each of its poses. A program with a few of them is solved, its design is
+judged over the whole workspace (:mod:`screwsynth.nlp.workspace`), and the poses that refute a claim become
+constraints, each of the one claim that it refutes, until the proof holds.
+
+In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
+worst of the poses known is beyond it at some pose nearby, and only poses without end would end the exchange.
+
+Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization problems*, J. Optim. Theory Appl. 19 (1976).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray, RobotInstance, Substitution, frozen_vector, instantiate
+from ..case.case import Case
+from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from ..case.limits.limit import Design, PosedRobot
+from ..case.task import Sense
+from ..errors import CaseError
+from ..interruption import is_requested
+from ..program.formulation import formulate
+from ..program.nlp import Nlp
+from ..workspace.judge import Judgement, judge_workspace
+from ..workspace.machine import LEGS
+from ..workspace.posebox import PoseNumbers, pose_box
+from ..workspace.verdict import Outcome
+from .multistart import ProgramSolution
+
+#: Part of a limit by which it is tighter in the constraints, and gap of the proofs: several of them fit between.
+TIGHTER = 1e-3
+_GAP = 2e-4
+#: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
+#: ranges, at which they are compared.
+_ALIKE, _NEARBY = 3e-4, 0.05
+_SEED = 0
+#: Part of the determinant of the rows at the middle of the workspace that is demanded at a singular pose.
+_DETERMINANT = 1e-2
+#: Largest number of exchanges.
+MOST_EXCHANGES = 40
+
+#: Solves a program, from points that come before those that the search samples.
+SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
+#: Called after each exchange with the number of exchanges, F, and the number of claims that are not proved.
+ExchangeProgress = Callable[[int, float, int], None]
+
+
+class BindingPose(NamedTuple):
+    """A pose at which a claim, by its name, is a constraint; a stroke has the pose of the longest length too."""
+
+    name: str
+    pose: PoseNumbers
+    longest: PoseNumbers | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceProof:
+    """The proof of a design over its workspace.
+
+    Attributes:
+        judgement: of the design.
+        poses: poses of the constraints, in the order in which they were found.
+        history: F, and the number of claims that were not proved, of each design in turn.
+        first: the design that keeps the limits at the stated pose alone: its judgement.
+    """
+
+    judgement: Judgement
+    poses: tuple[BindingPose, ...]
+    history: tuple[tuple[float, int], ...]
+    first: Judgement
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether the design is regular and keeps its limits at every pose."""
+        return not _faults(self.judgement)
+
+
+class Exchanged(NamedTuple):
+    """The last program's solution, and the judgement of its design; None where the program has no answer."""
+
+    own: ProgramSolution
+    proof: WorkspaceProof | None
+
+
+def solve_over_workspace(
+    case: Case, solve_one: SolveOne, *, time_limit: float | None = 60.0, progress: ExchangeProgress | None = None
+) -> Exchanged:
+    """Return the solution of a case whose limits hold over its workspace, and the proof.
+
+    Args:
+        case: a case with one task and one stated pose.
+        solve_one: solves a program.
+        time_limit: seconds for each search of a proof.
+        progress: called after each exchange.
+
+    Raises:
+        CaseError: the case has several tasks or poses, or a robot that is not six straight legs.
+    """
+    _check(case)
+    bare = formulate(case)
+    nlp, binding, history = bare, list[BindingPose](), list[tuple[float, int]]()
+    first: Judgement | None = None
+    found = solve_one(nlp, ())
+    while found.status.is_answer:
+        design = design_of(case, nlp, found.x)
+        judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, jobs=1, with_objective=False)
+        first = judged if first is None else first
+        faults = _faults(judged)
+        history.append((found.F, len(faults)))
+        if progress is not None:
+            progress(len(history), found.F, len(faults))
+        fresh = [each for each in faults if each is not None and not _is_known(each, binding)]
+        if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
+            return Exchanged(found, WorkspaceProof(judged, tuple(binding), tuple(history), first))
+        binding += _without_images(bare, case, fresh, found.x)
+        nlp = with_binding_poses(bare, case, binding)
+        found = solve_one(nlp, [found.x])
+    return Exchanged(found, None)
+
+
+def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
+    """Return a case with the dimensions of a point (n,) of its program, all fixed."""
+    values = nlp.program.kernels.robot_state(x, nlp.arguments).parameters.ravel().tolist()
+    parameters, begin = {}, 0
+    for item in case.model.parameters:
+        count = len(item.components)
+        parts = values[begin : begin + count]
+        parameters[item.name] = parts[0] if count == 1 else parts
+        begin += count
+    return replace(case, parameters=parameters)
+
+
+def with_binding_poses(nlp: Nlp, case: Case, binding: Sequence[BindingPose]) -> Nlp:
+    """Return a program with further constraints: claims at poses of the workspace.
+
+    Args:
+        nlp: the program without them.
+        case: the case.
+        binding: the poses.
+    """
+    added = [item for k, each in enumerate(binding) for item in _constraints(nlp, case, each, k)]
+    program = replace(nlp.program, constraints=(*nlp.program.constraints, *(item.constraint for item in added)))
+    return replace(
+        nlp,
+        program=program,
+        g_lower=frozen_vector([*nlp.g_lower, *(item.lower for item in added)]),
+        g_upper=frozen_vector([*nlp.g_upper, *(item.upper for item in added)]),
+    )
+
+
+def _check(case: Case) -> None:
+    """Refuse a case whose limits cannot hold over a workspace.
+
+    Raises:
+        CaseError: it is refused.
+    """
+    if len(case.tasks) > 1 or case.pose_count > 1:
+        raise CaseError("limits.over", "needs a case with one task and one stated pose", "workspace", case.source)
+    model = case.model
+    if len(model.legs) != LEGS or len(model.wrenches) != LEGS or model.unknowns:
+        raise CaseError("limits.over", "needs a robot with six straight legs", "workspace", case.source)
+
+
+def _faults(judged: Judgement) -> list[BindingPose | None]:
+    """Return a pose for each claim that is not proved; None for one that is open without a pose."""
+    faults: list[BindingPose | None] = []
+    regular = judged.regularity
+    if regular is not None and regular.outcome is not Outcome.PROVED:
+        faults.append(None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y)))
+    by_name = {(each.name, each.sense): each for each in judged.extremes}
+    for each in judged.extremes:
+        if each.limit is None or each.outcome is Outcome.PROVED:
+            continue
+        if each.pose is None:
+            faults.append(None)
+        elif each.key.startswith("actuator."):
+            limb = each.name.partition(" limb ")[2]
+            short, long = (by_name[f"leg_length limb {limb}", sense].pose for sense in (Sense.MIN, Sense.MAX))
+            faults.append(None if short is None else BindingPose(each.name, short, long))
+        else:
+            faults.append(BindingPose(each.name, each.pose))
+    return faults
+
+
+def _is_known(one: BindingPose, others: Sequence[BindingPose]) -> bool:
+    """Return whether a pose is a constraint of the same claim already."""
+    return any(
+        one.name == other.name and _are_same(one.pose, other.pose) and _are_same(one.longest, other.longest)
+        for other in others
+    )
+
+
+def _are_same(one: PoseNumbers | None, other: PoseNumbers | None) -> bool:
+    """Return whether two poses are the same, to the last bit."""
+    if one is None or other is None:
+        return one is other
+    return bool(np.array_equal(one.position, other.position) and np.array_equal(one.rotation, other.rotation))
+
+
+def _without_images(nlp: Nlp, case: Case, fresh: Sequence[BindingPose], x: FloatArray) -> list[BindingPose]:
+    """Return poses without those whose constraints only repeat another: the images of a pose in a symmetric robot.
+
+    Two constraints of one kind are the same where they differ by less than they are tighter than their limits, at a
+    design (n,) and at designs around it. With both a program would have no unique multipliers.
+    """
+    rng = np.random.default_rng(_SEED)
+    points = [x, *(np.clip(x + _NEARBY * nlp.scale * rng.normal(size=nlp.n), nlp.lower, nlp.upper) for _ in range(3))]
+    kept: list[BindingPose] = []
+    known: list[tuple[str, FloatArray, float]] = []
+    for each in fresh:
+        items = list(_constraints(nlp, case, each, 0))
+        expressions = ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
+        function = ca.Function("constraints", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
+        values = np.array([function(point, nlp.arguments).full().ravel() for point in points])
+        key, size = each.name.partition(" ")[0], float(np.abs(values).max(initial=0.0))
+        alike = (k == key and v.shape == values.shape and np.abs(v - values).max() <= _ALIKE * s for k, v, s in known)
+        if not any(alike):
+            kept.append(each)
+            known.append((key, values, size))
+    return kept
+
+
+def _constraints(nlp: Nlp, case: Case, binding: BindingPose, k: int) -> Iterator[BoundedConstraint]:
+    """Yield the constraints of a claim at its pose, with limits that are a little tighter."""
+    where = f" workspace pose {k + 1}"
+    robot = _robot_at(nlp, case, binding.pose)
+    if binding.name == "regular":
+        yield _regular(nlp, case, robot, where)
+        return
+    names = tuple(task.name for task in case.tasks)
+    for limit in case.limits:
+        if binding.longest is not None:
+            both = Design(case.as_limited, (robot, _robot_at(nlp, case, binding.longest)), {})
+            for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
+                for item in family.pair(0, 1):
+                    if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
+                        yield _tightened(item, f"{binding.name}{where}")
+            continue
+        for item in limit.at_pose(PosedRobot(case.model, robot, names, where)):
+            if item.constraint.name == f"{binding.name}{where}":
+                yield _tightened(item, item.constraint.name)
+
+
+def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
+    """Return a constraint with tighter bounds and a name; its number is that of its expression."""
+    lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
+    upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
+    # A measure is evaluated at the stated pose, and this is another.
+    return BoundedConstraint(replace(item.constraint, name=name, measure=None), lower, upper)
+
+
+def _robot_at(nlp: Nlp, case: Case, pose: PoseNumbers) -> RobotInstance:
+    """Return the robot with the program's dimensions at a pose of numbers."""
+    substitution = Substitution(
+        nlp.program.robot.parameters, SX(0, 1), SX(pose.rotation.tolist()), SX(pose.position.tolist())
+    )
+    twists = [SX(np.asarray(task.twist, dtype=np.float64).tolist()) for task in case.tasks]
+    return instantiate(case.model, substitution, SX(case.characteristic_length), twists)
+
+
+def _regular(nlp: Nlp, case: Case, robot: RobotInstance, where: str) -> BoundedConstraint:
+    """Return the constraint that the determinant of J keeps the sign that it has at the middle of the workspace."""
+    if case.workspace is None:
+        raise TypeError("a workspace is judged before its poses are constraints")
+    box = pose_box(case.workspace)
+    middle = _robot_at(nlp, case, box.pose(0.5 * (box.lower + box.upper)))
+    ratio = _determinant(robot) / _determinant(middle)
+    return BoundedConstraint(Constraint(f"regular{where}", ratio, NUMBER), _DETERMINANT, math.inf)
+
+
+def _determinant(robot: RobotInstance) -> SX:
+    """Return the determinant of J with moments about the platform's origin, (1, 1)."""
+    moments = [row.moment - ca.cross(robot.position, row.force) for row in robot.rows]
+    rows = [
+        ca.vertcat(row.force, moment).T / ca.sqrt(row.square) for row, moment in zip(robot.rows, moments, strict=True)
+    ]
+    return ca.det(ca.vertcat(*rows))

@@ -1,0 +1,108 @@
+"""Claims about numbers over a workspace: limits of a case, lengths of legs, F of each task, measures of the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import SX
+
+from ...models import Dimension
+from ..case.limits.constraint import SQUARED_LENGTH, Reading
+from ..case.limits.legs import LegLength
+from ..case.task import Sense
+from ..errors import InputError, nearest
+from ..program.layout import Layout
+
+#: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
+OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
+
+
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """A number whose smallest or largest value over the workspace is to be proved.
+
+    Attributes:
+        name: in the words of a case.
+        sense: whether the smallest or the largest value is meant.
+        expression: (1, 1) in the symbols of the layout; it grows with the number.
+        reading: how the expression reads as the number.
+        key: dotted key, below ``limits``, of the number in the case; empty where the number has no limit.
+        limit: largest or smallest value allowed of the expression; None where the number has no limit.
+    """
+
+    name: str
+    sense: Sense
+    expression: SX
+    reading: Reading
+    key: str = ""
+    limit: float | None = None
+
+
+def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective: bool = True) -> list[Claim]:
+    """Return the claims about a case over its workspace.
+
+    Args:
+        layout: the case as symbols of the pose.
+        quantities: names of measures of the robot that are asked for beside the case's limits.
+        with_objective: whether F of each task is one of the numbers.
+
+    Raises:
+        InputError: the robot has no measure of a name.
+    """
+    found = [*_of_limits(layout), *_of_legs(layout), *_of_quantities(layout, quantities)]
+    if with_objective:
+        found += _of_tasks(layout)
+    return found
+
+
+def _of_limits(layout: Layout) -> Iterator[Claim]:
+    """Yield a claim for each side of each limit at a pose."""
+    for item in (*layout.constraints, *layout.constant_limits):
+        constraint = item.constraint
+        low, high = constraint.keys
+        own = (*OWN_SEARCHES, "leg_length") if layout.robots[0].legs else OWN_SEARCHES
+        if not (low or high) or any(key.startswith(own) for key in constraint.keys):
+            continue
+        for key, sense, limit in ((low, Sense.MIN, item.lower), (high, Sense.MAX, item.upper)):
+            if key and math.isfinite(limit):
+                yield Claim(constraint.name, sense, constraint.expression, constraint.reading, key, limit)
+
+
+def _of_legs(layout: Layout) -> Iterator[Claim]:
+    """Yield the smallest and the largest length of each leg, with their limits: the lengths that its actuator needs."""
+    limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
+    ends = ((Sense.MIN, "min"), (Sense.MAX, "max"))
+    for leg in layout.robots[0].legs:
+        for sense, end in ends:
+            allowed = None if limit is None else getattr(limit, end)
+            yield Claim(
+                f"leg_length limb {leg.name}",
+                sense,
+                ca.sumsqr(leg.span),
+                SQUARED_LENGTH,
+                "" if allowed is None else f"leg_length.{end}",
+                None if allowed is None else allowed**2,
+            )
+
+
+def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
+    """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
+    known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
+    for name in names:
+        if name not in known:
+            raise InputError(f"--of-quantity {name}: no measure of this robot; {nearest(name, known)}")
+        quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
+        for i, owner in enumerate(quantity.owners):
+            for sense in (Sense.MIN, Sense.MAX):
+                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension))
+
+
+def _of_tasks(layout: Layout) -> Iterator[Claim]:
+    """Yield the smallest and the largest F of each task."""
+    for j, task in enumerate(layout.case.tasks):
+        name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
+        for sense in (Sense.MIN, Sense.MAX):
+            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER))

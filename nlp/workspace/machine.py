@@ -1,0 +1,54 @@
+"""A robot with its dimensions: a case all of whose parameters are fixed, and its legs as numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...models import FloatArray, frozen_array
+from ..case.case import Case
+from ..case.pose import Free
+from ..case.workspace import Workspace
+from ..errors import CaseError
+
+#: Number of legs, as many as the platform has freedoms.
+LEGS = 6
+
+
+class Legs(NamedTuple):
+    """Joint centres of a robot's six legs, (6, 3) each: in the base, and in the platform frame, length."""
+
+    base: FloatArray
+    platform: FloatArray
+
+
+def workspace_of_case(case: Case) -> Workspace:
+    """Return a case's workspace.
+
+    Raises:
+        CaseError: the case has none, or a dimension of its robot is free.
+    """
+    if case.workspace is None:
+        raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
+    for name in case.parameters:
+        if any(isinstance(value, Free) for value in case.components(name)):
+            fault = (
+                "is free, and a workspace is judged with fixed dimensions: give it with --set, or a result with --of"
+            )
+            raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
+    return case.workspace
+
+
+def legs_of(case: Case) -> Legs | None:
+    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs."""
+    model = case.model
+    if len(model.legs) != LEGS or len(model.wrenches) != LEGS or model.members or model.unknowns:
+        return None
+    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+    parts = [value for name in case.parameters for value in case.components(name)]
+    values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
+    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
+    base, platform = ca.Function("legs", [symbols], outputs).call([values])
+    return Legs(frozen_array(np.array(base).T, (LEGS, 3)), frozen_array(np.array(platform).T, (LEGS, 3)))

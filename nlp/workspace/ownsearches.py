@@ -1,0 +1,216 @@
+"""Claims that have searches of their own: singular values, distances between legs, strokes, errors of the pose."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from ...models import Dimension
+from ..case.case import Case
+from ..case.limits.clearance import LegClearance
+from ..case.limits.legs import Actuator
+from ..case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ..case.task import Sense
+from .boundsearch import Minimum, Oracle, prove_minimum
+from .clearance import Clearance
+from .extremes import Extreme
+from .machine import Legs
+from .posebox import PoseBox
+from .poseerror import PoseErrors, WorstError, displaced, with_rest
+from .singular import SingularValues
+from .verdict import Outcome
+
+#: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in extremes.
+_ON_LIMIT = 1e-9
+#: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
+_NEAR_ZERO = 0.1
+#: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
+_ERROR_GAP = 0.1
+
+
+def own_searches(
+    case: Case,
+    legs: Legs,
+    box: PoseBox,
+    *,
+    gap: float,
+    time_limit: float | None,
+    interrupted: Callable[[], bool],
+) -> Iterator[Extreme]:
+    """Yield the extremes of the case's limits that have searches of their own.
+
+    Args:
+        case: the case.
+        legs: its joint centres.
+        box: the poses.
+        gap: allowed distance of a bound from the best value known, as a part of it.
+        time_limit: seconds for each search.
+        interrupted: whether the work is requested to stop.
+    """
+    for limit in case.limits:
+        if isinstance(limit, SmallestSingularValue):
+            oracle = SingularValues(legs, box, limit.length, is_condition=False)
+            found = _minimum(oracle, box, limit.min, gap, time_limit, interrupted)
+            yield _from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
+        elif isinstance(limit, ConditionNumber):
+            oracle = SingularValues(legs, box, limit.length, is_condition=True)
+            found = _minimum(oracle, box, -limit.max, gap, time_limit, interrupted)
+            yield _from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
+        elif isinstance(limit, LegClearance):
+            names = [leg.name for leg in case.model.legs]
+            for one, other in itertools.combinations(range(len(names)), 2):
+                found = _minimum(Clearance(legs, box, one, other), box, limit.min, gap, time_limit, interrupted)
+                name = f"leg_clearance limbs {names[one]} and {names[other]}"
+                yield _from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
+
+
+def _minimum(
+    oracle: Oracle,
+    box: PoseBox,
+    limit: float,
+    gap: float,
+    time_limit: float | None,
+    interrupted: Callable[[], bool],
+) -> Minimum:
+    """Return the smallest value of a function, only as accurately as its limit needs."""
+    allowed = gap * max(abs(limit), _NEAR_ZERO)
+    return prove_minimum(oracle, box, gap=allowed, limit=limit, time_limit=time_limit, interrupted=interrupted)
+
+
+def _from_minimum(
+    name: str,
+    key: str,
+    limit: float,
+    box: PoseBox,
+    found: Minimum,
+    dimension: Dimension = Dimension.NUMBER,
+    sign: float = 1.0,
+) -> Extreme:
+    """Return the extreme of a number that is a search's value times a sign."""
+    slack = _ON_LIMIT * abs(limit)
+    outcome = Outcome.OPEN
+    if found.value < limit - slack:
+        outcome = Outcome.REFUTED
+    elif found.bound >= limit - slack:
+        outcome = Outcome.PROVED
+    reason = found.reason or "the limit is closer than the gap"
+    return Extreme(
+        name=name,
+        sense=Sense.MIN if sign > 0 else Sense.MAX,
+        dimension=dimension,
+        key=key,
+        limit=sign * limit,
+        bound=sign * found.bound,
+        reached=sign * found.value,
+        pose=box.pose(found.y),
+        outcome=outcome,
+        boxes=found.boxes,
+        seconds=found.seconds,
+        reason=reason if outcome is Outcome.OPEN else "",
+    )
+
+
+def strokes(case: Case, extremes: Sequence[Extreme]) -> Iterator[Extreme]:
+    """Yield the limits of the case on telescoping legs, from the proven lengths of each leg.
+
+    A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace.
+
+    Args:
+        case: the case.
+        extremes: among them the smallest and the largest length of each leg.
+    """
+    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
+    if limit is None:
+        return
+    by_name = {(each.name, each.sense): each for each in extremes}
+    for leg in case.model.legs:
+        short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in (Sense.MIN, Sense.MAX))
+        if limit.stroke_max is not None:
+            bound, reached = long.bound - short.bound, long.reached - short.reached
+            yield _of_stroke(f"actuator.stroke_max limb {leg.name}", Sense.MAX, limit.stroke_max, bound, reached, long)
+        if limit.dead_length is not None:
+            bound, reached = 2 * short.bound - long.bound, 2 * short.reached - long.reached
+            yield _of_stroke(
+                f"actuator.dead_length limb {leg.name}", Sense.MIN, limit.dead_length, bound, reached, short
+            )
+
+
+def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: float, at: Extreme) -> Extreme:
+    """Return the extreme of a number made from two lengths, with the pose of one of them."""
+    sign = 1.0 if sense is Sense.MAX else -1.0
+    slack = _ON_LIMIT * limit
+    outcome = Outcome.OPEN
+    if sign * (reached - limit) > slack:
+        outcome = Outcome.REFUTED
+    elif math.isfinite(bound) and sign * (bound - limit) <= slack:
+        outcome = Outcome.PROVED
+    reason = "the limit is closer than the gap of the lengths"
+    if not math.isfinite(bound):
+        reason = "the leg's lengths are not bounded"
+    return Extreme(
+        name=name,
+        sense=sense,
+        dimension=Dimension.LENGTH,
+        key=name.partition(" ")[0],
+        limit=limit,
+        bound=bound,
+        reached=reached,
+        pose=at.pose,
+        outcome=outcome,
+        boxes=0,
+        seconds=0.0,
+        reason=reason if outcome is Outcome.OPEN else "",
+    )
+
+
+def pose_errors(
+    legs: Legs,
+    box: PoseBox,
+    eps: float,
+    shortest: float,
+    *,
+    time_limit: float | None,
+    interrupted: Callable[[], bool],
+) -> Iterator[Extreme]:
+    """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
+
+    Args:
+        legs: joint centres.
+        box: the poses.
+        eps: largest error of a leg's length, those of its joint centres included, length.
+        shortest: proven shortest length of a leg over the poses.
+        time_limit: seconds for each search.
+        interrupted: whether the work is requested to stop.
+    """
+    searches = [WorstError(legs, box, is_rotation=is_rotation) for is_rotation in (False, True)]
+    found = []
+    for each in searches:
+        size = abs(float(each.values(0.5 * (box.lower + box.upper)[None])[0]))
+        found.append(prove_minimum(each, box, gap=_ERROR_GAP * size, time_limit=time_limit, interrupted=interrupted))
+    first = PoseErrors(*(-eps * each.bound for each in found))
+    reach = float(np.linalg.norm(legs.platform, axis=1).max())
+    whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
+    names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
+    for k, (name, dimension) in enumerate(names):
+        y, bound = found[k].y, whole[k]
+        # To first order both signs give the same error.
+        reached = max(displaced(legs, box, y, sign * eps * searches[k].worst(y))[k] for sign in (-1.0, 1.0))
+        is_proved = math.isfinite(bound) and not found[k].reason
+        reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
+        yield Extreme(
+            name=name,
+            sense=Sense.MAX,
+            dimension=dimension,
+            key="",
+            limit=None,
+            bound=bound,
+            reached=reached,
+            pose=box.pose(y),
+            outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
+            boxes=found[k].boxes,
+            seconds=found[k].seconds,
+            reason="" if is_proved else reason,
+        )

@@ -1,0 +1,643 @@
+"""Workspaces: a robot judged over a whole box of poses."""
+
+import json
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, CaseError, Free, InputError, json_data, load_result, solve
+from screwsynth.nlp.case.reader import case_from_tables, load_case
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.results.result import result_of
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.workspace import WorkspaceResult
+from screwsynth.nlp.workspace import rows
+from screwsynth.nlp.workspace.boundsearch import Oracle, prove_minimum
+from screwsynth.nlp.workspace.clearance import Clearance
+from screwsynth.nlp.workspace.engines import kernel, rank_engine
+from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.posebox import PoseBox, pose_box, scaled
+from screwsynth.nlp.workspace.poseerror import WorstError
+from screwsynth.nlp.workspace.regularity import Rank
+from screwsynth.nlp.workspace.scale import largest_scale
+from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.slices import Region, slices_of
+from screwsynth.nlp.workspace.verdict import Outcome
+
+needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
+
+#: The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
+TEXT = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 0, x4 = 5 }
+[pose]
+position = [0, 0, 20]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+leg_length = { min = 17, max = 44 }
+actuator = { stroke_max = 30 }
+platform_joint_angle = { max = 60, about = "home" }
+home = { position = [0, 0, 20] }
+[workspace]
+position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }]
+rotation = { angle = { min = -20, max = 20 } }
+"""
+POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("workspace") / "machine.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def case(machine: Path) -> Case:
+    return load_case(str(machine))
+
+
+def turned(kind: TurnKind, degrees: float) -> Workspace:
+    """The machine's positions with rotations up to an angle: about any axis, about one, or by roll, pitch and yaw."""
+    angle = Free(-math.radians(degrees), math.radians(degrees))
+    return Workspace(POSITION, Turns(kind, (angle,) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1), (0.6, 0.0, 0.8)))
+
+
+def legs(case: Case) -> Legs:
+    found = legs_of(case)
+    assert found is not None
+    return found
+
+
+def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
+    """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
+    w, x, y, z = (quaternions := np.array([box.quaternion(each) for each in points])).T / np.linalg.norm(
+        quaternions, axis=1
+    )
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)
+    arm = np.einsum("kij,lj->kli", turn, robot.platform)
+    span = points[:, None, :3] + arm - robot.base
+    return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))
+
+
+@pytest.mark.parametrize("engine", [pytest.param("c", marks=needs_kernel), "numpy"])
+@pytest.mark.parametrize(
+    ("kind", "degrees", "outcome", "most"),
+    [
+        (TurnKind.ANY_AXIS, 20, Outcome.PROVED, 3919),
+        (TurnKind.ANY_AXIS, 25, Outcome.PROVED, 10071),
+        (TurnKind.ANY_AXIS, 30, Outcome.PROVED, 10071),
+        (TurnKind.ANY_AXIS, 40, Outcome.REFUTED, 20000),
+        (TurnKind.ROLL_PITCH_YAW, 30, Outcome.REFUTED, 20000),
+    ],
+)
+def test_the_machine_is_regular_up_to_an_angle(
+    case: Case, kind: TurnKind, degrees: float, outcome: Outcome, most: int, engine: str
+) -> None:
+    box = pose_box(turned(kind, degrees))
+    found = prove_regular(legs(case), box, engine=engine)
+    assert (found.outcome, found.engine) == (outcome, engine)
+    assert found.boxes <= most
+    if outcome is Outcome.REFUTED:
+        assert found.sides is not None
+        assert found.y is not None
+        # Confirmed by rotation matrices and a singular value decomposition, which the search does not use.
+        positive, negative = determinants(legs(case), box, found.sides)
+        assert positive * negative < 0
+        assert all(box.holds(y) for y in found.sides)
+        pose = box.pose(found.y)
+        arm = legs(case).platform @ pose.rotation.T
+        span = pose.position + arm - legs(case).base
+        J = np.hstack([span, np.cross(arm, span)]) / np.linalg.norm(span, axis=1, keepdims=True)
+        values = np.linalg.svd(J, compute_uv=False)
+        assert values[-1] < 1e-10 * values[0]
+
+
+def exact_rows(robot: Legs, box: PoseBox, y: Sequence[Fraction]) -> list[list[Fraction]]:
+    w, i, j, k = exact_quaternion(box, y[3:])
+    scale = w * w + i * i + j * j + k * k
+    turn = (
+        (w * w + i * i - j * j - k * k, 2 * (i * j - w * k), 2 * (i * k + w * j)),
+        (2 * (i * j + w * k), w * w - i * i + j * j - k * k, 2 * (j * k - w * i)),
+        (2 * (i * k - w * j), 2 * (j * k + w * i), w * w - i * i - j * j + k * k),
+    )
+    rows = []
+    for base, platform in zip(robot.base.tolist(), robot.platform.tolist(), strict=True):
+        a = [Fraction(each) for each in platform]
+        d = [each - Fraction(b) for each, b in zip(y[:3], base, strict=True)]
+        u = [sum((each * part for each, part in zip(row, a, strict=True)), Fraction(0)) for row in turn]
+        moment = [u[1] * d[2] - u[2] * d[1], u[2] * d[0] - u[0] * d[2], u[0] * d[1] - u[1] * d[0]]
+        rows.append([*(scale * part + each for part, each in zip(d, u, strict=True)), *moment])
+    return rows
+
+
+def exact_quaternion(box: PoseBox, turn: Sequence[Fraction]) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    a, b, c = turn
+    one = Fraction(1)
+    if box.kind is TurnKind.ANY_AXIS:
+        return one, a, b, c
+    if box.kind is TurnKind.AXIS:
+        x, y, z = (Fraction(each) * a for each in box.axis.tolist())
+        return one, x, y, z
+    # The product of the quaternions of yaw, pitch and roll.
+    return one + a * b * c, a - b * c, b + a * c, c - a * b
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind: TurnKind) -> None:
+    rng = np.random.default_rng(7)
+    box, robot = pose_box(turned(kind, 50)), legs(case)
+    centre = box.random(40, rng)
+    half = (box.upper - box.lower) * rng.uniform(0, 0.2, (40, 1))
+    expansion = rows.expand(robot, box, centre, half)
+    wrong, unrounded = 0, 0
+    for k in range(40):
+        e = np.where(rng.uniform(size=6) < 0.5, np.sign(rng.normal(size=6)), rng.uniform(-1, 1, 6))
+        y = [
+            Fraction(float(c)) + Fraction(float(h)) * Fraction(float(s))
+            for c, h, s in zip(centre[k], half[k], e, strict=True)
+        ]
+        exactly = np.array(exact_rows(robot, box, y), dtype=object)
+        step = [a - Fraction(float(c)) for a, c in zip(y, centre[k], strict=True)]
+        second = [step[3 + i] * step[3 + j] for i, j in zip(rows.FIRST, rows.SECOND, strict=True)]
+        factors = [Fraction(1), *step, *second, *(step[3 + i // 3] * step[i % 3] for i in range(9))]
+        terms = np.vectorize(Fraction)(expansion.terms[k])
+        value = sum(terms[:, t] * factors[t] for t in range(rows.TERMS))
+        off = np.abs(exactly - value).astype(float)
+        assert (off <= expansion.rest[k]).all()
+        wrong += (off > 0.5 * (expansion.rest[k] - _rounding(expansion.rest[k]))).any()
+        unrounded += (off > 0).any()
+    # Without the bound of the other terms, or without rounding, the enclosure would not hold: the test can fail.
+    assert wrong or kind is TurnKind.ROLL_PITCH_YAW
+    assert unrounded
+
+
+def _rounding(rest: FloatArray) -> FloatArray:
+    """A little more than the share of rounding in the bounds of further terms."""
+    return np.minimum(rest, 1e-6 * rest.max())
+
+
+@needs_kernel
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_both_engines_agree_box_by_box(case: Case, kind: TurnKind) -> None:
+    rng = np.random.default_rng(1)
+    box = pose_box(turned(kind, 45))
+    lower = box.random(1500, rng)
+    upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.4, (1500, 1))
+    ours, theirs = (rank_engine(legs(case), box, name).examine(lower, upper) for name in ("c", "numpy"))
+    assert (ours.verdict == theirs.verdict).mean() > 0.999
+    assert (ours.sign == theirs.sign).mean() > 0.999
+    assert np.array_equal(ours.lower, theirs.lower)
+    assert {Rank.OPEN, Rank.REGULAR} <= set(ours.verdict.tolist())
+
+
+def test_random_robots_are_never_called_regular_where_the_determinant_changes_its_sign() -> None:
+    """200 robots and boxes, against dense sampling and the determinant along paths between the samples."""
+    rng = np.random.default_rng(3)
+    outcomes = []
+    for _ in range(200):
+        robot = Legs(
+            np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
+            np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
+        )
+        kind = list(TurnKind)[int(rng.integers(3))]
+        size = float(rng.uniform(0.02, 0.5))
+        turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
+        near = rng.uniform((-3, -3, 9), (3, 3, 15))
+        place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
+        box = pose_box(Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8))))
+        found = prove_regular(robot, box, most_boxes=3000)
+        outcomes.append(found.outcome)
+        corners = box.clipped(box.random(30, rng) + rng.choice([-1, 1], (30, 6)) * (box.upper - box.lower))
+        ends = np.concatenate([box.random(30, rng), corners])
+        along = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
+        values = determinants(robot, box, along)
+        if found.outcome is Outcome.PROVED:
+            assert (values > 0).all() or (values < 0).all()
+        if found.outcome is Outcome.REFUTED:
+            assert found.sides is not None
+            positive, negative = determinants(robot, box, found.sides)
+            assert positive > 0 > negative
+    assert outcomes.count(Outcome.PROVED) > 30
+    assert outcomes.count(Outcome.REFUTED) > 30
+
+
+@pytest.mark.parametrize("name", ["smallest singular value", "condition number", "clearance"])
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str) -> None:
+    rng = np.random.default_rng(5)
+    box, robot = pose_box(turned(kind, 25)), legs(case)
+    oracle: Oracle = Clearance(robot, box, 1, 2)
+    if name != "clearance":
+        oracle = SingularValues(robot, box, 11.5, is_condition=name == "condition number")
+    lower = box.random(150, rng)
+    upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (150, 6)), box.upper)
+    bound = oracle.bounds(lower, upper).lower
+    least = np.full(150, np.inf)
+    for _ in range(40):
+        share = rng.uniform(size=(150, 6))
+        share = np.where(rng.uniform(size=share.shape) < 0.4, np.round(share), share)
+        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+    assert (bound <= least + 1e-12).all()
+    # The bounds say something: half of these boxes have one that is less than a fifth off.
+    assert np.median((least - bound) / np.abs(least)) < 0.2
+
+
+def test_the_smallest_clearance_is_met_within_the_gap(case: Case) -> None:
+    box, robot = pose_box(turned(TurnKind.ANY_AXIS, 20)), legs(case)
+    found = prove_minimum(Clearance(robot, box, 1, 2), box, gap=0.05)
+    assert found.value - 0.05 <= found.bound <= found.value
+    samples = Clearance(robot, box, 1, 2).values(box.random(100_000, np.random.default_rng(0)))
+    assert samples.min() >= found.bound
+
+
+def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
+    judged = judge_workspace(case, with_objective=False)
+    assert judged.is_proved
+    points = pose_box(judged.workspace).random(100_000, np.random.default_rng(2))
+    robot, box = legs(case), pose_box(judged.workspace)
+    lengths = np.linalg.norm(spans(robot, box, points), axis=2)
+    by_name = {(each.name, each.sense.value): each for each in judged.extremes}
+    for i, leg in enumerate(case.model.legs):
+        short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in ("min", "max"))
+        assert short.bound <= lengths[:, i].min()
+        assert long.bound >= lengths[:, i].max()
+        assert short.reached - 1e-3 * short.reached <= short.bound <= short.reached
+        assert long.reached <= long.bound <= long.reached + 1e-3 * long.reached
+        stroke = by_name[f"actuator.stroke_max limb {leg.name}", "max"]
+        assert stroke.bound == pytest.approx(long.bound - short.bound)
+
+
+def test_roll_pitch_and_yaw_have_the_same_poses_in_both_searches(case: Case) -> None:
+    angles = (Free(-0.3, 0.1), Free(0.0, 0.25), Free(-0.1, 0.4))
+    workspace = Workspace((0.5, Free(-1.0, 1.0), 20.0), Turns(TurnKind.ROLL_PITCH_YAW, angles))
+    judged = judge_workspace(case, workspace=workspace, with_objective=False)
+    box, robot = pose_box(workspace), legs(case)
+    points = box.random(5000, np.random.default_rng(4))
+    lengths = np.array(
+        [np.linalg.norm(p.position + robot.platform @ p.rotation.T - robot.base, axis=1) for p in map(box.pose, points)]
+    )
+    long = [each for each in judged.extremes if each.key == "leg_length.max"]
+    for each, most in zip(long, lengths.max(axis=0), strict=True):
+        assert most <= each.bound <= 1.02 * most
+
+
+@pytest.mark.slow
+def test_the_largest_box_is_found_to_a_hundredth(case: Case) -> None:
+    found = largest_scale(case, time_limit=20)
+    assert found.refuted
+    assert found.factor < found.failed <= 1.011 * found.factor
+    assert judge_workspace(
+        case, workspace=scaled(turned(TurnKind.ANY_AXIS, 20), found.factor), with_objective=False
+    ).is_proved
+
+
+def test_the_command_proves_and_refutes(machine: Path, tmp_path: Path) -> None:
+    target = tmp_path / "result.json"
+    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--json", str(target)])
+    assert run.exit_code == 0, run.output
+    assert "J has full rank at every pose" in run.output
+    assert "everything is proved" in run.output
+    result = load_result(target)
+    assert isinstance(result, WorkspaceResult)
+    assert result.proved
+    jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
+    shorter = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--set", "limits.leg_length.max=40"])
+    assert shorter.exit_code == 1
+    assert "refuted" in shorter.output
+
+
+def test_dimensions_come_from_a_result(machine: Path, tmp_path: Path) -> None:
+    result = tmp_path / "result.json"
+    free = tmp_path / "free.toml"
+    free.write_text(TEXT.replace("x2 = 11.543", "x2 = { min = 8, max = 15 }"), encoding="utf-8")
+    runner = CliRunner()
+    refused = runner.invoke(app, ["workspace", str(free)])
+    assert "robot.parameters.x2: is free" in str(refused.exception)
+    solved = runner.invoke(app, ["evaluate", str(machine), "--json", str(result)])
+    assert solved.exit_code in (0, 1)
+    run = runner.invoke(app, ["workspace", str(free), "--gap", "0.01", "--of", str(result)])
+    assert run.exit_code == 0, run.output
+
+
+def test_a_refuted_claim_is_seen_with_evaluate(machine: Path) -> None:
+    wide = ["--set", "limits.leg_length.max=40"]
+    run = CliRunner().invoke(app, ["workspace", str(machine), *wide, "--gap", "0.01", "--json", "-"])
+    extremes = json.loads(run.stdout)["extremes"]
+    worst = next(each for each in extremes if each["key"] == "leg_length.max" and each["outcome"] == "refuted")
+    pose = worst["pose"]
+    settings = [f"{name}={value!r}" for name, value in zip(("p_x", "p_y", "p_z"), pose["position"], strict=True)]
+    settings += [f"axis={','.join(map(repr, pose['axis']))}", f"angle={pose['angle']!r}"]
+    shown = CliRunner().invoke(
+        app, ["evaluate", str(machine), *wide, *(part for each in settings for part in ("--set", each)), "--json", "-"]
+    )
+    lengths = json.loads(shown.stdout)["quantities"]["leg_length"]
+    limb = worst["name"].removeprefix("leg_length limb ")
+    assert lengths[limb] == pytest.approx(worst["reached"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"position": [0, 0, 20]}, "workspace: is one pose"),
+        ({"position": [0, 0, {"min": 5, "max": 4}]}, "workspace.position[2].min"),
+        ({"position": [0, 0, 20], "rotation": {"angle": 10}}, "workspace.rotation.angle"),
+        ({"position": [0, 0, 20], "rotation": {"angle": {"min": -5, "max": 9}}}, "workspace.rotation.angle"),
+        ({"position": [0, 0, 20], "rotation": {"roll": 5, "axis": [0, 0, 1]}}, "workspace.rotation.roll"),
+        (
+            {"position": [0, 0, 20], "rotation": {"axis": [0, 0, 0], "angle": {"min": 0, "max": 9}}},
+            "workspace.rotation.axis",
+        ),
+        ({"position": [0, 0, 20], "rotation": {"pitch": {"min": 0, "max": 170}}}, "workspace.rotation.pitch.max"),
+        ({"position": [0, 0, 20], "rotation": {}}, "workspace.rotation.angle: is missing"),
+        ({"position": [0, 0]}, "workspace.position"),
+        ({"place": [0, 0, 0]}, "workspace.place: no such key"),
+    ],
+)
+def test_bad_workspaces_are_refused(table: dict[str, object], message: str) -> None:
+    tables = tomllib.loads(TEXT) | {"workspace": table}
+    with pytest.raises(CaseError) as refused:
+        case_from_tables(tables, name="bad", source="bad.toml")
+    assert message in str(refused.value).replace(" = ", ": ") or message in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_a_workspace_is_written_and_read_again(case: Case, kind: TurnKind) -> None:
+    workspace = turned(kind, 25)
+    written = replace(case, workspace=replace(workspace, turns=replace(workspace.turns, axis=(0.0, 0.0, 1.0))))
+    again = case_from_tables(tomllib.loads(written.to_toml()), name="again", source="")
+    assert again.workspace == written.workspace
+
+
+#: The machine with free dimensions, for the best design that keeps its limits over a smaller workspace.
+FREE = (
+    TEXT.replace("x1 = 26.5, x2 = 11.543", "x1 = { min = 20, max = 32 }, x2 = { min = 8, max = 15 }")
+    .replace("[limits]", '[limits]\nover = "workspace"')
+    .replace("min = 17, max = 44", "min = 20, max = 38")
+    .replace("stroke_max = 30", "stroke_max = 17")
+    .replace('platform_joint_angle = { max = 60, about = "home" }\n', "")
+    .replace("home = { position = [0, 0, 20] }\n", "")
+    .replace("min = -5, max = 5", "min = -4, max = 4")
+    .replace("min = 15, max = 25", "min = 17, max = 23")
+    .replace("min = -20, max = 20", "min = -12, max = 12")
+    .replace("axis = [0, 0, 1]\npitch = inf", "axis = [1, 2, 6]\npoint = [3, 1, 12]\npitch = 0.1")
+)
+
+
+def test_limits_over_a_workspace_end_with_a_proof() -> None:
+    case = case_from_tables(tomllib.loads(FREE), name="free", source="free.toml")
+    solution = solve(case, starts=4, jobs=1)
+    proof = solution.workspace
+    assert proof is not None
+    assert proof.is_proved
+    assert not proof.first.is_proved
+    assert solution.status.is_answer
+    # The constraints of the exchange cost something: the first design, without them, has a larger F.
+    assert proof.history[0][0] > solution.F
+    design = proof.judgement.case
+    robot, box = legs(design), pose_box(proof.judgement.workspace)
+    points = box.random(100_000, np.random.default_rng(9))
+    span = spans(robot, box, points)
+    lengths = np.linalg.norm(span, axis=2)
+    assert lengths.min() >= 20
+    assert lengths.max() <= 38
+    assert np.ptp(lengths, axis=0).max() <= 17
+    # The design was pushed up to its limits: within a hundredth of one of them.
+    assert np.ptp(lengths, axis=0).max() > 0.9 * 17 or lengths.min() < 1.01 * 20
+    result = json_data(result_of(solution))
+    assert result["workspace"]["proved"] is True  # type: ignore[index, call-overload]
+    jsonschema.validate(result, result_schema())
+    assert "[workspace]" in design.to_toml()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[workspace]", "[workspaces]", "workspaces: no such key"),
+        ('over = "workspace"', 'over = "everything"', "limits.over"),
+        (
+            "[pose]\nposition = [0, 0, 20]",
+            "[[pose]]\nposition = [0, 0, 20]\n[[pose]]\nposition = [0, 0, 21]",
+            "limits.over",
+        ),
+    ],
+)
+def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> None:
+    with pytest.raises(CaseError) as refused:
+        solve(case_from_tables(tomllib.loads(FREE.replace(old, new)), name="free", source="free.toml"), starts=1)
+    assert message in str(refused.value)
+    without = FREE[: FREE.index("[workspace]")]
+    with pytest.raises(CaseError, match=r"needs the table \[workspace\]"):
+        case_from_tables(tomllib.loads(without), name="free", source="free.toml")
+
+
+@pytest.mark.slow
+def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
+    proof = solve(load_case("hexapod-workspace")).workspace
+    assert proof is not None
+    assert proof.is_proved
+    robot, box = legs(proof.judgement.case), pose_box(proof.judgement.workspace)
+    rng = np.random.default_rng(10)
+    least, most = np.full(6, np.inf), np.zeros(6)
+    for _ in range(20):
+        points = box.random(50_000, rng)
+        span = spans(robot, box, points)
+        lengths = np.linalg.norm(span, axis=2)
+        least, most = np.minimum(least, lengths.min(axis=0)), np.maximum(most, lengths.max(axis=0))
+        arm = span - points[:, None, :3] + robot.base
+        assert (np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2)) < 0).all()
+        home = np.add(robot.platform, (0, 0, 20)) - robot.base
+        cosine = (span * home).sum(axis=2) / lengths / np.linalg.norm(home, axis=1)
+        assert cosine.min() >= math.cos(math.radians(25))
+        for one, other in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0)):
+            assert Clearance(robot, box, one, other).values(points[:2000]).min() >= 3
+    assert least.min() >= 20
+    assert most.max() <= 38
+    assert (most - least).max() <= 17
+
+
+def spans(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
+    """Vectors (K, 6, 3) of the legs at points (K, 6)."""
+    form = rows.turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
+    rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    return points[:, None, :3] + np.einsum("bij,lj->bli", rotation, robot.platform) - robot.base
+
+
+def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: Path, tmp_path: Path) -> None:
+    wide = replace(case, workspace=turned(TurnKind.ROLL_PITCH_YAW, 30))
+    assert wide.workspace is not None
+    slices = slices_of(wide)
+    assert [each.names for each in slices][-1] == ("pitch", "yaw")
+    tilts = next(each for each in slices if each.names == ("roll", "pitch"))
+    assert set(tilts.regions) == set(Region)
+    middle = 0.5 * (tilts.boxes[:, :2] + tilts.boxes[:, 2:])
+    points = np.column_stack(
+        [np.zeros((len(middle), 2)), np.full(len(middle), 20.0), np.tan(middle / 2), np.zeros(len(middle))]
+    )
+    values = determinants(legs(case), pose_box(wide.workspace), points)
+    for region, sign in ((Region.REGULAR, -1), (Region.BEYOND, 1)):
+        assert (np.sign(values[[each is region for each in tilts.regions]]) == sign).all()
+    # The boxes cover the slice.
+    area = np.prod(np.diff(np.tan(tilts.boxes.reshape(-1, 2, 2) / 2), axis=1), axis=2).sum()
+    assert area == pytest.approx(np.prod(np.diff(np.tan(tilts.whole / 2), axis=0)))
+    picture = tmp_path / "slices.svg"
+    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.05", "--plot", str(picture)])
+    assert run.exit_code == 0, run.output
+    text = picture.read_text(encoding="utf-8")
+    assert 'id="workspace"' in text
+    assert f'id="{Region.REGULAR.value}"' in text
+
+
+def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:
+    """Errors of the pose (count,), in position and rotation, of random machines at random poses, by Newton's method.
+
+    Half of eps is the error of the legs' lengths, and half that of both joint centres.
+    """
+    rng = np.random.default_rng(11)
+    points = box.random(count, rng)
+    if extreme:
+        points = np.where(
+            rng.uniform(size=points.shape) < 0.8,
+            np.where(points > 0.5 * (box.lower + box.upper), box.upper, box.lower),
+            points,
+        )
+        points = box.clipped(points)
+    form = rows.turn_form(box, points[:, 3:], np.zeros((count, 3))).terms[:, 0]
+    start = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    turn, position = start.copy(), points[:, :3].copy()
+    span = position[:, None] + np.einsum("kij,lj->kli", turn, robot.platform) - robot.base
+    lengths = np.linalg.norm(span, axis=2)
+    if extreme:
+        signs = rng.choice([-1.0, 1.0], (count, 6))
+        wanted = lengths + eps / 2 * signs
+        along = np.einsum("kji,klj->kli", turn, span / lengths[:, :, None])
+        base, platform = (
+            robot.base + eps / 4 * signs[:, :, None] * span / lengths[:, :, None],
+            robot.platform - eps / 4 * signs[:, :, None] * along,
+        )
+    else:
+        wanted = lengths + eps / 2 * rng.uniform(-1, 1, (count, 6))
+        directions = rng.normal(size=(2, count, 6, 3))
+        directions *= eps / 4 / np.linalg.norm(directions, axis=3, keepdims=True)
+        base, platform = robot.base + directions[0], robot.platform + directions[1]
+    for _ in range(6):
+        arm = np.einsum("kij,klj->kli", turn, platform)
+        span = position[:, None] + arm - base
+        now = np.linalg.norm(span, axis=2)
+        unit = span / now[:, :, None]
+        step = np.linalg.solve(np.concatenate([unit, np.cross(arm, unit)], axis=2), (wanted - now)[:, :, None])[:, :, 0]
+        position += step[:, :3]
+        half = np.concatenate([np.full((count, 1), 2.0), step[:, 3:]], axis=1)
+        w, x, y, z = half.T / np.linalg.norm(half, axis=1)
+        turn = (
+            np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                ]
+            ).transpose(2, 0, 1)
+            @ turn
+        )
+    change = turn @ start.transpose(0, 2, 1)
+    vector = np.stack(
+        [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0], change[:, 1, 0] - change[:, 0, 1]]
+    )
+    return np.linalg.norm(position - points[:, :3], axis=1), np.arcsin(np.linalg.norm(vector, axis=0) / 2)
+
+
+@pytest.mark.parametrize("joint", [0.0005, pytest.param(0.05, marks=pytest.mark.slow)])
+def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(case: Case, joint: float) -> None:
+    angle = Free(-math.radians(10), math.radians(10))
+    workspace = Workspace((Free(-2.0, 2.0), Free(-2.0, 2.0), Free(18.0, 22.0)), Turns(TurnKind.ANY_AXIS, (angle,)))
+    built = replace(case, joint_centre_tolerance=joint)
+    judged = judge_workspace(built, workspace=workspace, gap=0.05, leg_error=2 * joint)
+    position, rotation = judged.extremes[-2:]
+    assert (position.name, rotation.name) == ("position error", "rotation error")
+    robot, box = legs(case), pose_box(workspace)
+    many = random_errors(robot, box, 4 * joint, 100_000, extreme=False)
+    worst = random_errors(robot, box, 4 * joint, 30_000, extreme=True)
+    for found, sampled, extreme in zip((position, rotation), many, worst, strict=True):
+        assert found.outcome is Outcome.PROVED
+        assert sampled.max() <= extreme.max() <= found.bound <= 1.5 * extreme.max()
+        assert extreme.max() <= 1.02 * found.reached
+        assert found.reached <= found.bound
+
+
+@pytest.mark.parametrize("is_rotation", [False, True])
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, is_rotation: bool) -> None:
+    rng = np.random.default_rng(6)
+    box = pose_box(turned(kind, 25))
+    oracle = WorstError(legs(case), box, is_rotation=is_rotation)
+    lower = box.random(100, rng)
+    upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (100, 6)), box.upper)
+    bound = oracle.bounds(lower, upper).lower
+    least = np.zeros(100)
+    for _ in range(30):
+        share = np.round(rng.uniform(size=(100, 6)), int(rng.integers(2)) * 3)
+        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+    assert (bound <= least).all()
+    assert np.median(bound / least) < 1.1
+
+
+def test_other_robots_are_bounded_and_stay_open(tmp_path: Path) -> None:
+    runner, file = CliRunner(), tmp_path / "robot.toml"
+    text = runner.invoke(app, ["new", "three-upu"]).output
+    place = "position = [{ min = -2, max = 2 }, 0, { min = 45, max = 50 }]"
+    box = f"[workspace]\n{place}\nrotation = {{ roll = {{ min = -5, max = 5 }} }}"
+    file.write_text(f"{text}\n{box}\n", encoding="utf-8")
+    run = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--json", "-"])
+    assert run.exit_code == 1
+    result = json.loads(run.stdout)
+    assert result["regular"] is None
+    assert not result["proved"]
+    # Lengths and F are bounded all the same.
+    assert {each["outcome"] for each in result["extremes"]} == {"proved"}
+    drawn = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--plot", str(tmp_path / "x.png")])
+    assert "six straight legs" in str(drawn.exception)
+    assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize("option", [["--gap", "2"], ["--time", "0"], ["--leg-error", "-1"], ["--of-quantity", "mass"]])
+def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str]) -> None:
+    run = CliRunner().invoke(app, ["workspace", str(machine), *option])
+    assert isinstance(run.exception, InputError)
+    assert str(run.exception).startswith(option[0])
+
+
+def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = iter([False] * 6)
+    monkeypatch.setattr("screwsynth.nlp.workspace.judge.is_requested", lambda: next(calls, True))
+    judged = judge_workspace(case, gap=0.05)
+    assert judged.regularity is not None
+    assert judged.regularity.outcome is Outcome.PROVED
+    assert judged.extremes[0].outcome is Outcome.PROVED
+    assert [each.reason for each in judged.extremes].count("interrupted") > 3
+    assert judged.extremes[-1].outcome is Outcome.OPEN
+    assert not judged.is_proved
