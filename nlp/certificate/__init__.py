@@ -7,5 +7,6 @@ The modules import each other in this order, and who checks a proof imports noth
   over boxes), ``quadratic`` (bounds of sums), ``examination`` (results), ``bounding`` and ``engines`` (the
   examination of boxes, in NumPy and in C), ``openboxes``, ``incumbent``, ``certificate``, ``branchandbound`` and
   ``proofwriter``;
-* the check: ``prooftree`` (claims of a proof), ``slopes``, ``slopebounds`` and ``proofcheck``.
+* the check: ``prooftree`` (claims of a proof), ``slopes``, ``slopebounds``, ``slopeweights``, ``slopecut`` and
+  ``proofcheck``.
 """
