@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models import FloatArray
 from ..program.nlp import Nlp
 from .proof import Node, Proof, ProofError, fingerprint
 from .prooftree import Claim, read_claims
-from .slopebounds import SumModel, sum_model
+from .slopebounds import sum_model
 from .slopecut import cut_off
 from .slopes import Slope, SlopeArithmetic
 from .slopeweights import lagrangian_weights
@@ -91,7 +92,7 @@ class _Shown(NamedTuple):
         lower, upper: (n, N) ends of the part of each box that is left to be shown; crossed where nothing is.
     """
 
-    holds: FloatArray
+    holds: NDArray[np.bool_]
     change: FloatArray
     lower: FloatArray
     upper: FloatArray
@@ -268,7 +269,7 @@ class _Checker:
                 low, high = np.fmax(low, ends[0]), np.fmin(high, ends[1])
         # Where a function may have no value, no sum bounds it.
         low, high = np.where(defined, low, lower), np.where(defined, high, upper)
-        return _Shown(np.logical_and(holds, defined), change, low, high)
+        return _Shown(np.asarray(holds & defined, dtype=bool), change, low, high)
 
     def _show_infeasible(
         self, r: int, condition: Slope, gradient: list[Slope], lower: FloatArray, upper: FloatArray
@@ -286,7 +287,7 @@ class _Checker:
             sign = sum_model(weights, [condition], [gradient], lower, upper)
             holds |= sign.bound() < 0
             change = sign.change()
-        return _Shown(holds, change, low, high)
+        return _Shown(np.asarray(holds, dtype=bool), change, low, high)
 
     def _show_monotone(
         self,
@@ -321,4 +322,4 @@ class _Checker:
             if kind == Node.MONOTONE:
                 rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
             holds |= rises
-        return _Shown(holds, change, *self._feasible_part(expressions, lower, upper))
+        return _Shown(np.asarray(holds, dtype=bool), change, *self._feasible_part(expressions, lower, upper))

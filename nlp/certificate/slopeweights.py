@@ -2,8 +2,8 @@
 
 The bound of ``L = sum_r w_r v_r`` over a box is about ``L(c) + sum_i r_i |dL/dx_i (c)|``. The weights are found in two
 steps: coordinate descent on the sum of squares of the scaled gradient, and then on this bound itself, which also counts
-how far a condition is violated at the centre. The first weights are better where the optimum lies in the box, the second
-ones for a box on the edge of the feasible set.
+how far a condition is violated at the centre. The first weights are better where the optimum lies in the box, the
+second ones for a box on the edge of the feasible set.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _minimise_bound(
 ) -> None:
     """Change one weight (N,) so that ``weight value + sum |left|`` is least; written in place, as is ``left`` (n, N).
 
-    The function is convex and piecewise linear in the weight, so it is least where a component of ``left`` is 0, or at 0.
+    The function is convex and piecewise linear in the weight: it is least where a component of ``left`` is 0, or at 0.
     """
     without = left - weight * gradient
     with np.errstate(all="ignore"):

@@ -46,6 +46,7 @@ class StandardForm:
         conditions: ``h_k``; numbered after the functions where both are counted.
         sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
         has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
+        places: places of its variables in the program, where it is a part of another form; else they are the first.
     """
 
     nlp: Nlp
@@ -56,6 +57,7 @@ class StandardForm:
     conditions: tuple[Condition, ...]
     sign: float
     has_epigraph: bool
+    places: tuple[int, ...] | None = None
 
     @property
     def n(self) -> int:
@@ -65,7 +67,8 @@ class StandardForm:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the variables."""
-        return tuple(variable.name for variable in self.nlp.program.variables[: self.n])
+        variables = self.nlp.program.variables
+        return tuple(variables[i].name for i in (range(self.n) if self.places is None else self.places))
 
     @property
     def is_equation(self) -> tuple[bool, ...]:
