@@ -33,7 +33,7 @@
 #define MULTIPLIER_ROUNDS 8
 #define TANGENT_ROUNDS 3
 
-enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN };
+enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };
 enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
 
 typedef double Lane[LANES];
@@ -107,6 +107,15 @@ static Rule rule_of(int op, double c, double lo, double hi)
         r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * (fabs(r.value) + r.slope);
         r.least = -0.5 * grown / (lo * lo), r.most = -0.5 / (grown * hi * hi);
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
+    } else if (op == RAMP) {
+        int kink = lo < 0 && hi > 0;
+        double slope = lo >= 0 ? 1.0 : hi <= 0 ? 0.0 : hi / (hi - lo), half = kink ? -0.5 * slope * lo : 0.0;
+        r.value = slope * c + half, r.slope = slope, r.least = r.most = 0.0;
+        r.error = half + (kink ? 8 * ULP * (hi - lo) + TINY : 0.0);
+        r.lo = larger(lo, 0.0), r.hi = larger(hi, 0.0);
+    } else if (op == STEP) {
+        r.lo = lo > 0 ? 1.0 : 0.0, r.hi = hi < 0 ? 0.0 : 1.0;
+        r.value = 0.5 * (r.lo + r.hi), r.error = 0.5 * (r.hi - r.lo), r.slope = r.least = r.most = 0.0;
     } else if (op == ATAN) {
         double low = atan(lo), high = atan(hi);
         r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = 2 * OFF * (fabs(r.value) + 1);

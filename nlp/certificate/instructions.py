@@ -45,6 +45,8 @@ class Op(enum.IntEnum):
     EXP = 13
     LOG = 14
     ATAN = 15
+    RAMP = 16  # max(r[a], 0)
+    STEP = 17  # 1 where r[a] >= 0, else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +239,9 @@ def _write_operation(writer: _TapeWriter, op: int, to: int, source: list[int]) -
 def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
     """Write an operation as several others, by an identity that is exact for real numbers."""
     one = writer.temporary()
-    if op == ca.OP_INV:
+    if op in (ca.OP_FMAX, ca.OP_FMIN, ca.OP_LE, ca.OP_FABS, ca.OP_SIGN):
+        _write_kink(writer, op, to, a, b)
+    elif op == ca.OP_INV:
         writer.set_constant(one, 1.0)
         writer.write(Op.DIV, to, one, a)
     elif op == ca.OP_TAN:
@@ -277,6 +281,49 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
         _write_power(writer, to, a, writer.constant[b])
     else:
         raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
+
+
+def _write_kink(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
+    """Write an operation with a kink or a step by a ramp or a step of one number.
+
+    fmax(a, b) = b + ramp(a - b), fmin(a, b) = a - ramp(a - b), (a <= b) = step(b - a), |a| = 2 ramp(a) - a, and the sign
+    of a is 2 step(a) - 1 where it is not 0.
+    """
+    other = writer.temporary()
+    if op == ca.OP_LE:
+        _write_difference(writer, other, b, a)
+        writer.write(Op.STEP, to, other)
+    elif op == ca.OP_SIGN:
+        writer.write(Op.STEP, other, a)
+        writer.write(Op.SCALE, other, other, k=2.0)
+        writer.write(Op.SHIFT, to, other, k=-1.0)
+    elif op == ca.OP_FABS:
+        writer.write(Op.RAMP, other, a)
+        writer.write(Op.SCALE, other, other, k=2.0)
+        writer.write(Op.SUB, to, other, a)
+    else:
+        # The constant is the one that is added, so that fmax(0, x) is a ramp of x and nothing else.
+        if a in writer.constant:
+            a, b = b, a
+        _write_difference(writer, other, *((a, b) if op == ca.OP_FMAX else (b, a)))
+        writer.write(Op.RAMP, other, other)
+        if op == ca.OP_FMIN:
+            writer.write(Op.SCALE, other, other, k=-1.0)
+        if b in writer.constant:
+            writer.write(Op.SHIFT, to, other, k=writer.constant[b])
+        else:
+            writer.write(Op.ADD, to, b, other)
+
+
+def _write_difference(writer: _TapeWriter, to: int, a: int, b: int) -> None:
+    """Write ``a - b`` for numbers of which at most one is constant."""
+    if b in writer.constant:
+        writer.write(Op.SHIFT, to, a, k=-writer.constant[b])
+    elif a in writer.constant:
+        writer.write(Op.SCALE, to, b, k=-1.0)
+        writer.write(Op.SHIFT, to, to, k=writer.constant[a])
+    else:
+        writer.write(Op.SUB, to, a, b)
 
 
 def _add_half_pi(writer: _TapeWriter, to: int) -> None:

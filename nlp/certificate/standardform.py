@@ -23,6 +23,7 @@ from ..evidence.state import CLOSED
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from ..program.program import Program
+from .kinks import without_ties
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,7 @@ class StandardForm:
     @cached_property
     def jacobian(self) -> SX:
         """(R, n) derivatives, dense: structural zeros are written out."""
-        return ca.densify(ca.jacobian(self.expressions, self.x))
+        return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
 
     @cached_property
     def dependence(self) -> list[list[bool]]:
