@@ -286,8 +286,8 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
 def _write_kink(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
     """Write an operation with a kink or a step by a ramp or a step of one number.
 
-    fmax(a, b) = b + ramp(a - b), fmin(a, b) = a - ramp(a - b), (a <= b) = step(b - a), |a| = 2 ramp(a) - a, and the sign
-    of a is 2 step(a) - 1 where it is not 0.
+    fmax(a, b) = b + ramp(a - b), fmin(a, b) = b - ramp(b - a), (a <= b) = step(b - a), |a| = 2 ramp(a) - a, and the
+    sign of a is 2 step(a) - 1 where it is not 0.
     """
     other = writer.temporary()
     if op == ca.OP_LE:

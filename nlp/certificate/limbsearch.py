@@ -7,6 +7,7 @@ of it has a bound above the limb's value at the incumbent by more than this part
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ...models import FloatArray
 from .boxsearch import BoxSearch
 from .engines import engine_for
 from .incumbent import Incumbent
+from .proofwriter import ProofWriter
 from .separation import Limb, Separation
 from .standardform import StandardForm
 
@@ -78,16 +80,28 @@ class IndependentSearch:
         incumbent: the best point known, which the search improves.
         engine: name of the engine.
         jobs: threads of the engine.
+        recorder: records the limbs' trees for a proof.
     """
 
     def __init__(
-        self, form: StandardForm, separation: Separation, incumbent: Incumbent, engine: str | None, jobs: int | None
+        self,
+        form: StandardForm,
+        separation: Separation,
+        incumbent: Incumbent,
+        engine: str | None,
+        jobs: int | None,
+        recorder: ProofWriter | None = None,
     ) -> None:
         self._constant = separation.constant
         parts: dict[tuple[int, ...], FloatArray] = {}
         self._searches = [
-            BoxSearch(limb.form, engine_for(limb.form, engine, jobs), LimbPoint(limb, incumbent, parts))
-            for limb in separation.limbs
+            BoxSearch(
+                limb.form,
+                engine_for(limb.form, engine, jobs),
+                LimbPoint(limb, incumbent, parts),
+                None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
+            )
+            for k, limb in enumerate(separation.limbs)
         ]
         self._form, self._incumbent = form, incumbent
 
@@ -116,9 +130,13 @@ class IndependentSearch:
         """Upper bound of the maximum: the sum of the limbs' bounds, rounded up."""
         if self._is_infeasible:
             return -math.inf
-        bounds = [max(each.bound, each.incumbent.value) for each in self._searches]
+        bounds = [self._limb_bound(k) for k in range(len(self._searches))]
         total = math.fsum([*bounds, self._constant])
         return total + _SUM * math.fsum(map(abs, [*bounds, self._constant]))
+
+    def _limb_bound(self, k: int) -> float:
+        """Return the upper bound of one limb."""
+        return max(self._searches[k].bound, self._searches[k].incumbent.value)
 
     @property
     def fault(self) -> str:

@@ -39,6 +39,10 @@ class OwnBoxes:
         places = np.repeat(starts - before, counts) + np.arange(int(counts.sum()))
         return OwnBoxes(self.lower[:, places], self.upper[:, places], np.repeat(np.arange(which.size), counts))
 
+    def width(self, count: int) -> FloatArray:
+        """Return the sum (B,) of all sides of the boxes of each of so many lists."""
+        return np.asarray(np.bincount(self.of, (self.upper - self.lower).sum(axis=0), minlength=count))
+
     def bisect(self, which: NDArray[np.bool_], along: NDArray[np.intp]) -> OwnBoxes:
         """Return the lists with some boxes (N,) bisected along one variable (N,) each."""
         places = np.repeat(np.arange(self.of.size), 1 + which)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ...models import FloatArray
 from ..program.nlp import Nlp
-from .proof import Node, Proof, ProofError, fingerprint
-from .prooftree import Claim, read_claims
+from .proof import Node, Proof, ProofError, fingerprint, is_same_program
+from .prooftree import Claim, read_parts
 from .slopebounds import sum_model
 from .slopecut import cut_off
 from .slopes import Slope, SlopeArithmetic
@@ -62,25 +62,25 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     Raises:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
     """
-    if fingerprint(nlp) != proof.graph:
+    if not is_same_program(fingerprint(nlp), proof.graph):
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     bound = -np.inf if proof.bound is None else proof.bound
-    claims = read_claims(proof.tree, form)
-    checker = _Checker(form, bound)
-    pieces = 0
-    groups: dict[tuple[Node, int], list[Claim]] = {}
-    for claim in claims:
-        groups.setdefault((claim.kind, claim.index), []).append(claim)
-    done = 0
-    for (kind, index), group in groups.items():
-        for start in range(0, len(group), 4 * _BLOCK):
-            part = group[start : start + 4 * _BLOCK]
-            pieces += checker.show(kind, index, part)
-            done += len(part)
-            if progress is not None:
-                progress(done, len(claims) - done)
-    return VerifiedProof(len(claims), pieces, bound)
+    parts = read_parts(proof.tree, form, bound)
+    leaves, pieces, done = sum(len(part.claims) for part in parts), 0, 0
+    for part in parts:
+        checker = _Checker(part.form, part.bound)
+        groups: dict[tuple[Node, int], list[Claim]] = {}
+        for claim in part.claims:
+            groups.setdefault((claim.kind, claim.index), []).append(claim)
+        for (kind, index), group in groups.items():
+            for start in range(0, len(group), 4 * _BLOCK):
+                some = group[start : start + 4 * _BLOCK]
+                pieces += checker.show(kind, index, some)
+                done += len(some)
+                if progress is not None:
+                    progress(done, leaves - done)
+    return VerifiedProof(leaves, pieces, bound)
 
 
 class _Shown(NamedTuple):

@@ -205,8 +205,13 @@ class SharedSearch:
             refined = SharedBoxes(lower, upper, sums.bound, own, good)
             self._opened.push(refined.select(np.flatnonzero(refine)))
         done = alive & ~refine & ~cut
-        if done.any():
-            self._undivided.append(rest.select(np.flatnonzero(done)))
+        # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
+        moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
+        for before, each in zip(boxes.own, lists, strict=True):
+            moved |= each.own.width(boxes.count) < before.width(boxes.count)
+        for which, push in ((done & moved, self._opened.push), (done & ~moved, self._undivided.append)):
+            if which.any():
+                push(rest.select(np.flatnonzero(which)))
 
     def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""

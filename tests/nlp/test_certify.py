@@ -179,12 +179,12 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     assert sound.status is CertificateStatus.PROVED
     assert sound.bound >= solution.F * (1 - 1e-12)
 
-    whole = NumpyEngine._collapse_monotone
+    whole = NumpyEngine.collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "collapse_monotone", careless)
     inside = 0.5 * solution.x
     wrong = certify_program(solution.nlp, inside, engine="numpy", gap=1e-9)
     assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
@@ -193,7 +193,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
 @pytest.mark.slow
 def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the test above: no incumbent is given, so a rule that drops the optimum cannot hide behind it."""
-    whole = NumpyEngine._collapse_monotone
+    whole = NumpyEngine.collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
@@ -207,7 +207,7 @@ def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeyp
         return wrong
 
     assert caught() == 0
-    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "collapse_monotone", careless)
     assert caught() >= 1
 
 
@@ -366,7 +366,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
         "LINEAR": bounding._LINEAR,
         "ROOT_SLACK": quadratic._ROOT_SLACK,
         "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
-        "TANGENT_ROUNDS": bounding._TANGENT_ROUNDS,
+        "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
     }
     for name, value in numbers.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"#define {name} ")]
