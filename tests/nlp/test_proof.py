@@ -350,3 +350,29 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
     assert "could not be shown" in rejected(replace(proof, tree=lower), case)
     assert "ends" in rejected(replace(proof, tree=proof.tree[:-1]), case)
     assert "goes on" in rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), case)
+
+
+def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
+    tables = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
+    del tables["expect"]
+    tables["limits"] = {"leg_clearance": {"min": 3}}
+    tables["robot"]["parameters"].update({"x1": 26.5, "x2": 11.543, "x3": 4})
+    tables["pose"]["position"] = [{"min": -6, "max": 6, "start": 0}, 0, 20]
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": {"min": -15, "max": 15}}
+    case = case_from_tables(tables, name="legs", source="legs")
+    certified = certify(case, gap=1e-3, starts=4, with_proof=True)
+    evidence = certified.solution.evidence
+    assert evidence is not None
+    assert any(side.name.startswith("leg_clearance") for side in evidence.active)
+    proof = proof_of(certified, "")
+    nlp = program_of(case, proof.statement)
+    check_proof(proof, nlp)
+    form = standard_form(nlp)
+    x = form.lower[:, None] + np.random.default_rng(0).random((form.n, 3000)) * (form.upper - form.lower)[:, None]
+    values = ca.Function("values", [form.x], [form.expressions]).map(3000)(x).full()
+    feasible = (values[1:] <= 0).all(axis=0)
+    assert 0 < feasible.sum() < 3000
+    assert proof.bound is not None
+    # Points that do not keep the limit are better: it matters.
+    assert values[0][feasible].max() <= proof.bound < values[0].max()
+    assert "bounded" in rejected(replace(proof, bound=proof.bound * (1 - 3e-3)), case)
