@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from .separation import Separation
     from .standardform import StandardForm
 
-#: Shared boxes that are examined at once: their models fit the memory even with long lists.
-_BLOCK = 128
+#: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
+_BLOCK = 48
 #: Own boxes of one list above which the shared box is bisected instead.
-_LONGEST = 1024
+_LONGEST = 512
 #: Part of the widest limb's spread from which on a limb's list is refined too.
 _SPREAD = 0.25
 #: How many times more the limbs' lists must promise than bisections of the shared box to be refined.
