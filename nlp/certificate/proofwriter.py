@@ -63,7 +63,9 @@ class ProofWriter:
         bounds = [each.bound() for each in self._limbs]
         parts = [bytes([Node.LIMBS])]
         for each, bound in zip(self._limbs, bounds, strict=True):
-            if -np.inf in bounds and bound > -np.inf:
+            if bound == -np.inf:
+                parts += [struct.pack("<d", bound), each.writer.tree()]
+            elif -np.inf in bounds:
                 parts += [struct.pack("<d", np.inf), bytes([Node.BOUNDED])]
             else:
                 parts += [struct.pack("<d", bound + _OUTWARDS * abs(bound)), each.writer.tree()]

@@ -16,6 +16,9 @@ from screwsynth.nlp.certificate.engines import kernel, limb_engine_for
 from screwsynth.nlp.certificate.limbmodels import LimbModels
 from screwsynth.nlp.certificate.limbsums import LimbBound, bound_limb
 from screwsynth.nlp.certificate.ownboxes import OwnBoxes
+from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.proofwriter import ProofWriter
 from screwsynth.nlp.certificate.separation import Separation, separate
 from screwsynth.nlp.certificate.sharedcuts import LeftOwn
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
@@ -134,8 +137,12 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     upper[:3] = 0.1
     lower = nlp.lower.copy()
     lower[:3] = -0.1
-    found = certify_program(replace(nlp, lower=lower, upper=upper), gap=1e-2)
+    nlp = replace(nlp, lower=lower, upper=upper)
+    recorder = ProofWriter(1)
+    found = certify_program(nlp, gap=1e-2, recorder=recorder)
     assert found.status is CertificateStatus.INFEASIBLE
+    proof = Proof("", "none", Statement(), fingerprint(nlp), None, recorder.tree())
+    assert check_proof(proof, nlp).bound == -math.inf
 
 
 def test_an_independent_search_that_stops_has_a_bound() -> None:
