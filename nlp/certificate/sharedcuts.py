@@ -39,7 +39,8 @@ class SharedSums:
         parts: bounds of each limb.
         common: enclosures of the part with shared variables alone.
         M: (B) models of the common part with all tilts and bests.
-        bound: (B,) upper bounds.
+        sums: (B,) upper bounds from these models: the limbs' bests, and the most that the common part adds to them.
+        bound: (B,) upper bounds: the lesser of these and of those that the boxes had before.
         is_possible: (B,) whether the common conditions can hold and every limb has a box left.
         binding: (R, B) whether a common condition may bind.
     """
@@ -48,6 +49,7 @@ class SharedSums:
     parts: list[LimbBound]
     common: GradientModel
     M: QuadraticModel
+    sums: FloatArray
     bound: FloatArray
     is_possible: NDArray[np.bool_]
     binding: NDArray[np.bool_]
@@ -143,7 +145,7 @@ def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, 
 
 
 def cut_own(
-    good: FloatArray, found: LimbModels, part: LimbBound, own: OwnBoxes, bound: FloatArray, threshold: float
+    good: FloatArray, found: LimbModels, part: LimbBound, own: OwnBoxes, sums: FloatArray, threshold: float
 ) -> LeftOwn:
     """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
 
@@ -152,13 +154,14 @@ def cut_own(
         found: models of the limb.
         part: its bounds.
         own: its boxes.
-        bound: (B,) upper bounds of the shared boxes.
+        sums: (B,) upper bounds of the shared boxes, each the sum of the limbs' bests and of what the common part adds.
+            A lesser bound of the whole, from elsewhere, would say nothing of the other limbs.
         threshold: the threshold.
     """
     m = len(found.lower) - len(own.lower)
-    # The others give at most ``bound - best``, so this limb must give the rest.
-    level = threshold - (bound - part.best)
-    level = level - _SUM * (abs(threshold) + np.abs(bound) + np.abs(part.best))
+    # The others give at most ``sums - best``, so this limb must give the rest.
+    level = threshold - (sums - part.best)
+    level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(part.best))
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), part.reached)
     keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
     ends = part.L.ends_reaching(level[own.of])

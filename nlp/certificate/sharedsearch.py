@@ -145,9 +145,10 @@ class SharedSearch:
         M = with_tilts(common.sum_model(weights), parts)
         bound = M.bound()
         known = np.isfinite(common.value.s[0]) & np.all([np.isfinite(part.best) for part in parts], axis=0)
-        bound = np.fmin(np.where(known & ~np.isnan(bound), bound, np.inf), boxes.bound)
+        sums = np.where(known & ~np.isnan(bound), bound, np.inf)
+        bound = np.fmin(sums, boxes.bound)
         emptied = np.any([part.best == -np.inf for part in parts], axis=0)
-        return SharedSums(models, parts, common, M, bound, ~(impossible.any(axis=0) | emptied), binding)
+        return SharedSums(models, parts, common, M, sums, bound, ~(impossible.any(axis=0) | emptied), binding)
 
     def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
         """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
@@ -181,7 +182,7 @@ class SharedSearch:
         left = contract_shared(self._common_form, boxes, sums, threshold)
         lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
         parts = zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
-        lists = [cut_own(*each, sums.bound, threshold) for each in parts]
+        lists = [cut_own(*each, sums.sums, threshold) for each in parts]
         good = tuple(each.good for each in lists)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         self._closed_bound = max(self._closed_bound, threshold)

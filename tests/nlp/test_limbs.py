@@ -234,9 +234,9 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
     whole = sharedsearch.cut_own
 
     def careless(
-        good: np.ndarray, found: LimbModels, part: LimbBound, own: OwnBoxes, bound: np.ndarray, threshold: float
+        good: np.ndarray, found: LimbModels, part: LimbBound, own: OwnBoxes, sums: np.ndarray, threshold: float
     ) -> LeftOwn:
-        del bound
+        del sums
         return whole(good, found, part, own, part.best, threshold)
 
     monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
