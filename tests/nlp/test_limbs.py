@@ -13,6 +13,7 @@ from screwsynth.nlp.certificate import branchandbound, sharedsearch
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.engines import kernel, limb_engine_for
+from screwsynth.nlp.certificate.incumbent import Incumbent
 from screwsynth.nlp.certificate.limbmodels import LimbModels
 from screwsynth.nlp.certificate.limbsums import LimbBound, bound_limb
 from screwsynth.nlp.certificate.ownboxes import OwnBoxes
@@ -265,3 +266,19 @@ def test_limbs_that_share_the_pose_have_a_finite_bound_soon() -> None:
     x = form.lower[:, None] + share * (form.upper - form.lower)[:, None]
     values = ca.Function("f", [form.x], [form.functions[0]]).map(3000)(x).full()
     assert values.max() <= found.bound
+
+
+def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
+    """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
+    form, found = separated(poses(0))
+    search = sharedsearch.SharedSearch(form, found, Incumbent(form), None, 1)
+    boxes = search._opened.pop(1)
+    for bound in (np.inf, 1.0):
+        with np.errstate(all="ignore"):
+            sums = search._examine(replace(boxes, bound=np.array([bound])))
+            lists = [
+                sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
+                for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
+            ]
+        assert sums.bound[0] == min(bound, sums.sums[0])
+        assert all(each.own.of.size for each in lists)
