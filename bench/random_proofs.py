@@ -18,7 +18,7 @@ from screwsynth.nlp.certificate.proof import ProofError
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
-#: Bytes of a tree above which its check takes minutes, and is left out.
+#: Bytes of a tree above which its check is left out: it takes too long for a run of hundreds.
 LARGEST = 12_000
 
 
