@@ -33,7 +33,7 @@
 #define MULTIPLIER_ROUNDS 8
 #define TANGENT_ROUNDS 3
 
-enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN };
+enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };
 enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
 
 typedef double Lane[LANES];
@@ -107,6 +107,15 @@ static Rule rule_of(int op, double c, double lo, double hi)
         r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * (fabs(r.value) + r.slope);
         r.least = -0.5 * grown / (lo * lo), r.most = -0.5 / (grown * hi * hi);
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
+    } else if (op == RAMP) {
+        int kink = lo < 0 && hi > 0;
+        double slope = lo >= 0 ? 1.0 : hi <= 0 ? 0.0 : hi / (hi - lo), half = kink ? -0.5 * slope * lo : 0.0;
+        r.value = slope * c + half, r.slope = slope, r.least = r.most = 0.0;
+        r.error = half + (kink ? 8 * ULP * (hi - lo) + TINY : 0.0);
+        r.lo = larger(lo, 0.0), r.hi = larger(hi, 0.0);
+    } else if (op == STEP) {
+        r.lo = lo > 0 ? 1.0 : 0.0, r.hi = hi < 0 ? 0.0 : 1.0;
+        r.value = 0.5 * (r.lo + r.hi), r.error = 0.5 * (r.hi - r.lo), r.slope = r.least = r.most = 0.0;
     } else if (op == ATAN) {
         double low = atan(lo), high = atan(hi);
         r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = 2 * OFF * (fabs(r.value) + 1);
@@ -397,13 +406,14 @@ typedef struct {
     double q_middle, q_rounding;
 } Box;
 
-static void choose_multipliers(Box *x, const int *equation)
+/* The gradient is made small in the variables from number first on. */
+static void choose_multipliers(Box *x, const int *equation, int first)
 {
     int n = x->n, J = x->J, R = x->R;
     for (int r = 0; r < R; r++) {
         x->weights[r] = r == 0;
         x->size[r] = 0.0;
-        for (int i = 0; i < n; i++) {
+        for (int i = first; i < n; i++) {
             double along = x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0);
             x->size[r] += along * along;
         }
@@ -414,7 +424,7 @@ static void choose_multipliers(Box *x, const int *equation)
             if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->high[r] >= 0)))
                 continue;
             double product = 0.0, weight = x->weights[r];
-            for (int i = 0; i < n; i++)
+            for (int i = first; i < n; i++)
                 product += (x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0)) * x->left[i];
             double new = weight - product / x->size[r];
             if (r < J)
@@ -424,7 +434,7 @@ static void choose_multipliers(Box *x, const int *equation)
             if (!isfinite(new))
                 continue;
             double change = new - weight;
-            for (int i = 0; i < n; i++)
+            for (int i = first; i < n; i++)
                 x->left[i] += change * (x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0));
             x->weights[r] = new;
             if (r < J)
@@ -646,7 +656,41 @@ typedef struct {
     const double *lower, *upper;
     int *verdict, *reason, *split, *cut_lower, *cut_upper;
     double *bound, *value, *left_lower, *left_upper, *centre;
+    int shared;     /* number of the first variables that other limbs have too */
+    double *models; /* of the Lagrangian and of the function's gradient, limbmodels.py; NULL without them */
 } Report;
+
+static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
+
+/* Writes row after row of a box's model: limbmodels.py names them. */
+static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
+{
+    int n = x->n, J = x->J, R = x->R;
+    double *to = report->models + at;
+    const double *vectors[] = {x->qb, x->qw, x->qlo, x->qhi};
+    Py_ssize_t B = report->B;
+    int holds = 1; /* whether every condition holds on the whole box */
+    for (int r = J; r < R; r++)
+        holds = holds && !form->equation[r] && x->high[r] < 0;
+    *to = defined + 2 * holds, *(to += B) = x->q_middle, *(to += B) = x->q_rounding;
+    for (int k = 0; k < 4; k++)
+        for (int i = 0; i < n; i++)
+            *(to += B) = vectors[k][i];
+    for (int i = 0; i < n * n; i++)
+        *(to += B) = x->H[i];
+    for (int i = 0; i < report->shared; i++) {
+        double low = INFINITY, high = -INFINITY;
+        int up = 0, down = 0;
+        for (int r = 0; r < R; r++) {
+            double least = x->grad_lo[r * n + i], most = x->grad_hi[r * n + i];
+            if (r < J)
+                low = smaller(low, least), high = larger(high, most);
+            else if (form->depends[r * n + i] && !(x->high[r] < 0))
+                up |= form->equation[r] || !(most < 0), down |= form->equation[r] || !(least > 0);
+        }
+        *(to += B) = low, *(to += B) = high, *(to += B) = up, *(to += B) = down;
+    }
+}
 
 static void judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
                   double threshold)
@@ -674,9 +718,11 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
                 value = -INFINITY;
         }
     }
-    choose_multipliers(x, form->equation);
+    choose_multipliers(x, form->equation, report->shared);
     combine(x);
-    double lagrangian = quadratic_bound(x);
+    if (report->models)
+        write_model(form, x, report, at, defined);
+    double lagrangian = report->models ? INFINITY : quadratic_bound(x);
     bound = lagrangian < bound ? lagrangian : bound;
     bound = defined ? bound : INFINITY;
 
@@ -689,7 +735,7 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         x->why_lo[i] = x->why_hi[i] = -2;
     }
     /* Monotonicity. */
-    for (int i = 0; i < n && defined; i++)
+    for (int i = report->shared; i < n && defined; i++)
         for (int side = 1; side >= -1; side -= 2) {
             Py_ssize_t end = i * B + at;
             int applies = report->upper[end] > report->lower[end] && verdict == OPEN;
@@ -874,17 +920,18 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *equation, *depends, *low, *high, *arrays[12];
+    PyObject *tape, *equation, *depends, *low, *high, *arrays[12], *models = NULL;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOO!)(OOOOOOOOOOOO)nnnd", &form.n, &form.functions, &equation, &depends, &low,
+    if (!PyArg_ParseTuple(args, "(iiOOOOO!)(OOOOOOOOOOOO)nnnd|iO", &form.n, &form.functions, &equation, &depends, &low,
                           &high, &PyTuple_Type, &tape, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
-                          &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold))
+                          &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
+                          &report.shared, &models))
         return NULL;
     int good = form.n > 0 && form.functions > 0 && read_tape(&all, tape, &form.tape) == 0;
     form.expressions = good ? form.tape.outputs / (form.n + 1) : 0;
@@ -900,6 +947,13 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && (report.cut_upper = borrow(&all, arrays[8], n * B, I, 1));
     good = good && (report.split = borrow(&all, arrays[9], B, I, 1)) && (report.value = borrow(&all, arrays[10], B, D, 1));
     good = good && (report.centre = borrow(&all, arrays[11], n * B, D, 1));
+    if (good && models) {
+        int valid = report.shared >= 0 && report.shared <= form.n;
+        Py_ssize_t rows = valid ? rows_of_models(form.n, report.shared) : -1;
+        good = (report.models = borrow(&all, models, rows * B, D, 1)) != NULL;
+    } else if (report.shared != 0) {
+        report.shared = 0;
+    }
     double *memory = NULL;
     if (good && (form.functions > R || form.tape.outputs != R * (n + 1) || begin < 0 || finish > B)) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
@@ -922,8 +976,10 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, tape), arrays, B, begin, finish, threshold)\n\n"
-     "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results)."},
+     "examine((n, functions, equation, depends, low, high, tape), arrays, B, begin, finish, threshold,\n"
+     "        shared=0, models=None)\n\n"
+     "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
+     "With models the first variables are shared with other limbs."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -23,10 +23,11 @@ import numpy as np
 
 from .enclosure import Enclosures, Midpoints, enclose, midpoints
 from .examination import COLLAPSED, UNMOVED, Examination, Verdict
-from .instructions import Tape, compile_tape
+from .instructions import compile_tape
 from .intervals import ULP
-from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching, largest_on_unit_interval
+from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .standardform import StandardForm
+from .tape import Tape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,9 +35,8 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 from ..errors import UncoveredError
 
-#: Rounds of the coordinate-wise searches for multipliers and for a tangent point: any result of them gives a bound.
+#: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
 _MULTIPLIER_ROUNDS = 8
-_TANGENT_ROUNDS = 3
 #: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
 _LINEAR = 0.3
 #: Part of a side below which a contraction is not worth its leaf in a proof.
@@ -69,7 +69,7 @@ def _uncovered_limit(form: StandardForm) -> str | None:
 
 
 @dataclass(eq=False)
-class _Remainder:
+class Remainder:
     """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
 
     The attributes are those of :class:`Examination`.
@@ -83,7 +83,7 @@ class _Remainder:
     reason: NDArray[np.int32]
 
     @classmethod
-    def whole(cls, lower: FloatArray, upper: FloatArray) -> _Remainder:
+    def whole(cls, lower: FloatArray, upper: FloatArray) -> Remainder:
         """Return whole boxes, all open."""
         cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
         open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
@@ -130,25 +130,18 @@ class NumpyEngine:
         """Examine boxes; NumPy's warnings of invalid operations are off."""
         J = self.functions
         box = midpoints(lower, upper)
-        model = self._model(lower, upper, box.radius)
-        # Ranges of the expressions: of their forms, and by the mean value theorem.
-        steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
+        model = self.model(lower, upper, box.radius)
+        low, high = ranges(model)
         middle, error = model.value.c, model.value.s
-        spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
-        high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
-        low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
         defined = (error[:J] < np.inf).all(axis=0)
         bound = high[:J].min(axis=0)
-        L = model.sum_model(self._multipliers(model, high))
-        bound = np.where(defined, np.fmin(bound, self._quadratic_bound(L)), np.inf)
+        L = model.sum_model(self.multipliers(model, high))
+        bound = np.where(defined, np.fmin(bound, L.bound()), np.inf)
 
-        impossible = (low > 0) | (self.equation[:, None] & (high < 0))
-        impossible[:J] = False
-        binding = (~(high < 0)) & ~impossible
-        binding[:J] = False
-        left = self._collapse_monotone(model, binding, lower, upper)
-        self._contract(model, L, left, box, threshold)
-        some = impossible.any(axis=0)
+        impossible, binding = self.states(low, high)
+        left = self.collapse_monotone(model, binding, lower, upper)
+        self.contract(model, L, left, box, threshold)
+        some = np.asarray(impossible.any(axis=0))
         left.close(some, Verdict.INFEASIBLE, impossible.argmax(axis=0)[some])
         left.verdict[~defined & (left.verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
         left.lower[:, ~defined], left.upper[:, ~defined] = lower[:, ~defined], upper[:, ~defined]
@@ -168,7 +161,7 @@ class NumpyEngine:
             centre=box.centre,
         )
 
-    def _model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
+    def model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
         """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each."""
         n, R = self.form.n, len(self.equation)
         box = enclose(self._tape, lower, upper)
@@ -191,17 +184,18 @@ class NumpyEngine:
             gradient_hi=box.hi[R:].reshape(shape),
         )
 
-    def _multipliers(self, model: GradientModel, high: FloatArray) -> FloatArray:
+    def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
 
-        They make its scaled gradient at the centre small, by coordinate descent on the sum of squares.
+        They make its scaled gradient at the centre small in the variables from number ``first`` on, by coordinate
+        descent on the sum of squares.
         """
         J, R = self.functions, len(self.equation)
         weights = np.zeros_like(high)
         weights[0] = 1.0
-        left = model.b[0].copy()
-        directions = model.b.copy()
-        directions[:J] -= model.b[0]
+        left = model.b[0, first:].copy()
+        directions = model.b[:, first:].copy()
+        directions[:J] -= model.b[0, first:]
         sizes = np.einsum("rib,rib->rb", directions, directions)
         usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
         usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
@@ -225,59 +219,25 @@ class NumpyEngine:
         weights[:J, bad], weights[0, bad] = 0.0, 1.0
         return weights
 
-    def _quadratic_bound(self, L: QuadraticModel) -> FloatArray:
-        """Return an upper bound (B,) of the Lagrangian over the box, from its model."""
-        mean = L.middle + np.maximum(np.abs(L.slope_lo), np.abs(L.slope_hi)).sum(axis=0)
-        # Where the slope has a sign, the largest value is on that face.
-        s = np.where(L.slope_lo >= 0, 1.0, np.where(L.slope_hi <= 0, -1.0, 0.0))
-        free = s == 0
-        Hs = np.einsum("ijb,jb->ib", L.H, s)
-        fixed = L.middle + (L.b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0) + (L.w * np.abs(s)).sum(axis=0)
-        b = np.where(free, L.b + Hs, 0.0)
-        w = np.where(free, L.w, 0.0)
-        H = np.where(free[:, None] & free[None], L.H, 0.0)
-        diagonal = np.einsum("iib->ib", H).copy()
-        others = np.abs(H).sum(axis=1) - np.abs(diagonal)
-        separate = fixed + (largest_on_unit_interval(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
-        shift = np.maximum(diagonal + others, 0.0)
-        tangent = fixed + self._tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
-        best = np.fmin(mean, np.fmin(separate, tangent))
-        return np.asarray(best + L.rounding)
+    def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""
+        impossible = (low > 0) | (self.equation[:, None] & (high < 0))
+        impossible[: self.functions] = False
+        binding = (~(high < 0)) & ~impossible
+        binding[: self.functions] = False
+        return impossible, binding
 
-    def _tangent(self, b: FloatArray, H: FloatArray, diagonal: FloatArray) -> FloatArray:
-        """Return the largest value over the box of a tangent plane to the concave ``b e + 1/2 e' C e``.
-
-        ``C`` is ``H`` with another diagonal. A tangent plane of a concave function is nowhere below it; this one
-        touches it near its maximum.
-        """
-        n = len(b)
-        t = np.zeros_like(b)
-        gradient = b.copy()
-        for _ in range(_TANGENT_ROUNDS):
-            for i in range(n):
-                curvature = diagonal[i]
-                new = np.where(curvature < 0, t[i] - gradient[i] / curvature, np.sign(gradient[i]))
-                new = np.clip(np.where(np.isfinite(new), new, 0.0), -1.0, 1.0)
-                change = new - t[i]
-                t[i] = new
-                gradient += change * H[i]
-                gradient[i] += change * (curvature - H[i, i])
-        # The plane at t: b t + 1/2 t'Ct + gradient (e - t), where gradient = b + C t.
-        Ct = np.einsum("ijb,jb->ib", H, t) + (diagonal - np.einsum("iib->ib", H)) * t
-        gradient = b + Ct
-        return np.asarray(-0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0))
-
-    def _collapse_monotone(
-        self, model: GradientModel, binding: NDArray[np.bool_], lower: FloatArray, upper: FloatArray
-    ) -> _Remainder:
+    def collapse_monotone(
+        self, model: GradientModel, binding: NDArray[np.bool_], lower: FloatArray, upper: FloatArray, first: int = 0
+    ) -> Remainder:
         """Close or collapse boxes in which every function rises along a variable and no condition stops a point.
 
         Such a point is no maximum, unless it lies on the face of the whole box. A condition stops it when it may bind
         and may grow in that direction; an equation always does, if it depends on the variable.
         """
-        left = _Remainder.whole(lower, upper)
+        left = Remainder.whole(lower, upper)
         J = self.functions
-        for i in range(self.form.n):
+        for i in range(first, self.form.n):
             width = upper[i] > lower[i]
             for side in (1, -1):
                 g_lo, g_hi = model.gradient_lo[:, i], model.gradient_hi[:, i]
@@ -295,8 +255,8 @@ class NumpyEngine:
                 (left.cut_lower if side > 0 else left.cut_upper)[i, collapsed] = COLLAPSED
         return left
 
-    def _contract(
-        self, model: GradientModel, L: QuadraticModel, left: _Remainder, box: Midpoints, threshold: float
+    def contract(
+        self, model: GradientModel, L: QuadraticModel, left: Remainder, box: Midpoints, threshold: float
     ) -> None:
         """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold."""
         centre, radius = box
@@ -333,7 +293,7 @@ class NumpyEngine:
         which = np.asarray(emptied.any(axis=0))
         left.close(which, Verdict.EMPTIED, emptied.argmax(axis=0)[which])
 
-    def _split(self, L: QuadraticModel, lower: FloatArray, upper: FloatArray, left: _Remainder) -> NDArray[np.int32]:
+    def _split(self, L: QuadraticModel, lower: FloatArray, upper: FloatArray, left: Remainder) -> NDArray[np.int32]:
         """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left."""
         width = upper - lower
         part = (left.upper - left.lower) / np.where(width > 0, width, 1.0)
@@ -345,3 +305,13 @@ class NumpyEngine:
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(left.upper > left.lower)] = -1.0
         return np.asarray(score.argmax(axis=0), dtype=np.int32)
+
+
+def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
+    steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
+    middle, error = model.value.c, model.value.s
+    spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
+    high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
+    low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
+    return low, high

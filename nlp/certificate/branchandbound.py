@@ -13,10 +13,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import NamedTuple
-
-import numpy as np
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol
 
 from ...models import FloatArray, frozen_array
 from ..case.task import Sense
@@ -24,12 +22,14 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
 from ..interruption import Milestone, is_requested, reached
 from ..program.nlp import Nlp
+from .boxsearch import BoxSearch
 from .certificate import Certificate, CertificateStatus
-from .engines import Engine, engine_for
-from .examination import Examination, Verdict
+from .engines import engine_for, engine_name
 from .incumbent import Incumbent, IncumbentError
-from .openboxes import Boxes, OpenBoxes
+from .limbsearch import IndependentSearch
 from .proofwriter import ProofWriter
+from .separation import separate
+from .sharedsearch import SharedSearch
 from .standardform import StandardForm, is_in_home_mode, standard_form
 
 #: The gap asked for when none is given: a ten-thousandth.
@@ -39,10 +39,8 @@ GAP = 1e-4
 _FOLDED = 1e-12
 #: Part of the objective's scale below which an incumbent counts as 0: a gap relative to it would have no meaning.
 _NEAR_ZERO = 1e-6
-#: Width, in parts of the whole box, below which a box without a finite bound is taken to hold a point without a value.
-_SINGULAR_WIDTH = 2.0**-16
-#: Width, in parts of the whole box, below which a box is not bisected.
-_LEAST_WIDTH = 2.0**-40
+#: Number of variables up to which the whole box is searched although limbs share variables: it takes fewer boxes then.
+_WHOLE_BOX = 12
 #: Seconds between two reports of progress, and the largest number of entries in a history.
 _REPORT_EVERY = 0.1
 _HISTORY = 200
@@ -88,8 +86,9 @@ def certify_program(
     if nlp.n == 0:
         return _certify_point(nlp, above, time.perf_counter() - began)
     form = standard_form(nlp)
-    chosen = engine_for(form, engine, jobs)
-    search = _Search(form, chosen, gap, above, began, recorder)
+    incumbent = Incumbent(form)
+    method = _method(form, incumbent, engine, jobs, recorder)
+    search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
     try:
         search.incumbent.start(x, claimed)
     except IncumbentError as error:
@@ -100,7 +99,7 @@ def certify_program(
     except KeyboardInterrupt:
         reason = "interrupted"
     finally:
-        chosen.close()
+        method.close()
     return search.certificate(reason)
 
 
@@ -121,6 +120,51 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
     )
 
 
+def _method(
+    form: StandardForm, incumbent: Incumbent, engine: str | None, jobs: int | None, recorder: ProofWriter | None
+) -> SearchMethod:
+    """Return the search for a form: by limbs where it separates, else of the whole box.
+
+    The proof of limbs that share variables would need lists of boxes of their own: it is one of the whole box.
+    """
+    separation = separate(form)
+    if separation is not None and not separation.shared:
+        return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
+    if separation is None or recorder is not None or form.n <= _WHOLE_BOX:
+        return BoxSearch(form, engine_for(form, engine, jobs), incumbent, recorder)
+    return SharedSearch(form, separation, incumbent, engine, jobs)
+
+
+class SearchMethod(Protocol):
+    """A way to search a box, step by step."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether boxes are left to be examined."""
+
+    @property
+    def left(self) -> int:
+        """Number of open boxes."""
+
+    @property
+    def boxes(self) -> int:
+        """Number of boxes examined."""
+
+    @property
+    def bound(self) -> float:
+        """Upper bound of the maximum over the boxes; -inf where no point is feasible."""
+
+    @property
+    def fault(self) -> str:
+        """Reason for stopping at boxes without a finite bound; empty without any."""
+
+    def step(self, threshold: float) -> None:
+        """Examine some boxes, and close those whose bounds do not exceed a threshold."""
+
+    def close(self) -> None:
+        """Stop what works beside it."""
+
+
 class _Gap(NamedTuple):
     """Largest difference of bound and incumbent, in the objective's unit, and whether it is a part of the incumbent."""
 
@@ -134,38 +178,22 @@ class _Search:
 
     Attributes:
         form: the form.
-        engine: examines boxes.
+        incumbent: the best feasible point known.
+        method: examines boxes.
         gap: as for :func:`certify_program`.
         above: as for :func:`certify_program`.
         began: time at the start.
-        recorder: records the search's tree for a proof.
-        incumbent: the best feasible point known.
-        opened: boxes to be examined.
-        current: boxes under examination; None between two blocks.
-        undivided: open boxes that are too small to bisect.
-        closed_bound: largest bound of all boxes that were closed because of their bounds.
-        boxes, nodes: number of boxes examined, and of nodes in the tree.
         history: (seconds, bound, incumbent) in the program's own sense.
     """
 
     form: StandardForm
-    engine: Engine
+    incumbent: Incumbent
+    method: SearchMethod
+    engine: str
     gap: float
     above: float | None
     began: float
-    recorder: ProofWriter | None
-
-    def __post_init__(self) -> None:
-        form = self.form
-        self.incumbent = Incumbent(form)
-        self.opened = OpenBoxes()
-        root = np.zeros(1, dtype=np.int64)
-        self.opened.push(Boxes(form.lower[:, None], form.upper[:, None], np.array([np.inf]), root))
-        self.current: Boxes | None = None
-        self.undivided: list[Boxes] = []
-        self.closed_bound = -math.inf
-        self.boxes, self.nodes = 0, 1
-        self.history: list[tuple[float, float, float]] = []
+    history: list[tuple[float, float, float]] = field(default_factory=list)
 
     @property
     def threshold(self) -> float:
@@ -193,18 +221,14 @@ class _Search:
     @property
     def bound(self) -> float:
         """Upper bound of the maximum, at this state of the search."""
-        others = [float(boxes.bound.max()) for boxes in self.undivided]
-        if self.current is not None:
-            others.append(float(self.current.bound.max()))
-        known = max(self.closed_bound, self.opened.bound, *others, self.incumbent.value)
+        known = max(self.method.bound, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
-        turn = 0
         reached(Milestone.BOUND)
-        while self.opened.count:
+        while self.method.is_open:
             if is_requested():
                 return "interrupted"
             if self._has_counterexample():
@@ -215,83 +239,10 @@ class _Search:
             if seconds - reported >= _REPORT_EVERY:
                 reported = seconds
                 self._report(seconds, progress)
-            self.current = self.opened.pop(self.engine.block if turn else 1)
-            turn += 1
-            found = self.engine.examine(self.current.lower, self.current.upper, self.threshold)
-            self._improve(found, turn)
-            self._branch(self.current, found)
-            self.current = None
-            undefined = [boxes for boxes in self.undivided if not np.isfinite(boxes.bound).all()]
-            if undefined:
-                return self._reason_without_bound(undefined[0])
-        return "boxes are left that are too small to cut" if self.undivided else ""
-
-    def _improve(self, found: Examination, turn: int) -> None:
-        """Improve the incumbent from the best centre of a block, or from the centre of the box with the largest bound.
-
-        The latter costs more, and is tried at turns 1, 2, 4, 8 and so on.
-        """
-        best = int(np.argmax(found.value))
-        if found.value[best] > self.incumbent.value:
-            self.incumbent.consider(found.centre[:, best])
-        if turn & (turn - 1) == 0:
-            self.incumbent.improve_near(found.centre[:, int(np.argmax(np.nan_to_num(found.bound, posinf=-math.inf)))])
-
-    def _branch(self, boxes: Boxes, found: Examination) -> None:
-        """Bisect the open boxes, and account for the others."""
-        threshold = self.threshold
-        closed = found.verdict == Verdict.BOUNDED
-        if closed.any():
-            self.closed_bound = max(self.closed_bound, float(found.bound[closed].max()))
-        if self._is_contracted_by_value(found):
-            self.closed_bound = max(self.closed_bound, threshold)
-        self.boxes += boxes.count
-        bound = np.fmin(found.bound, boxes.bound)
-        lower, upper, split = found.lower, found.upper, found.split
-        every = np.arange(boxes.count)
-        low, high = lower[split, every], upper[split, every]
-        middle = 0.5 * low + 0.5 * high
-        whole = (self.form.upper - self.form.lower)[:, None]
-        width = ((upper - lower) / whole).max(axis=0)
-        least = np.where(np.isfinite(bound), _LEAST_WIDTH, _SINGULAR_WIDTH)
-        is_open = found.verdict == Verdict.OPEN
-        small = is_open & ((width < least) | ~((low < middle) & (middle < high)))
-        # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
-        again = small & ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
-        once, done, cut = (np.flatnonzero(which) for which in (again, small & ~again, is_open & ~small))
-        first_child = np.full(boxes.count, -1, dtype=np.int64)
-        first_child[cut] = self.nodes + 2 * np.arange(cut.size)
-        first_child[once] = self.nodes + 2 * cut.size + np.arange(once.size)
-        self.nodes += 2 * cut.size + once.size
-        if self.recorder is not None:
-            is_cut = is_open & ~small
-            self.recorder.record(boxes, found, np.where(is_cut, middle, np.nan), first_child)
-        if done.size:
-            self.undivided.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[done]))
-        self.opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_child[once]))
-        left, right = upper[:, cut].copy(), lower[:, cut].copy()
-        columns = np.arange(cut.size)
-        left[split[cut], columns] = right[split[cut], columns] = middle[cut]
-        self.opened.push(
-            Boxes(
-                np.concatenate([lower[:, cut], right], axis=1),
-                np.concatenate([left, upper[:, cut]], axis=1),
-                np.concatenate([bound[cut], bound[cut]]),
-                np.concatenate([first_child[cut], first_child[cut] + 1]),
-            )
-        )
-
-    def _is_contracted_by_value(self, found: Examination) -> bool:
-        """Return whether a contraction excluded points because of their value, which is at most the threshold."""
-        count = len(self.form.functions)
-        return any(bool(((why >= 0) & (why < count)).any()) for why in (found.cut_lower, found.cut_upper))
-
-    def _reason_without_bound(self, boxes: Boxes) -> str:
-        """Return the reason for stopping at boxes without a finite bound, with the place of the first."""
-        which = int(np.argmin(np.isfinite(boxes.bound)))
-        point = 0.5 * (boxes.lower[:, which] + boxes.upper[:, which])
-        at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.form.names, point, strict=True))
-        return f"the expressions have no finite bound near {at}, as where a limb has zero length"
+            self.method.step(self.threshold)
+            if self.method.fault:
+                return self.method.fault
+        return "boxes are left that are too small to cut" if self.method.left else ""
 
     def _report(self, seconds: float, progress: CertifyProgress | None) -> None:
         """Report progress, and add to the history; a full history loses every second entry."""
@@ -301,15 +252,14 @@ class _Search:
                 del self.history[1::2]
             self.history.append((seconds, bound, incumbent))
         if progress is not None:
-            progress(seconds, bound, incumbent, self.boxes, self.opened.count)
+            progress(seconds, bound, incumbent, self.method.boxes, self.method.left)
 
     def certificate(self, reason: str) -> Certificate:
         """Return the certificate at this state of the search."""
         nlp, sign = self.form.nlp, self.form.sign
         seconds = time.perf_counter() - self.began
         self._report(seconds, None)
-        left = self.opened.count + sum(boxes.count for boxes in self.undivided)
-        left += 0 if self.current is None else self.current.count
+        left = self.method.left
         known = self.incumbent.x is not None
         if self._has_counterexample():
             status = CertificateStatus.REFUSED
@@ -335,8 +285,8 @@ class _Search:
             is_relative=is_relative,
             above=self.above,
             was_beaten=self.incumbent.was_beaten,
-            engine=self.engine.name,
-            boxes=self.boxes,
+            engine=self.engine,
+            boxes=self.method.boxes,
             open=left,
             seconds=seconds,
             reason=reason,

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .instructions import Op, Tape
 from .intervals import TINY, ULP, interval_product, widen
+from .tape import Op, Tape
 from .univariate import RULES
 
 if TYPE_CHECKING:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from .bounding import NumpyEngine, search_tape
-from .examination import Examination
-from .instructions import Tape
+from .examination import Examination, Verdict
+from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from .standardform import StandardForm
+from .tape import Tape
 
 if TYPE_CHECKING:
     from ...models import FloatArray
@@ -51,12 +52,13 @@ class KernelEngine:
         form: the form whose box is searched.
         module: the kernel.
         jobs: threads; one for each processor when left out.
+        shared: number of the first variables that the form, a limb's, shares with others.
     """
 
     name = "c"
 
-    def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None) -> None:
-        self._module = module
+    def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int = 0) -> None:
+        self._module, self._shared = module, shared
         self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
@@ -76,6 +78,33 @@ class KernelEngine:
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
         """Examine boxes: see :meth:`screwsynth.nlp.certificate.bounding.NumpyEngine.examine`."""
+        return self._examine(lower, upper, threshold, ())
+
+    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+        """Return upper models: see :class:`screwsynth.nlp.certificate.limbmodels.LimbEngine`."""
+        n, m = lower.shape[0], self._shared
+        rows = np.empty((rows_of_models(n, m), lower.shape[1]))
+        found = self._examine(lower, upper, -np.inf, (m, rows))
+        flags, L, sides = models_from_rows(rows, n, m)
+        closed = np.isin(found.verdict, (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED))
+        found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
+        return LimbModels(
+            is_possible=~closed,
+            defined=np.isin(flags, (1, 3)),
+            holds=flags >= 2,
+            lower=found.lower,
+            upper=found.upper,
+            L=L,
+            slope_lo=sides[:, 0],
+            slope_hi=sides[:, 1],
+            stops_up=sides[:, 2] > 0,
+            stops_down=sides[:, 3] > 0,
+            high=found.bound,
+            value=found.value,
+        )
+
+    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
+        """Examine boxes on all threads; with ``models`` the number of shared variables and an array for the models."""
         n, count = lower.shape
         verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
         cut_lower, cut_upper = np.empty((n, count), dtype=np.int32), np.empty((n, count), dtype=np.int32)
@@ -85,7 +114,7 @@ class KernelEngine:
         found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
         def examine_part(begin: int, finish: int) -> None:
-            self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold)
+            self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold, *models)
 
         pieces = self._jobs if count >= _WORTH_A_THREAD * self._jobs else 1
         edges = [count * k // pieces for k in range(pieces + 1)]
@@ -116,6 +145,11 @@ def kernel() -> ModuleType | None:
         return None
 
 
+def engine_name(name: str | None) -> str:
+    """Return the name of the engine that :func:`engine_for` takes."""
+    return name or ("numpy" if kernel() is None else "c")
+
+
 def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
     """Return an engine for a form.
 
@@ -136,3 +170,19 @@ def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = N
             raise ValueError("the C kernel was not built: numpy is there")
         return NumpyEngine(form)
     return KernelEngine(form, module, jobs)
+
+
+def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jobs: int | None = None) -> LimbEngine:
+    """Return an engine for the form of a limb, of whose variables the first ``shared`` are shared with others.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+        ValueError: there is no engine of that name here.
+    """
+    module = kernel()
+    if engine_name(name) == "c" and module is not None:
+        return KernelEngine(form, module, jobs, shared)
+    engine = engine_for(form, name, jobs)
+    if not isinstance(engine, NumpyEngine):
+        raise ValueError(f"there is no engine {name!r} for limbs")
+    return NumpyLimbEngine(engine, shared)

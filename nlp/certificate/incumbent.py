@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 
@@ -25,6 +26,20 @@ class IncumbentError(InputError):
     """The point that was given is not feasible, or does not have the value claimed."""
 
 
+class PointKeeper(Protocol):
+    """The best point known to a search of boxes."""
+
+    @property
+    def value(self) -> float:
+        """Value of the form there; -inf without a point."""
+
+    def consider(self, point: FloatArray) -> None:
+        """Keep a point (n,) if it is feasible and better."""
+
+    def improve_near(self, point: FloatArray) -> None:
+        """Correct a point (n,) towards an optimum, and keep the result if it is better."""
+
+
 class Incumbent:
     """The best feasible point known, and its value in the standard form.
 
@@ -34,12 +49,14 @@ class Incumbent:
     Attributes:
         x: (n,) the point in the form's variables; None without one.
         value: of the form there; -inf without a point.
+        size: number n of the form's variables.
     """
 
     def __init__(self, form: StandardForm) -> None:
         self._form = form
         self.x: FloatArray | None = None
         self.value = -math.inf
+        self.size = form.n
         self._given = math.nan
 
     @property

@@ -7,74 +7,17 @@ products), so that an arithmetic needs few rules. An operation without an identi
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ..errors import UncoveredError
+from .tape import Op, Tape
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ...models import FloatArray
-
-
-class Op(enum.IntEnum):
-    """Operations on registers ``r``: ``r[to] = ...`` from ``r[a]``, ``r[b]`` and the constant ``k``.
-
-    The numbers are those of ``_bounds.c``.
-    """
-
-    CONSTANT = 0  # k
-    INPUT = 1  # variable a
-    OUTPUT = 2  # result ``to`` is r[a]
-    ADD = 3  # r[a] + r[b]
-    SUB = 4  # r[a] - r[b]
-    MUL = 5  # r[a] * r[b]
-    DIV = 6  # r[a] / r[b]
-    SHIFT = 7  # r[a] + k
-    SCALE = 8  # r[a] * k
-    SQUARE = 9  # r[a]^2
-    SQRT = 10
-    SIN = 11
-    COS = 12
-    EXP = 13
-    LOG = 14
-    ATAN = 15
-
-
-@dataclass(frozen=True, eq=False)
-class Tape:
-    """A list of N instructions.
-
-    Attributes:
-        op: (N,) :class:`Op` of each instruction.
-        to: (N,) register written, or the index of the result for an output.
-        a, b: (N,) registers read, or the index of the variable for an input; 0 where there is none.
-        k: (N,) constants.
-        first, last: (N,) span of variables: the written value depends on no others than ``first <= i < last``.
-        inputs: number of variables.
-        outputs: number of results.
-        registers: number of registers.
-    """
-
-    op: NDArray[np.int32]
-    to: NDArray[np.int32]
-    a: NDArray[np.int32]
-    b: NDArray[np.int32]
-    k: FloatArray
-    first: NDArray[np.int32]
-    last: NDArray[np.int32]
-    inputs: int
-    outputs: int
-    registers: int
-
-    def __len__(self) -> int:
-        return len(self.op)
+    pass
 
 
 _SAME = {ca.OP_ADD: Op.ADD, ca.OP_SUB: Op.SUB, ca.OP_MUL: Op.MUL, ca.OP_DIV: Op.DIV}
@@ -237,7 +180,9 @@ def _write_operation(writer: _TapeWriter, op: int, to: int, source: list[int]) -
 def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
     """Write an operation as several others, by an identity that is exact for real numbers."""
     one = writer.temporary()
-    if op == ca.OP_INV:
+    if op in (ca.OP_FMAX, ca.OP_FMIN, ca.OP_LE, ca.OP_FABS, ca.OP_SIGN):
+        _write_kink(writer, op, to, a, b)
+    elif op == ca.OP_INV:
         writer.set_constant(one, 1.0)
         writer.write(Op.DIV, to, one, a)
     elif op == ca.OP_TAN:
@@ -251,12 +196,6 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
         writer.write(Op.SQUARE, other, b)
         writer.write(Op.ADD, one, one, other)
         writer.write(Op.SQRT, to, one)
-    elif op == ca.OP_FABS:
-        _write_size(writer, to, a)
-    elif op == ca.OP_SIGN:
-        # x / |x|, off 0: the derivative of |x|.
-        _write_size(writer, one, a)
-        writer.write(Op.DIV, to, a, one)
     elif op in (ca.OP_ASIN, ca.OP_ACOS):
         # asin y = atan(y / sqrt(1 - y^2)), acos y = pi/2 - asin y, for |y| < 1.
         writer.write(Op.SQUARE, one, a)
@@ -285,11 +224,47 @@ def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) ->
         raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
 
 
-def _write_size(writer: _TapeWriter, to: int, a: int) -> None:
-    """Write ``|x|`` as the root of ``x^2``, as the length of a vector with one component is."""
-    square = writer.temporary()
-    writer.write(Op.SQUARE, square, a)
-    writer.write(Op.SQRT, to, square)
+def _write_kink(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
+    """Write an operation with a kink or a step by a ramp or a step of one number.
+
+    fmax(a, b) = b + ramp(a - b), fmin(a, b) = b - ramp(b - a), (a <= b) = step(b - a), |a| = 2 ramp(a) - a, and the
+    sign of a is 2 step(a) - 1 where it is not 0.
+    """
+    other = writer.temporary()
+    if op == ca.OP_LE:
+        _write_difference(writer, other, b, a)
+        writer.write(Op.STEP, to, other)
+    elif op == ca.OP_SIGN:
+        writer.write(Op.STEP, other, a)
+        writer.write(Op.SCALE, other, other, k=2.0)
+        writer.write(Op.SHIFT, to, other, k=-1.0)
+    elif op == ca.OP_FABS:
+        writer.write(Op.RAMP, other, a)
+        writer.write(Op.SCALE, other, other, k=2.0)
+        writer.write(Op.SUB, to, other, a)
+    else:
+        # The constant is the one that is added, so that fmax(0, x) is a ramp of x and nothing else.
+        if a in writer.constant:
+            a, b = b, a
+        _write_difference(writer, other, *((a, b) if op == ca.OP_FMAX else (b, a)))
+        writer.write(Op.RAMP, other, other)
+        if op == ca.OP_FMIN:
+            writer.write(Op.SCALE, other, other, k=-1.0)
+        if b in writer.constant:
+            writer.write(Op.SHIFT, to, other, k=writer.constant[b])
+        else:
+            writer.write(Op.ADD, to, b, other)
+
+
+def _write_difference(writer: _TapeWriter, to: int, a: int, b: int) -> None:
+    """Write ``a - b`` for numbers of which at most one is constant."""
+    if b in writer.constant:
+        writer.write(Op.SHIFT, to, a, k=-writer.constant[b])
+    elif a in writer.constant:
+        writer.write(Op.SCALE, to, b, k=-1.0)
+        writer.write(Op.SHIFT, to, to, k=writer.constant[a])
+    else:
+        writer.write(Op.SUB, to, a, b)
 
 
 def _add_half_pi(writer: _TapeWriter, to: int) -> None:

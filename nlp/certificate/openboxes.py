@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,27 @@ if TYPE_CHECKING:
 
 #: With more open boxes than this the search is depth-first, so that it needs no more memory.
 _MANY = 2_000_000
+
+
+class _Chunk(Protocol):
+    """Boxes with bounds."""
+
+    @property
+    def bound(self) -> FloatArray:
+        """(B,) upper bounds."""
+
+    @property
+    def count(self) -> int:
+        """Number of boxes."""
+
+    def select(self, which: NDArray[np.intp]) -> Self:
+        """Return the boxes at some indices."""
+
+    def joined(self, others: list[Self]) -> Self:
+        """Return these boxes and those of others."""
+
+
+Chunk = TypeVar("Chunk", bound=_Chunk)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,44 +62,42 @@ class Boxes:
         """Return the boxes at some indices."""
         return Boxes(self.lower[:, which], self.upper[:, which], self.bound[which], self.place[which])
 
-
-def concatenate(parts: list[Boxes]) -> Boxes:
-    """Return all boxes of several parts, at least one."""
-    if len(parts) == 1:
-        return parts[0]
-    return Boxes(
-        np.concatenate([part.lower for part in parts], axis=1),
-        np.concatenate([part.upper for part in parts], axis=1),
-        np.concatenate([part.bound for part in parts]),
-        np.concatenate([part.place for part in parts]),
-    )
+    def joined(self, others: list[Boxes]) -> Boxes:
+        """Return these boxes and those of others."""
+        parts = [self, *others]
+        return Boxes(
+            np.concatenate([part.lower for part in parts], axis=1),
+            np.concatenate([part.upper for part in parts], axis=1),
+            np.concatenate([part.bound for part in parts]),
+            np.concatenate([part.place for part in parts]),
+        )
 
 
 @dataclass
-class OpenBoxes:
+class OpenBoxes(Generic[Chunk]):
     """Chunks of open boxes, ordered by their largest bound; of equal ones the newest comes first.
 
     Boxes without a finite bound are thus bisected before any others, depth-first. The search soon finds whether they
     are merely wide, or hold a point without a value.
     """
 
-    _heap: list[tuple[float, int, Boxes]] = field(default_factory=list)
+    _heap: list[tuple[float, int, Chunk]] = field(default_factory=list)
     _newest: int = 0
     count: int = 0
 
-    def push(self, boxes: Boxes) -> None:
+    def push(self, boxes: Chunk) -> None:
         """Add boxes."""
         if boxes.count:
             self._newest -= 1
             self.count += boxes.count
             heapq.heappush(self._heap, (-float(boxes.bound.max()), self._newest, boxes))
 
-    def pop(self, most: int) -> Boxes:
+    def pop(self, most: int) -> Chunk:
         """Remove and return boxes with the largest bounds, at most so many; there must be one.
 
         Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
         """
-        taken: list[Boxes] = []
+        taken: list[Chunk] = []
         room = most
         while self._heap and room:
             boxes = self._next()
@@ -89,9 +108,9 @@ class OpenBoxes:
                 boxes = boxes.select(order[:room])
             taken.append(boxes)
             room -= boxes.count
-        return concatenate(taken)
+        return taken[0].joined(taken[1:]) if len(taken) > 1 else taken[0]
 
-    def _next(self) -> Boxes:
+    def _next(self) -> Chunk:
         """Remove and return the chunk with the largest bound, or the newest one where there are many boxes."""
         if self.count <= _MANY:
             return heapq.heappop(self._heap)[2]

@@ -11,6 +11,10 @@ A proof holds the case as text, the statement of its program, the proven bound, 
     infeasible k       condition k holds nowhere in the box
     monotone i         no maximum lies in the box, because every function rises along variable i
 
+Where the limbs of a form share no variable, the tree may begin with the byte ``LIMBS``. For each limb then follow its
+bound and its tree, over its own variables, and the sum of the bounds must not exceed the proven one. A limb with the
+bound minus infinity has no feasible point, and then the trees of the others are bare leaves without a bound.
+
 The boxes therefore cover the root by construction, and a tree with too few or too many bytes is no proof. Expressions
 are counted from 0, the functions first and then the conditions. ``docs/certificate.md`` explains the reasons and why
 they suffice; :mod:`screwsynth.nlp.certificate.proofcheck` checks them.
@@ -34,7 +38,11 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 
 _FORMAT = "screwsynth-proof"
-_VERSION = 1
+_VERSION = 2
+#: Points at which a fingerprint takes a program's values, and the number of its sums.
+_POINTS, _SUMS = 3, 4
+#: Difference of the sums of one program in two processes: far more than rounding, far less than any change of a case.
+_SAME = 1e-9
 
 
 class Node(enum.IntEnum):
@@ -48,6 +56,7 @@ class Node(enum.IntEnum):
     BOUNDED = 6
     INFEASIBLE = 7
     MONOTONE = 8
+    LIMBS = 9
 
 
 class ProofError(InputError):
@@ -141,15 +150,34 @@ def read_proof(text: str, source: str) -> Proof:
 
 
 def fingerprint(nlp: Nlp) -> str:
-    """Return SHA-256 of a program's expressions, as CasADi lists their operations, and of its arguments and bounds."""
+    """Return a text that tells programs from each other: sizes, and sums of their values at a few points.
+
+    The same case may give graphs whose constants differ in the last bit, from one process to another, so that no hash
+    of the graph would do. A proof does not rest on it: the check shows every claim for the program that it has built.
+    """
     nlp = with_all_pairs(nlp)
     program = nlp.program
-    function = ca.Function("graph", [program.x, program.p], [ca.densify(program.objective), ca.densify(program.g)])
-    digest = hashlib.sha256()
-    for index in range(function.n_instructions()):
-        op, inputs = function.instruction_id(index), function.instruction_input(index)
-        constant = function.instruction_constant(index) if op == ca.OP_CONST else 0.0
-        digest.update(repr((op, inputs, function.instruction_output(index), float(constant).hex())).encode())
-    for numbers in (nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper, np.array([nlp.sign])):
-        digest.update(np.ascontiguousarray(numbers, dtype="<f8").tobytes())
-    return digest.hexdigest()
+    function = ca.Function("values", [program.x, program.p], [ca.densify(ca.vertcat(program.objective, program.g))])
+    rng = np.random.default_rng(0)
+    shares = rng.random((_POINTS, nlp.n))
+    points = [nlp.lower + share * (nlp.upper - nlp.lower) for share in shares]
+    values = [function(x, nlp.arguments).full().ravel() for x in points]
+    numbers = np.concatenate([*values, nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper])
+    # Each number counts by its size and by its sign; one that is not finite by a constant.
+    known = np.isfinite(numbers)
+    parts = np.where(known, numbers / (1 + np.abs(np.where(known, numbers, 0.0))), np.where(numbers > 0, 2.0, -2.0))
+    sums = rng.normal(size=(_SUMS, numbers.size)) @ parts
+    return " ".join([str(nlp.n), str(len(nlp.g_lower)), str(int(nlp.sign)), *(f"{each:.12e}" for each in sums)])
+
+
+def is_same_program(one: str, other: str) -> bool:
+    """Return whether two fingerprints are of the same program, to rounding."""
+    first, second = one.split(), other.split()
+    if first[:3] != second[:3] or len(first) != len(second):
+        return False
+    try:
+        return bool(
+            np.allclose([float(each) for each in first], [float(each) for each in second], rtol=_SAME, atol=_SAME)
+        )
+    except ValueError:
+        return False

@@ -14,19 +14,24 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models import FloatArray
 from ..program.nlp import Nlp
-from .proof import Node, Proof, ProofError, fingerprint
-from .prooftree import Claim, read_claims
-from .slopebounds import quadratic_bound
+from .proof import Node, Proof, ProofError, fingerprint, is_same_program
+from .prooftree import Claim, read_parts
+from .slopebounds import sum_model
+from .slopecut import cut_off
 from .slopes import Slope, SlopeArithmetic
+from .slopeweights import lagrangian_weights
 from .standardform import StandardForm, standard_form
 
 #: Number of boxes that are evaluated at once.
 _BLOCK = 512
 #: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
 _MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
+#: Error of a difference of two rounded numbers, in parts of their sizes.
+_SUMS = 1e-13
 #: Callback with the number of claims checked, and of those to be checked.
 CheckProgress = Callable[[int, int], None]
 
@@ -57,39 +62,57 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     Raises:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
     """
-    if fingerprint(nlp) != proof.graph:
+    if not is_same_program(fingerprint(nlp), proof.graph):
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     bound = -np.inf if proof.bound is None else proof.bound
-    claims = read_claims(proof.tree, form)
-    checker = _Checker(form, bound)
-    pieces = 0
-    groups: dict[tuple[Node, int], list[Claim]] = {}
-    for claim in claims:
-        groups.setdefault((claim.kind, claim.index), []).append(claim)
-    done = 0
-    for (kind, index), group in groups.items():
-        for start in range(0, len(group), 4 * _BLOCK):
-            part = group[start : start + 4 * _BLOCK]
-            pieces += checker.show(kind, index, part)
-            done += len(part)
-            if progress is not None:
-                progress(done, len(claims) - done)
-    return VerifiedProof(len(claims), pieces, bound)
+    parts = read_parts(proof.tree, form, bound)
+    leaves, pieces, done = sum(len(part.claims) for part in parts), 0, 0
+    for part in parts:
+        checker = _Checker(part.form, part.bound)
+        groups: dict[tuple[Node, int], list[Claim]] = {}
+        for claim in part.claims:
+            groups.setdefault((claim.kind, claim.index), []).append(claim)
+        for (kind, index), group in groups.items():
+            for start in range(0, len(group), 4 * _BLOCK):
+                some = group[start : start + 4 * _BLOCK]
+                pieces += checker.show(kind, index, some)
+                done += len(some)
+                if progress is not None:
+                    progress(done, leaves - done)
+    return VerifiedProof(leaves, pieces, bound)
+
+
+class _Shown(NamedTuple):
+    """What is shown of a claim on N boxes.
+
+    Attributes:
+        holds: (N,) whether the claim is shown.
+        change: (n, N) how much the claim can gain from halving each variable.
+        lower, upper: (n, N) ends of the part of each box that is left to be shown; crossed where nothing is.
+    """
+
+    holds: NDArray[np.bool_]
+    change: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
 class _Attempt(NamedTuple):
-    """An attempt to show a claim on N boxes, (N,) each.
+    """An attempt to show a claim on N boxes.
 
     Attributes:
-        holds: whether the claim is shown.
-        is_wrong: whether a box's centre shows that the claim is wrong.
-        along: the variable to bisect.
+        holds: (N,) whether the claim is shown.
+        is_wrong: (N,) whether a box's centre shows that the claim is wrong.
+        along: (N,) the variable to bisect.
+        lower, upper: (n, N) ends of the part of each box that is left to be shown.
     """
 
     holds: FloatArray
     is_wrong: FloatArray
     along: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
 class _Checker:
@@ -127,7 +150,7 @@ class _Checker:
             a, b, of, deep = lower[:, part], upper[:, part], owner[part], depth[part]
             np.add.at(used, of, 1)
             total += size
-            holds, is_wrong, along = self._attempt(kind, index, a, b)
+            holds, is_wrong, along, a, b = self._attempt(kind, index, a, b)
             left = np.logical_not(holds)
             at_limit = (used[of] > _MOST_PIECES) | (deep >= _MOST_BISECTIONS)
             failed = np.logical_and(left, np.logical_or(is_wrong, at_limit))
@@ -166,37 +189,21 @@ class _Checker:
         expressions, derivatives = values[: self._count], values[self._count :]
         n = self._form.n
         gradients = [derivatives[r * n : (r + 1) * n] for r in range(self._count)]
-        radius = 0.5 * (upper - lower)
         with np.errstate(all="ignore"):
             if kind == Node.BOUNDED:
-                holds = self._shows_bound(expressions, gradients, lower, upper)
-                decisive = 0
+                shown = self._show_bound(expressions, gradients, lower, upper)
             elif kind == Node.INFEASIBLE:
-                sign = 1.0 if not self._equation[index] else None
-                holds = self._shows_infeasible(expressions[index], gradients[index], lower, upper, sign)
-                decisive = index
+                shown = self._show_infeasible(index, expressions[index], gradients[index], lower, upper)
             else:
-                holds, decisive = self._shows_monotone(kind, index, expressions, gradients, lower, upper), 0
-            if kind in (Node.BOUNDED, Node.INFEASIBLE):
-                # The bound is wide by the slopes of the gradient, and less by the gradient itself.
-                weight = np.array(
-                    [
-                        sum(
-                            np.fmax(np.abs(g.S[0][i]), np.abs(g.S[1][i])) * radius[k]
-                            for k, g in enumerate(gradients[decisive])
-                        )
-                        + 0.3 * np.fmax(np.abs(gradients[decisive][i].V[0]), np.abs(gradients[decisive][i].V[1]))
-                        for i in range(n)
-                    ]
-                )
-            else:
-                slopes = [gradients[r][index].S for r in range(self._functions)]
-                weight = np.max([np.fmax(np.abs(low), np.abs(high)) for low, high in slopes], axis=0)
-            score = weight * radius
+                shown = self._show_monotone(kind, index, expressions, gradients, lower, upper)
+            holds = np.logical_or(shown.holds, (shown.lower > shown.upper).any(axis=0))
+            radius = 0.5 * (shown.upper - shown.lower)
+            part = radius / np.where(upper > lower, 0.5 * (upper - lower), 1.0)
+            score = shown.change * part
             relative = radius / (self._form.upper - self._form.lower)[:, None]
             score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
         is_wrong = self._is_wrong_at_centre(kind, index, expressions, gradients)
-        return _Attempt(holds, is_wrong, np.asarray(score.argmax(axis=0)))
+        return _Attempt(holds, is_wrong, np.asarray(score.argmax(axis=0)), shown.lower, shown.upper)
 
     def _is_wrong_at_centre(
         self, kind: Node, index: int, expressions: list[Slope], gradients: list[list[Slope]]
@@ -223,35 +230,66 @@ class _Checker:
             excluded.append(stopped)
         return np.asarray(np.all(excluded, axis=0))
 
-    def _shows_bound(
+    def _feasible_part(
+        self, expressions: list[Slope], lower: FloatArray, upper: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return ends (n, N) of the part of each box where no single condition excludes a point; crossed if none is."""
+        low, high = lower, upper
+        for each, is_equation in zip(expressions[self._functions :], self._equation[self._functions :], strict=True):
+            (C_low, C_high), (S_low, S_high) = each.C, each.S
+            ends = [cut_off(C_low, S_low, S_high, lower, upper)]
+            if is_equation:
+                ends.append(cut_off(-C_high, -S_high, -S_low, lower, upper))
+            for below, above in ends:
+                low, high = np.fmax(low, below), np.fmin(high, above)
+        return low, high
+
+    def _show_bound(
         self, expressions: list[Slope], gradients: list[list[Slope]], lower: FloatArray, upper: FloatArray
-    ) -> FloatArray:
-        """Return whether no feasible point has a value above the bound.
+    ) -> _Shown:
+        """Show that no feasible point has a value above the bound.
 
         A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound.
         """
         J = self._functions
-        least = np.min([expression.V[1] for expression in expressions[:J]], axis=0)
-        holds = least <= self._bound
+        defined = np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0)
+        holds = np.min([expression.V[1] for expression in expressions[:J]], axis=0) <= self._bound
         for expression, is_equation in zip(expressions[J:], self._equation[J:], strict=True):
             holds |= (expression.V[0] > 0) | (is_equation & (expression.V[1] < 0))
+        low, high = self._feasible_part(expressions, lower, upper)
+        change = np.zeros_like(lower)
         if not holds.all():
-            weights = self._multipliers(expressions, gradients, upper - lower)
-            holds |= quadratic_bound(weights, expressions, gradients, lower, upper) <= self._bound
+            for weights in lagrangian_weights(J, self._equation, expressions, gradients, 0.5 * (upper - lower)):
+                L = sum_model(weights, expressions, gradients, lower, upper)
+                holds |= L.bound() <= self._bound
+                change = np.fmax(change, L.change())
+                # Points where the sum is at most the bound need no more: the others are left.
+                above = self._bound - L.total - _SUMS * (abs(self._bound) + np.abs(L.total))
+                ends = cut_off(above, -L.slope_high, -L.slope_low, lower, upper)
+                low, high = np.fmax(low, ends[0]), np.fmin(high, ends[1])
         # Where a function may have no value, no sum bounds it.
-        return np.asarray(holds & np.all([np.isfinite(expression.V[1]) for expression in expressions[:J]], axis=0))
+        low, high = np.where(defined, low, lower), np.where(defined, high, upper)
+        return _Shown(np.asarray(holds & defined, dtype=bool), change, low, high)
 
-    def _shows_infeasible(
-        self, condition: Slope, gradient: list[Slope], lower: FloatArray, upper: FloatArray, sign: float | None
-    ) -> FloatArray:
-        """Return whether a condition is positive on the whole box; for an equation, positive or negative."""
-        holds = (condition.V[0] > 0) | ((condition.V[1] < 0) if sign is None else False)
-        for direction in (-1.0,) if sign is not None else (-1.0, 1.0):
+    def _show_infeasible(
+        self, r: int, condition: Slope, gradient: list[Slope], lower: FloatArray, upper: FloatArray
+    ) -> _Shown:
+        """Show that a condition is positive on the whole box; for an equation, positive or negative."""
+        (C_low, C_high), (S_low, S_high) = condition.C, condition.S
+        holds, change = condition.V[0] > 0, np.zeros_like(lower)
+        low, high = cut_off(C_low, S_low, S_high, lower, upper)
+        if self._equation[r]:
+            holds |= condition.V[1] < 0
+            ends = cut_off(-C_high, -S_high, -S_low, lower, upper)
+            low, high = np.fmax(low, ends[0]), np.fmin(high, ends[1])
+        for direction in (-1.0, 1.0) if self._equation[r] else (-1.0,):
             weights = np.full((1, lower.shape[1]), direction)
-            holds |= quadratic_bound(weights, [condition], [gradient], lower, upper) < 0
-        return np.asarray(holds)
+            sign = sum_model(weights, [condition], [gradient], lower, upper)
+            holds |= sign.bound() < 0
+            change = sign.change()
+        return _Shown(np.asarray(holds, dtype=bool), change, low, high)
 
-    def _shows_monotone(
+    def _show_monotone(
         self,
         kind: Node,
         i: int,
@@ -259,10 +297,13 @@ class _Checker:
         gradients: list[list[Slope]],
         lower: FloatArray,
         upper: FloatArray,
-    ) -> FloatArray:
-        """Return whether every function rises along a variable in a direction that no condition and no face stops."""
+    ) -> _Shown:
+        """Show that every function rises along a variable in a direction that no condition and no face stops."""
         form, J = self._form, self._functions
         holds = np.zeros(lower.shape[1], dtype=bool)
+        radius = 0.5 * (upper - lower)
+        steep = np.max([np.fmax(np.abs(each[i].S[0]), np.abs(each[i].S[1])) for each in gradients[:J]], axis=0)
+        change = steep * radius
         sides = {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(kind, (1, -1))
         for side in sides:
             rises = np.ones_like(holds)
@@ -274,46 +315,11 @@ class _Checker:
                     free = expressions[r].V[1] < 0
                     if not self._equation[r]:
                         free |= (high < 0) if side > 0 else (low > 0)
+                    # The functions rise, and this condition may stop a point: it decides where to cut.
+                    reach = np.fmax(np.abs(expressions[r].S[0]), np.abs(expressions[r].S[1])) * radius
+                    change = np.where(rises & ~free, reach, change)
                     rises &= free
             if kind == Node.MONOTONE:
                 rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
             holds |= rises
-        return holds
-
-    def _multipliers(self, expressions: list[Slope], gradients: list[list[Slope]], width: FloatArray) -> FloatArray:
-        """Return weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
-
-        All such weights give bounds. These make the gradient at the centre small, by projected gradient descent.
-        """
-        J, R = self._functions, self._count
-        G = np.array([[0.5 * (g.C[0] + g.C[1]) for g in row] for row in gradients]) * width
-        G = np.where(np.isfinite(G), G, 0.0)
-        weights = np.zeros((R, width.shape[1]))
-        weights[:J] = 1.0 / J
-        for r in range(J, R):
-            if not self._equation[r]:
-                # A condition that cannot bind gets no weight.
-                G[r] = np.where(expressions[r].V[1] < 0, 0.0, G[r])
-        if R == 1:
-            return weights
-        lipschitz = np.maximum((G * G).sum(axis=(0, 1)), 1e-300)
-        for _ in range(200):
-            left = np.einsum("rb,rib->ib", weights, G)
-            step = np.einsum("rib,ib->rb", G, left) / lipschitz
-            weights -= step
-            weights[:J] = _project_on_simplex(weights[:J])
-            for r in range(J, R):
-                if not self._equation[r]:
-                    weights[r] = np.minimum(weights[r], 0.0)
-        return weights
-
-
-def _project_on_simplex(weights: FloatArray) -> FloatArray:
-    """Return the nearest columns (J, N) that are not negative and sum to 1."""
-    ordered = -np.sort(-weights, axis=0)
-    sums = np.cumsum(ordered, axis=0) - 1
-    counts = np.arange(1, len(weights) + 1)[:, None]
-    last = np.maximum((ordered - sums / counts > 0).sum(axis=0), 1)
-    level = sums[last - 1, np.arange(weights.shape[1])] / last
-    positive = np.maximum(weights - level, 0.0)
-    return np.asarray(positive / positive.sum(axis=0))
+        return _Shown(np.asarray(holds, dtype=bool), change, *self._feasible_part(expressions, lower, upper))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,10 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .proof import Node, ProofError
+from .separation import separate
 from .standardform import StandardForm
 
 if TYPE_CHECKING:
     from ...models import FloatArray
+
+
+#: Rounding of a sum of a few bounds, in parts of their sizes: many times the largest possible.
+_SUM = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +37,52 @@ class Claim:
     upper: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Claims about the box of one form: of the whole one, or of a limb.
+
+    Attributes:
+        form: the form.
+        bound: the bound of the form's value that the claims prove; -inf where there is no feasible point.
+        claims: the claims.
+    """
+
+    form: StandardForm
+    bound: float
+    claims: list[Claim]
+
+
+def read_parts(tree: bytes, form: StandardForm, bound: float) -> list[Part]:
+    """Read the parts of a tree, which together prove a bound of a form's value.
+
+    Raises:
+        ProofError: the bytes are no tree, or the bounds of limbs do not add up.
+    """
+    if tree[:1] != bytes([Node.LIMBS]):
+        return [Part(form, bound, read_claims(tree, form))]
+    separation = separate(form)
+    if separation is None or separation.shared:
+        raise ProofError("the tree is one of limbs without shared variables, which the case does not have")
+    parts, at = [], 1
+    for limb in separation.limbs:
+        if at + 8 > len(tree):
+            raise ProofError("the tree ends before every box is closed")
+        (own,) = struct.unpack("<d", tree[at : at + 8])
+        reader = TreeReader(tree, limb.form, at + 8)
+        reader.read_tree()
+        parts.append(Part(limb.form, own, reader.claims))
+        at = reader.at
+    if at != len(tree):
+        raise ProofError("the tree goes on after every box is closed")
+    empty = [part for part in parts if part.bound == -np.inf]
+    if empty:
+        return empty
+    bounds = [*(part.bound for part in parts), separation.constant]
+    if not math.fsum(bounds) + _SUM * math.fsum(map(abs, bounds)) <= bound:
+        raise ProofError("the bounds of the limbs are more than the proven one together")
+    return parts
+
+
 def read_claims(tree: bytes, form: StandardForm) -> list[Claim]:
     """Read the claims of a tree; their boxes cover the form's.
 
@@ -38,9 +90,7 @@ def read_claims(tree: bytes, form: StandardForm) -> list[Claim]:
         ProofError: the bytes are no tree.
     """
     reader = TreeReader(tree, form)
-    waiting = [(np.array(form.lower), np.array(form.upper))]
-    while waiting:
-        waiting += reader.read_node(*waiting.pop())
+    reader.read_tree()
     if reader.at != len(tree):
         raise ProofError("the tree goes on after every box is closed")
     return reader.claims
@@ -54,11 +104,21 @@ class TreeReader:
         claims: the claims of the nodes read.
     """
 
-    def __init__(self, tree: bytes, form: StandardForm) -> None:
+    def __init__(self, tree: bytes, form: StandardForm, at: int = 0) -> None:
         self._tree, self._form = tree, form
         self._conditions = range(len(form.functions), len(form.functions) + len(form.conditions))
-        self.at = 0
+        self.at = at
         self.claims: list[Claim] = []
+
+    def read_tree(self) -> None:
+        """Read all nodes of the tree of the form's box.
+
+        Raises:
+            ProofError: the bytes are no tree.
+        """
+        waiting = [(np.array(self._form.lower), np.array(self._form.upper))]
+        while waiting:
+            waiting += self.read_node(*waiting.pop())
 
     def _read_bytes(self, count: int) -> bytes:
         self.at += count

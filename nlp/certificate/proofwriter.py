@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,11 +18,22 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 
 
+#: Part of itself by which the bound of a limb moves outwards: half as much as that of the whole.
+_OUTWARDS = 5e-13
+
+
 class _NodeRecord(NamedTuple):
     """Bytes of a node, and the nodes of its children, the next one in preorder last."""
 
     text: bytes
     following: list[int]
+
+
+class _LimbRecord(NamedTuple):
+    """Record of a limb's tree, and the function that returns its bound."""
+
+    writer: ProofWriter
+    bound: Callable[[], float]
 
 
 class ProofWriter:
@@ -34,6 +46,30 @@ class ProofWriter:
     def __init__(self, functions: int) -> None:
         self._functions = functions
         self._nodes: dict[int, _NodeRecord] = {}
+        self._limbs: list[_LimbRecord] = []
+
+    def limb(self, bound: Callable[[], float]) -> ProofWriter:
+        """Return the record of the next limb's tree; the tree of the whole is that of its limbs then.
+
+        Args:
+            bound: returns the limb's bound at the end of the search; -inf without a feasible point.
+        """
+        writer = ProofWriter(self._functions)
+        self._limbs.append(_LimbRecord(writer, bound))
+        return writer
+
+    def _tree_of_limbs(self) -> bytes:
+        """Return the limbs' bounds and trees."""
+        bounds = [each.bound() for each in self._limbs]
+        parts = [bytes([Node.LIMBS])]
+        for each, bound in zip(self._limbs, bounds, strict=True):
+            if bound == -np.inf:
+                parts += [struct.pack("<d", bound), each.writer.tree()]
+            elif -np.inf in bounds:
+                parts += [struct.pack("<d", np.inf), bytes([Node.BOUNDED])]
+            else:
+                parts += [struct.pack("<d", bound + _OUTWARDS * abs(bound)), each.writer.tree()]
+        return b"".join(parts)
 
     def record(self, boxes: Boxes, found: Examination, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
         """Record a block of examined boxes.
@@ -58,6 +94,8 @@ class ProofWriter:
         Raises:
             ProofError: a box is not closed.
         """
+        if self._limbs:
+            return self._tree_of_limbs()
         parts: list[bytes] = []
         waiting = [0]
         while waiting:

@@ -16,6 +16,8 @@ from .intervals import TINY, ULP
 if TYPE_CHECKING:
     from ...models import FloatArray
 
+#: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.
+_TANGENT_ROUNDS = 3
 #: Part of its terms by which a quadratic's level is lowered before its roots: far more than their rounding.
 _ROOT_SLACK = 1e-12
 
@@ -107,14 +109,33 @@ class QuadraticModel:
     slope_hi: FloatArray
     rounding: FloatArray
 
-    def ends_reaching(self, level: float) -> Ends:
-        """Return the ends of the ``e_i`` for which the model can reach a level, for any other ``e_j``."""
+    def bound(self) -> FloatArray:
+        """Return an upper bound (B,) over the box."""
+        mean = self.middle + np.maximum(np.abs(self.slope_lo), np.abs(self.slope_hi)).sum(axis=0)
+        # Where the slope has a sign, the largest value is on that face.
+        s = np.where(self.slope_lo >= 0, 1.0, np.where(self.slope_hi <= 0, -1.0, 0.0))
+        free = s == 0
+        Hs = np.einsum("ijb,jb->ib", self.H, s)
+        fixed = self.middle + (self.b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0) + (self.w * np.abs(s)).sum(axis=0)
+        b = np.where(free, self.b + Hs, 0.0)
+        w = np.where(free, self.w, 0.0)
+        H = np.where(free[:, None] & free[None], self.H, 0.0)
+        diagonal = np.einsum("iib->ib", H).copy()
+        others = np.abs(H).sum(axis=1) - np.abs(diagonal)
+        separate = fixed + (largest_on_unit_interval(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
+        shift = np.maximum(diagonal + others, 0.0)
+        tangent = fixed + _tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
+        best = np.fmin(mean, np.fmin(separate, tangent))
+        return np.asarray(best + self.rounding)
+
+    def ends_reaching(self, level: float | FloatArray) -> Ends:
+        """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
         diagonal = np.einsum("iib->ib", self.H)
         others = np.abs(self.H).sum(axis=(0, 1)) - np.abs(diagonal).sum(axis=0)
         most = largest_on_unit_interval(np.abs(self.b) + self.w, diagonal)
         total = self.middle + self.rounding + 0.5 * others + most.sum(axis=0)
         need = level - (total - most)
-        size = np.abs(need) + np.abs(self.b) + self.w + np.abs(diagonal) + np.abs(total) + abs(level)
+        size = np.abs(need) + np.abs(self.b) + self.w + np.abs(diagonal) + np.abs(total) + np.abs(level)
         need = need - (_ROOT_SLACK * size + TINY)
         right_first, right_last = _ends_of_solutions(self.b + self.w, diagonal, need)
         left_first, left_last = _ends_of_solutions(-self.b + self.w, diagonal, need)
@@ -147,6 +168,30 @@ def largest_on_unit_interval(linear: FloatArray, quadratic: FloatArray) -> Float
     inside = (quadratic < 0) & (linear < -quadratic)
     peak = np.where(inside, linear * linear / np.where(inside, -2 * quadratic, 1.0), 0.0)
     return np.where(inside, peak, linear + 0.5 * quadratic)
+
+
+def _tangent(b: FloatArray, H: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """Return the largest value over the box of a tangent plane to the concave ``b e + 1/2 e' C e``.
+
+    ``C`` is ``H`` with another diagonal. A tangent plane of a concave function is nowhere below it; this one
+    touches it near its maximum.
+    """
+    n = len(b)
+    t = np.zeros_like(b)
+    gradient = b.copy()
+    for _ in range(_TANGENT_ROUNDS):
+        for i in range(n):
+            curvature = diagonal[i]
+            new = np.where(curvature < 0, t[i] - gradient[i] / curvature, np.sign(gradient[i]))
+            new = np.clip(np.where(np.isfinite(new), new, 0.0), -1.0, 1.0)
+            change = new - t[i]
+            t[i] = new
+            gradient += change * H[i]
+            gradient[i] += change * (curvature - H[i, i])
+    # The plane at t: b t + 1/2 t'Ct + gradient (e - t), where gradient = b + C t.
+    Ct = np.einsum("ijb,jb->ib", H, t) + (diagonal - np.einsum("iib->ib", H)) * t
+    gradient = b + Ct
+    return np.asarray(-0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0))
 
 
 def _integrate(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,14 +17,49 @@ if TYPE_CHECKING:
 _SUMS = 1e-13
 
 
-def quadratic_bound(
+@dataclass(frozen=True, eq=False)
+class SumModel:
+    """An upper model ``fixed + b e + 1/2 e'He`` of a weighted sum over N boxes, e in [-1, 1]^n.
+
+    Attributes:
+        total: (N,) upper bound of the sum at the centre.
+        fixed: (N,) the same, with the widths of all intervals and rounding.
+        b: (n, N).
+        H: (n, n, N) symmetric.
+        slope_low, slope_high: (n, N) gradient over the box.
+        radius: (n, N) half widths, rounded up.
+    """
+
+    total: FloatArray
+    fixed: FloatArray
+    b: FloatArray
+    H: FloatArray
+    slope_low: FloatArray
+    slope_high: FloatArray
+    radius: FloatArray
+
+    def bound(self) -> FloatArray:
+        """Return an upper bound (N,) over the boxes."""
+        steep = np.maximum(np.abs(self.slope_low), np.abs(self.slope_high))
+        mean = self.total + (steep * self.radius).sum(axis=0) * (1 + _SUMS) + _SUMS * np.abs(self.total)
+        # Where the sum rises along a variable on the whole box, it is largest on that face.
+        margin = _SUMS * steep
+        s = np.where(self.slope_low - margin > 0, 1.0, np.where(self.slope_high + margin < 0, -1.0, 0.0))
+        return np.asarray(np.fmin(mean, self.fixed + _largest(self.b, self.H, s)))
+
+    def change(self) -> FloatArray:
+        """Return how much (n, N) the bound can gain from halving each variable."""
+        return np.asarray(np.abs(self.H).sum(axis=0) + 0.3 * np.abs(self.b))
+
+
+def sum_model(
     weights: FloatArray,
     expressions: Sequence[Slope],
     gradients: Sequence[Sequence[Slope]],
     lower: FloatArray,
     upper: FloatArray,
-) -> FloatArray:
-    """Return an upper bound (N,) over boxes of a weighted sum of expressions, from the slopes of its gradient.
+) -> SumModel:
+    """Return the upper model of a weighted sum of expressions over boxes, from the slopes of its gradient.
 
     ``L(c + h) in L(c) + g h + 1/2 h'S h``, with intervals for ``g`` and ``S``.
 
@@ -42,6 +78,8 @@ def quadratic_bound(
     sizes = np.zeros(N)
     for weight, expression, gradient in zip(weights, expressions, gradients, strict=True):
         used, positive = weight != 0, weight >= 0
+        if not used.any():
+            continue
         ends = (expression.C[0], expression.C[1])
         total += np.where(used, weight * np.where(positive, ends[1], ends[0]), 0.0)
         sizes += np.where(used, np.abs(weight * ends[0]), 0.0)
@@ -50,6 +88,7 @@ def quadratic_bound(
                 one, other = np.where(positive, source[0], source[1]), np.where(positive, source[1], source[0])
                 low[i] += np.where(used, weight * one, 0.0)
                 high[i] += np.where(used, weight * other, 0.0)
+    total = total + _SUMS * sizes
     S_low, S_high = S_low * r[:, None] * r[None], S_high * r[:, None] * r[None]
     S_low, S_high = 0.5 * (S_low + S_low.swapaxes(0, 1)), 0.5 * (S_high + S_high.swapaxes(0, 1))
     H, loose = 0.5 * (S_low + S_high), 0.5 * (S_high - S_low).sum(axis=(0, 1))
@@ -57,12 +96,7 @@ def quadratic_bound(
     spread = (0.5 * (b_high - b_low) * r).sum(axis=0)
     sizes = sizes + np.abs(b).sum(axis=0) + np.abs(S_low).sum(axis=(0, 1)) + np.abs(S_high).sum(axis=(0, 1))
     fixed = total + 0.5 * loose + spread + _SUMS * sizes
-    across = np.maximum(np.abs(slope_low), np.abs(slope_high)) * r
-    mean = total + across.sum(axis=0) * (1 + _SUMS) + _SUMS * np.abs(total)
-    margin = _SUMS * np.maximum(np.abs(slope_low), np.abs(slope_high))
-    # Where the sum rises along a variable on the whole box, it is largest on that face.
-    s = np.where(slope_low - margin > 0, 1.0, np.where(slope_high + margin < 0, -1.0, 0.0))
-    return np.asarray(np.fmin(mean, fixed + _largest(b, H, s)))
+    return SumModel(total, fixed, b, H, slope_low, slope_high, r)
 
 
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:

@@ -219,6 +219,34 @@ class _Boxes:
     def one(self) -> Slope:
         return self.constant(1.0)
 
+    def ramp(self, u: Slope) -> Slope:
+        """Return max(u, 0): a difference of it is that of u times a number from 0 to 1."""
+        low, high = np.minimum(u.V[0], u.C[0]), np.maximum(u.V[1], u.C[1])
+        part = np.where(low >= 0, 1.0, 0.0), np.where(high <= 0, 0.0, 1.0)
+        V, C = ((np.maximum(ends[0], 0.0), np.maximum(ends[1], 0.0)) for ends in (u.V, u.C))
+        return self.slope(V, C, _mul(u.S, part))
+
+    def step(self, u: Slope) -> Slope:
+        """Return 1 where u is not negative, else 0; where it is not known which, there is no slope."""
+        V, C = ((np.where(ends[0] > 0, 1.0, 0.0), np.where(ends[1] < 0, 0.0, 1.0)) for ends in (u.V, u.C))
+        defined = np.isfinite(u.V[0]) & np.isfinite(u.V[1])
+        V = np.where(defined, V[0], np.nan), np.where(defined, V[1], np.nan)
+        flat = np.broadcast_to(np.where(defined & (V[0] == V[1]), 0.0, np.nan), u.S[0].shape)
+        return Slope(V, C, (flat, flat))
+
+    def fmax(self, u: Slope, v: Slope) -> Slope:
+        V, C = ((np.maximum(a[0], b[0]), np.maximum(a[1], b[1])) for a, b in ((u.V, v.V), (u.C, v.C)))
+        return self.slope(V, C, self.add(v, self.ramp(self.sub(u, v))).S)
+
+    def fmin(self, u: Slope, v: Slope) -> Slope:
+        return self.scale(self.fmax(self.scale(u, -1.0), self.scale(v, -1.0)), -1.0)
+
+    def sign(self, u: Slope) -> Slope:
+        return self.sub(self.scale(self.step(u), 2.0), self.one())
+
+    def fabs(self, u: Slope) -> Slope:
+        return self.sub(self.scale(self.ramp(u), 2.0), u)
+
     def atan(self, u: Slope) -> Slope:
         return self.smooth(u, _ATAN, lambda x: _inverse(_add(_square(x), (np.array(1.0), np.array(1.0)))))
 
@@ -250,10 +278,6 @@ class _Boxes:
     def hypot(self, y: Slope, x: Slope) -> Slope:
         return self.sqrt(self.add(self.square(y), self.square(x)))
 
-    def size(self, u: Slope) -> Slope:
-        """Return ``|u|``, as the root of the square."""
-        return self.sqrt(self.square(u))
-
     def sin(self, u: Slope) -> Slope:
         return self.smooth(u, lambda x: _wave(x, np.sin), lambda x: _wave(x, np.cos))
 
@@ -271,8 +295,6 @@ _UNARY: dict[int, Callable[[_Boxes, Slope], Slope]] = {
     ca.OP_TWICE: lambda at, u: at.scale(u, 2.0),
     ca.OP_SQ: _Boxes.square,
     ca.OP_SQRT: _Boxes.sqrt,
-    ca.OP_FABS: _Boxes.size,
-    ca.OP_SIGN: lambda at, u: at.div(u, at.size(u)),
     ca.OP_INV: lambda at, u: at.div(at.one(), u),
     ca.OP_SIN: _Boxes.sin,
     ca.OP_COS: _Boxes.cos,
@@ -281,6 +303,8 @@ _UNARY: dict[int, Callable[[_Boxes, Slope], Slope]] = {
     ca.OP_ASIN: _Boxes.asin,
     ca.OP_ACOS: _Boxes.acos,
     ca.OP_EXP: lambda at, u: at.smooth(u, _EXP, _EXP),
+    ca.OP_FABS: _Boxes.fabs,
+    ca.OP_SIGN: _Boxes.sign,
     ca.OP_LOG: lambda at, u: at.smooth(u, _log, _inverse),
 }
 _BINARY: dict[int, Callable[[_Boxes, Slope, Slope], Slope]] = {
@@ -292,4 +316,7 @@ _BINARY: dict[int, Callable[[_Boxes, Slope, Slope], Slope]] = {
     ca.OP_CONSTPOW: _Boxes.power,
     ca.OP_ATAN2: _Boxes.atan2,
     ca.OP_HYPOT: _Boxes.hypot,
+    ca.OP_FMAX: _Boxes.fmax,
+    ca.OP_FMIN: _Boxes.fmin,
+    ca.OP_LE: lambda at, u, v: at.step(at.sub(v, u)),
 }

@@ -23,6 +23,7 @@ from ..evidence.state import CLOSED
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from ..program.program import Program
+from .kinks import without_ties
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class StandardForm:
         sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
         signs: conditions of a robot's assembly, which are no constraints of the program.
         has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
+        places: places of its variables in the program, where it is a part of another form; else they are the first.
     """
 
     nlp: Nlp
@@ -58,6 +60,7 @@ class StandardForm:
     signs: tuple[Condition, ...]
     sign: float
     has_epigraph: bool
+    places: tuple[int, ...] | None = None
 
     @property
     def n(self) -> int:
@@ -67,7 +70,8 @@ class StandardForm:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the variables."""
-        return tuple(variable.name for variable in self.nlp.program.variables[: self.n])
+        variables = self.nlp.program.variables
+        return tuple(variables[i].name for i in (range(self.n) if self.places is None else self.places))
 
     @property
     def is_equation(self) -> tuple[bool, ...]:
@@ -82,7 +86,7 @@ class StandardForm:
     @cached_property
     def jacobian(self) -> SX:
         """(R, n) derivatives, dense: structural zeros are written out."""
-        return ca.densify(ca.jacobian(self.expressions, self.x))
+        return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
 
     @cached_property
     def dependence(self) -> list[list[bool]]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .instructions import Op
 from .intervals import LIBRARY, TINY, ULP, widen
+from .tape import Op
 
 if TYPE_CHECKING:
     from ...models import FloatArray
@@ -96,6 +96,22 @@ def _atan(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     return Rule(value, 1 / (1 + c * c), least, most, 2 * _LIBRARY_ERROR * (np.abs(value) + 1), *ends)
 
 
+def _ramp(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
+    """Return the rule of ``max(v, 0)``: over an interval with 0 in it, between the chord and its parallel through 0."""
+    slope = np.where(lo >= 0, 1.0, np.where(hi <= 0, 0.0, hi / (hi - lo)))
+    half = np.where((lo < 0) & (hi > 0), -0.5 * slope * lo, 0.0)
+    error = half + np.where((lo < 0) & (hi > 0), 8 * ULP * (hi - lo) + TINY, 0.0)
+    nothing = np.zeros_like(c)
+    return Rule(slope * c + half, slope, nothing, nothing, error, np.maximum(lo, 0.0), np.maximum(hi, 0.0))
+
+
+def _step(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
+    """Return the rule of the step, which is 1 from 0 on; over an interval with 0 in it, anything between."""
+    least, most = np.where(lo > 0, 1.0, 0.0), np.where(hi < 0, 0.0, 1.0)
+    nothing = np.zeros_like(c)
+    return Rule(0.5 * (least + most), nothing, nothing, nothing, 0.5 * (most - least), least, most)
+
+
 #: The rule of each operation of one variable, from its centre and the ends of its interval.
 RULES: Mapping[Op, Callable[[FloatArray, FloatArray, FloatArray], Rule]] = {
     Op.SQRT: _sqrt,
@@ -104,4 +120,6 @@ RULES: Mapping[Op, Callable[[FloatArray, FloatArray, FloatArray], Rule]] = {
     Op.EXP: _exp,
     Op.LOG: _log,
     Op.ATAN: _atan,
+    Op.RAMP: _ramp,
+    Op.STEP: _step,
 }

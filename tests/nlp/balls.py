@@ -4,10 +4,10 @@ import flint
 import numpy as np
 
 from screwsynth.nlp.certificate.enclosure import Enclosures
-from screwsynth.nlp.certificate.instructions import Op, Tape
+from screwsynth.nlp.certificate.tape import Op, Tape
 
 
-def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - one branch for each operation
+def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901, PLR0912 - one branch for each operation
     """Results of a tape at a point (n,) of doubles; a ball without an end is undefined."""
     work: list[flint.arb] = [flint.arb(0)] * tape.registers
     out: list[flint.arb] = [flint.arb(0)] * tape.outputs
@@ -36,6 +36,12 @@ def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901 - 
             work[to] = work[a] * flint.arb(k)
         elif op == Op.SQUARE:
             work[to] = work[a] * work[a]
+        elif op in (Op.RAMP, Op.STEP) and not work[a].is_finite():
+            work[to] = work[a]
+        elif op == Op.RAMP:
+            work[to] = flint.arb(0) if work[a] < 0 else work[a] if work[a] > 0 else work[a].union(flint.arb(0))
+        elif op == Op.STEP:
+            work[to] = flint.arb(0) if work[a] < 0 else flint.arb(1) if work[a] >= 0 else flint.arb(0.5, 0.5)
         else:
             work[to] = getattr(work[a], unary[Op(op)])()
     return out

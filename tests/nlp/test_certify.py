@@ -179,12 +179,12 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     assert sound.status is CertificateStatus.PROVED
     assert sound.bound >= solution.F * (1 - 1e-12)
 
-    whole = NumpyEngine._collapse_monotone
+    whole = NumpyEngine.collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "collapse_monotone", careless)
     inside = 0.5 * solution.x
     wrong = certify_program(solution.nlp, inside, engine="numpy", gap=1e-9)
     assert wrong.bound < solution.F * (1 - 1e-9) or wrong.status is not CertificateStatus.PROVED
@@ -193,7 +193,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
 @pytest.mark.slow
 def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the test above: no incumbent is given, so a rule that drops the optimum cannot hide behind it."""
-    whole = NumpyEngine._collapse_monotone
+    whole = NumpyEngine.collapse_monotone
 
     def careless(self: NumpyEngine, model: object, binding: np.ndarray, *rest: object) -> object:
         return whole(self, model, np.zeros_like(binding), *rest)  # type: ignore[arg-type]
@@ -207,7 +207,7 @@ def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeyp
         return wrong
 
     assert caught() == 0
-    monkeypatch.setattr(NumpyEngine, "_collapse_monotone", careless)
+    monkeypatch.setattr(NumpyEngine, "collapse_monotone", careless)
     assert caught() >= 1
 
 
@@ -366,7 +366,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
         "LINEAR": bounding._LINEAR,
         "ROOT_SLACK": quadratic._ROOT_SLACK,
         "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
-        "TANGENT_ROUNDS": bounding._TANGENT_ROUNDS,
+        "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
     }
     for name, value in numbers.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"#define {name} ")]
@@ -397,11 +397,13 @@ def test_the_kernel_is_built_without_what_would_break_it() -> None:
     path = find_case("paper-4.1-helical").parents[1] / "pyproject.toml"
     if not path.exists():
         pytest.skip("an installed package has no build settings")
-    (extension,) = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["setuptools"]["ext-modules"]
-    flags = extension["extra-compile-args"]
-    assert "-ffp-contract=off" in flags
-    assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
-    assert extension["optional"] is True
+    extensions = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["setuptools"]["ext-modules"]
+    assert {each["name"].rpartition(".")[2] for each in extensions} == {"_bounds", "_workspace"}
+    for extension in extensions:
+        flags = extension["extra-compile-args"]
+        assert "-ffp-contract=off" in flags
+        assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
+        assert extension["optional"] is True
 
 
 @pytest.mark.parametrize("engine", ENGINES)

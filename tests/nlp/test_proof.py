@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import struct
 import tomllib
 import zlib
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, read_proof
+from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.certificate.prooftree import TreeReader, read_claims
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
@@ -269,7 +270,18 @@ def test_the_contract_names_every_module_of_the_search() -> None:
     room = "screwsynth.nlp.certificate"
     (contract,) = [each for each in contracts if each.get("source_modules") == [f"{room}.proofcheck"]]
     modules = {path.stem for path in (settings.parent / "nlp" / "certificate").glob("*.py")} - {"__init__"}
-    check = {"standardform", "proof", "prooftree", "slopes", "slopebounds", "proofcheck"}
+    check = {
+        "standardform",
+        "kinks",
+        "separation",
+        "proof",
+        "prooftree",
+        "slopes",
+        "slopebounds",
+        "slopecut",
+        "slopeweights",
+        "proofcheck",
+    }
     assert set(contract["forbidden_modules"]) == {f"{room}.{module}" for module in modules - check}
 
 
@@ -295,3 +307,72 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     code, out, _ = cli("solve", str(case), "--certify", "--starts", "4")
     assert code == 0
     assert out.count("proved:") == 3
+
+
+def test_a_fingerprint_forgives_rounding_and_nothing_else(proof: Proof) -> None:
+    nlp = program_of(load_case(NAME), proof.statement)
+    rounded = replace(nlp, arguments=np.nextafter(nlp.arguments, np.inf), upper=np.nextafter(nlp.upper, 0.0))
+    assert is_same_program(fingerprint(rounded), proof.graph)
+    for other in (
+        replace(nlp, upper=nlp.upper * (1 + 1e-5)),
+        program_of(load_case(NAME, {"x2": 8.0001}), proof.statement),
+        program_of(load_case("paper-4.1-rotation-axis-z"), proof.statement),
+    ):
+        assert not is_same_program(fingerprint(other), proof.graph)
+    for text in ("", "x y z", proof.graph + " 1", proof.graph[:-3] + "zzz"):
+        assert not is_same_program(text, proof.graph)
+
+
+def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
+    joints: dict[str, object] = {}
+    for k in range(6):
+        for name, radius, turn in (("base", 12.0, 0.2), ("platform", 6.0, -0.3)):
+            angle = np.pi / 3 * k + (-1) ** k * turn
+            joints[f"{name}_{k + 1}"] = [float(radius * np.cos(angle)), float(radius * np.sin(angle)), 0.0]
+    # Two legs with free joint coordinates.
+    for name in ("base_1", "platform_1", "base_4"):
+        x, y, z = joints[name]  # type: ignore[misc]
+        joints[name] = [{"min": x - 2, "max": x + 2}, {"min": y - 2, "max": y + 2}, z]
+    tables = {
+        "robot": {"model": "hexapod", "parameters": joints},
+        "pose": {"position": [0, 0, 15]},
+        "task": [{"name": "t", "sense": "max", "axis": [1, 2, 3], "point": [1, 0, 2], "pitch": 1}],
+    }
+    case = case_from_tables(tables, name="two legs", source="two legs")
+    proof = proof_of(certify(case, gap=1e-3, starts=2, with_proof=True), "")
+    assert proof.tree[0] == Node.LIMBS
+    assert proof.bound is not None
+    nlp = program_of(case, proof.statement)
+    assert check_proof(proof, nlp).bound == proof.bound
+    assert "together" in rejected(replace(proof, bound=proof.bound * (1 - 1e-3)), case)
+    (first,) = struct.unpack("<d", proof.tree[1:9])
+    lower = proof.tree[:1] + struct.pack("<d", first * (1 - 0.01)) + proof.tree[9:]
+    assert "could not be shown" in rejected(replace(proof, tree=lower), case)
+    assert "ends" in rejected(replace(proof, tree=proof.tree[:-1]), case)
+    assert "goes on" in rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), case)
+
+
+def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
+    tables = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
+    del tables["expect"]
+    tables["limits"] = {"leg_clearance": {"min": 3}}
+    tables["robot"]["parameters"].update({"x1": 26.5, "x2": 11.543, "x3": 4})
+    tables["pose"]["position"] = [{"min": -6, "max": 6, "start": 0}, 0, 20]
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": {"min": -15, "max": 15}}
+    case = case_from_tables(tables, name="legs", source="legs")
+    certified = certify(case, gap=1e-3, starts=4, with_proof=True)
+    evidence = certified.solution.evidence
+    assert evidence is not None
+    assert any(side.name.startswith("leg_clearance") for side in evidence.active)
+    proof = proof_of(certified, "")
+    nlp = program_of(case, proof.statement)
+    check_proof(proof, nlp)
+    form = standard_form(nlp)
+    x = form.lower[:, None] + np.random.default_rng(0).random((form.n, 3000)) * (form.upper - form.lower)[:, None]
+    values = ca.Function("values", [form.x], [form.expressions]).map(3000)(x).full()
+    feasible = (values[1:] <= 0).all(axis=0)
+    assert 0 < feasible.sum() < 3000
+    assert proof.bound is not None
+    # Points that do not keep the limit are better: it matters.
+    assert values[0][feasible].max() <= proof.bound < values[0].max()
+    assert "bounded" in rejected(replace(proof, bound=proof.bound * (1 - 3e-3)), case)

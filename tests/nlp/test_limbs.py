@@ -1,0 +1,284 @@
+"""Search by limbs: what is read off the expressions, bounds of sums, and that nothing better is ever dropped."""
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from screwsynth.models import hexapod
+from screwsynth.nlp import Case, Free, Rotation, case_from_tables, formulate, load_case, solve
+from screwsynth.nlp.certificate import branchandbound, sharedsearch
+from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.certificate.certificate import CertificateStatus
+from screwsynth.nlp.certificate.engines import kernel, limb_engine_for
+from screwsynth.nlp.certificate.incumbent import Incumbent
+from screwsynth.nlp.certificate.limbmodels import LimbModels
+from screwsynth.nlp.certificate.limbsums import LimbBound, bound_limb
+from screwsynth.nlp.certificate.ownboxes import OwnBoxes
+from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.proofwriter import ProofWriter
+from screwsynth.nlp.certificate.separation import Separation, separate
+from screwsynth.nlp.certificate.sharedcuts import LeftOwn
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+
+needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
+
+
+def machine(width: float, pose_is_free: bool = False) -> Case:
+    """A hexapod whose 36 joint coordinates are free within a width, and whose pose is held or free."""
+    parameters: dict[str, object] = {}
+    for leg in range(6):
+        corner = 2 * math.pi * (leg // 2) / 3
+        azimuth = corner + (-1 if leg % 2 == 0 else 1) * math.radians(55)
+        for name, radius, angle in (("base", 26.5, corner), ("platform", 11.543, azimuth)):
+            point = (radius * math.cos(angle), radius * math.sin(angle), 0.0)
+            parameters[f"{name}_{leg + 1}"] = [Free(each - width, each + width) for each in point]
+    task = load_case("hexapod-machining").tasks[0]
+    if not pose_is_free:
+        return Case(hexapod(), parameters, [0.0, 0.0, 20.0], [task])
+    position: list[object] = [Free(-3.0, 3.0), Free(-3.0, 3.0), Free(18.0, 22.0)]
+    return Case(hexapod(), parameters, position, [task], rotation=Rotation(axis=None, angle=Free(-0.17, 0.17)))
+
+
+def poses(seed: int) -> Case:
+    """A platform at two or three poses that are free, whose dimensions are free too, half of them with limits."""
+    rng = np.random.default_rng(seed)
+    tables: dict[str, object] = {
+        "units": {"angle": "rad"},
+        "robot": {
+            "model": "stewart-gough",
+            "parameters": {"x1": {"min": 8, "max": 12}, "x2": float(rng.uniform(4, 8)), "x3": 0.3, "x4": 0.2},
+        },
+        "pose": [
+            {
+                "position": [{"min": -2, "max": 2}, float(rng.uniform(-3, 3)), {"min": 25 + k, "max": 31 + k}],
+                "rotation": {"axis": [0, 0, 1], "angle": {"min": -0.3, "max": 0.3} if seed % 3 == 0 else 0.1},
+            }
+            for k in range(2 + seed % 2)
+        ],
+        "task": [
+            {
+                "name": "t",
+                "sense": ("max", "min")[seed % 2],
+                "axis": rng.normal(size=3).tolist(),
+                "point": rng.normal(size=3).tolist(),
+                "pitch": 1,
+            }
+        ],
+    }
+    if seed % 4 > 1:
+        tables["limits"] = {"leg_length": {"min": 24, "max": 34}, "base_joint_angle": 0.6, "footprint": {"base": 11}}
+    return case_from_tables(tables, name="poses", source="poses")
+
+
+def separated(case: Case) -> tuple[StandardForm, Separation]:
+    form = standard_form(formulate(case))
+    found = separate(form)
+    assert found is not None
+    return form, found
+
+
+@pytest.mark.parametrize(
+    ("case", "shared", "own"),
+    [
+        (machine(2.0), 0, [6] * 6),
+        (machine(2.0, pose_is_free=True), 6, [6] * 6),
+        (load_case("paper-4.4-max"), 0, [6] * 3),
+        (poses(0), 1, [3, 3]),
+        (poses(7), 1, [2, 2, 2]),
+    ],
+    ids=["joints", "joints and pose", "axes", "two poses", "three poses"],
+)
+def test_limbs_are_read_off_the_expressions(case: Case, shared: int, own: list[int]) -> None:
+    form, found = separated(case)
+    assert len(found.shared) == shared
+    assert [len(limb.own) for limb in found.limbs] == own
+    every = [*found.shared, *(i for limb in found.limbs for i in limb.own)]
+    assert sorted(every) == list(range(form.n))
+    count = sum(len(limb.form.conditions) for limb in found.limbs)
+    assert count + (0 if found.common is None else len(found.common.conditions)) == len(form.conditions)
+    x = form.lower + np.random.default_rng(0).random(form.n) * (form.upper - form.lower)
+    parts = [limb.form.value_at(x[[*found.shared, *limb.own]]) for limb in found.limbs]
+    rest = found.constant if found.common is None else found.common.value_at(x[list(found.shared)])
+    assert sum(parts) + rest == pytest.approx(form.value_at(x), rel=1e-12)
+    for limb in found.limbs:
+        assert limb.form.names == tuple(form.names[i] for i in (*found.shared, *limb.own))
+
+
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "hexapod-machining"])
+def test_a_form_whose_terms_share_every_variable_has_no_limbs(name: str) -> None:
+    assert separate(standard_form(formulate(load_case(name)))) is None
+
+
+@needs_kernel
+def test_independent_limbs_are_proved_by_themselves() -> None:
+    solution = solve(machine(2.0), starts=2)
+    found = certify_program(solution.nlp, solution.x, gap=1e-4)
+    assert found.status is CertificateStatus.PROVED
+    assert found.boxes < 1000
+    form = standard_form(solution.nlp)
+    rng = np.random.default_rng(0)
+    points = form.lower[:, None] + rng.integers(0, 2, (form.n, 2000)) * (form.upper - form.lower)[:, None]
+    values = ca.Function("f", [form.x], [form.functions[0]]).map(2000)(points).full()
+    assert values.max() <= found.bound
+    assert found.bound <= solution.F * (1 + 1.001e-4)
+    free = certify_program(formulate(load_case("paper-4.4-min")), gap=1e-4)
+    assert free.status is CertificateStatus.PROVED
+    assert abs(free.bound) < 1e-5
+
+
+def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
+    case = load_case("paper-4.4-min")
+    nlp = formulate(case)
+    # Unit axes whose components are all small do not exist.
+    upper = nlp.upper.copy()
+    upper[:3] = 0.1
+    lower = nlp.lower.copy()
+    lower[:3] = -0.1
+    nlp = replace(nlp, lower=lower, upper=upper)
+    recorder = ProofWriter(1)
+    found = certify_program(nlp, gap=1e-2, recorder=recorder)
+    assert found.status is CertificateStatus.INFEASIBLE
+    proof = Proof("", "none", Statement(), fingerprint(nlp), None, recorder.tree())
+    assert check_proof(proof, nlp).bound == -math.inf
+
+
+def test_an_independent_search_that_stops_has_a_bound() -> None:
+    solution = solve(machine(5.0), starts=2)
+    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05, engine="numpy")
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert found.bound >= solution.F
+
+
+@needs_kernel
+def test_the_engines_have_the_same_models_of_limbs() -> None:
+    for case in (machine(2.0, pose_is_free=True), poses(6)):
+        form, found = separated(case)
+        m, limb = len(found.shared), found.limbs[1].form
+        rng = np.random.default_rng(1)
+        size = (limb.upper - limb.lower)[:, None] * rng.uniform(0, 0.3, (limb.n, 200))
+        low = limb.lower[:, None] + rng.random((limb.n, 200)) * ((limb.upper - limb.lower)[:, None] - size)
+        one, other = (limb_engine_for(limb, m, name, 1).limb_models(low, low + size) for name in ("c", "numpy"))
+        for name in ("is_possible", "defined", "holds", "stops_up", "stops_down"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        for name in ("lower", "upper", "slope_lo", "slope_hi", "high", "value"):
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9)
+        for name, values in vars(one.L).items():
+            np.testing.assert_allclose(values, getattr(other.L, name), rtol=1e-9, atol=1e-9)
+        assert form.n > limb.n
+
+
+def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
+    """phi_k - t_k at random points of random boxes, for random tilts' boxes; and the value reached is a lower bound."""
+    _, found = separated(machine(2.0, pose_is_free=True))
+    m, limb = len(found.shared), found.limbs[2].form
+    engine = limb_engine_for(limb, m)
+    rng = np.random.default_rng(2)
+    B, each, points = 30, 5, 40
+    room = (limb.upper - limb.lower)[:, None]
+    size = room * 10.0 ** rng.uniform(-4, -0.3, (limb.n, B))
+    low = limb.lower[:, None] + rng.random((limb.n, B)) * (room - size)
+    of = np.repeat(np.arange(B), each)
+    own_size = size[m:, of] * rng.random((limb.n - m, of.size))
+    own_low = low[m:, of] + rng.random(own_size.shape) * (size[m:, of] - own_size)
+    own = OwnBoxes(own_low, own_low + own_size, of)
+    good = low[m:] + 0.5 * size[m:]
+    models = engine.limb_models(
+        np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
+    )
+    at_good = engine.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good]))
+    part = bound_limb(models, at_good, own, m)
+    assert (part.reached > -np.inf).all()
+    value = ca.Function("f", [limb.x], [limb.functions[0]])
+    e = rng.uniform(-1, 1, (m, B, points))
+    s = low[:m, :, None] + 0.5 * size[:m, :, None] * (1 + e)
+    tilt = np.einsum("ib,ibp->bp", part.tilt.g, e) + 0.5 * np.einsum("ijb,ibp,jbp->bp", part.tilt.Q, e, e)
+    o = own.lower[:, :, None] + rng.random((limb.n - m, of.size, points)) * own_size[:, :, None]
+
+    def values(shared: np.ndarray, own_part: np.ndarray) -> np.ndarray:
+        x = np.concatenate([shared, own_part]).reshape(limb.n, -1)
+        return np.asarray(value.map(x.shape[1])(x).full().reshape(shared.shape[1:]))
+
+    slack = 1e-12 * np.abs(part.best).max()
+    above = values(s[:, of], o) - tilt[of]
+    kept = part.bounds > -np.inf
+    assert kept.any()
+    assert (above[kept].max(axis=1) <= part.bounds[kept] + slack).all()
+    reached = values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt
+    assert (reached.min(axis=1) >= part.reached - slack).all()
+    # A dropped box is worse than the good point at every shared point.
+    assert (above[~kept] <= (values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt)[of][~kept] + slack).all()
+
+
+def both_searches(seed: int) -> tuple[float, float]:
+    """Bound by limbs without an incumbent, and the best of some starts, both to be maximised."""
+    solution = solve(poses(seed), starts=4)
+    found = certify_program(solution.nlp, None, gap=1e-2, time_limit=20)
+    sign = -solution.nlp.sign
+    # A bound is proved, or there is none because everything was dropped.
+    assert found.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
+    return -math.inf if found.status is CertificateStatus.INFEASIBLE else sign * found.bound, sign * solution.F
+
+
+def test_no_start_beats_a_bound_by_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    for seed in range(6):
+        bound, best = both_searches(seed)
+        assert bound >= best - 1e-9 * abs(best)
+
+
+def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test of the test above: own boxes are held against the threshold as if the other limbs gave nothing."""
+    whole = sharedsearch.cut_own
+
+    def careless(
+        good: np.ndarray, found: LimbModels, part: LimbBound, own: OwnBoxes, sums: np.ndarray, threshold: float
+    ) -> LeftOwn:
+        del sums
+        return whole(good, found, part, own, part.best, threshold)
+
+    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(sharedsearch, "cut_own", careless)
+    # No better incumbent is found, so a bound that is too low cannot hide behind it.
+    monkeypatch.setattr(sharedsearch.SharedSearch, "_improve", lambda *_: None)
+    wrong = 0
+    for seed in (0, 2, 6):
+        bound, best = both_searches(seed)
+        wrong += bound < best - 1e-6 * abs(best)
+    assert wrong >= 1
+
+
+@needs_kernel
+def test_limbs_that_share_the_pose_have_a_finite_bound_soon() -> None:
+    """42 free numbers: the bound of a search that stops holds at random corners of the box."""
+    nlp = formulate(machine(2.0, pose_is_free=True))
+    found = certify_program(nlp, gap=1e-3, time_limit=1.5)
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert found.incumbent <= found.bound < 10_000
+    form = standard_form(nlp)
+    rng = np.random.default_rng(3)
+    # Corners of the joints' boxes; poses within the rotation's ball.
+    share = rng.integers(0, 2, (form.n, 3000)).astype(float)
+    share[-3:] = 0.5 + rng.uniform(-0.28, 0.28, (3, 3000))
+    x = form.lower[:, None] + share * (form.upper - form.lower)[:, None]
+    values = ca.Function("f", [form.x], [form.functions[0]]).map(3000)(x).full()
+    assert values.max() <= found.bound
+
+
+def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
+    """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
+    form, found = separated(poses(0))
+    search = sharedsearch.SharedSearch(form, found, Incumbent(form), None, 1)
+    boxes = search._opened.pop(1)
+    for bound in (np.inf, 1.0):
+        with np.errstate(all="ignore"):
+            sums = search._examine(replace(boxes, bound=np.array([bound])))
+            lists = [
+                sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
+                for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
+            ]
+        assert sums.bound[0] == min(bound, sums.sums[0])
+        assert all(each.own.of.size for each in lists)
