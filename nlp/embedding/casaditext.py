@@ -1,8 +1,8 @@
 """C as CasADi generates it, without what a controller does not need.
 
 Beside each function CasADi writes a dozen that return names, sizes and sparsities, by which it loads a library. A
-controller calls none of them, and together they are a fifth of the machine code. Each number of an input is read after a
-test whether the input is given at all. Here every input is given, and the tests are a tenth of the machine code.
+controller calls none of them, and together they are a fifth of the machine code. Each number of an input is read after
+a test whether the input is given at all. Here every input is given, and the tests are a tenth of the machine code.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ _PARTS = ("1.0", "0.25", "0.0625", "0.015625", "0.00390625", "0.0")
 #: Second derivatives in one iteration: for the step; along the sides that are active at the point, to recognise a
 #: saddle; and again for the step.
 _CURVATURES = 3
-#: First derivatives that a search may have for each iteration so far, beside those of one line search. Of 34,000 searches
-#: in seven cases none had more than 3.7 for each iteration on the whole.
+#: First derivatives that a search may have for each iteration so far, beside those of one line search. Of 34,000
+#: searches in seven cases none had more than 3.7 for each iteration on the whole.
 _DERIVATIVES = 4
 
 
