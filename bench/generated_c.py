@@ -3,11 +3,12 @@
 Both versions are compiled first, two at a time. Then their programs run in turns, so that a busy machine burdens both.
 Instructions are counted by valgrind and do not depend on the load. Run by hand on a quiet machine:
 
-    .venv/bin/python -P bench/generated_c.py --old CHECKOUT
+    .venv/bin/python -P bench/generated_c.py --old CHECKOUT --write
 
-Without ``--old`` the table has this version alone, as it always has for several tasks or poses, which were another
-problem before. The old code of hexapod-machining takes two minutes to compile; for a Cortex-M7 it is left out unless
-``--all`` is given.
+Rows are printed as they are measured, progress on standard error. ``--write`` puts the tables of a complete run into
+docs/embedding.md. Without ``--old`` the tables have this version alone, as they always have for several tasks or poses,
+which were another problem before. The old code of hexapod-machining takes two minutes to compile; for a Cortex-M7 it is
+left out unless ``--all`` is given.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -36,6 +37,10 @@ FLAGS = ("-std=gnu99", "-O2")
 SOLVES, ROUNDS = 10_000, 10
 SLOW = {"hexapod-machining": 3_000}
 KINDS = ("cold", "task", "warm")
+VERSIONS = ("before", "after")
+#: The page with the tables, and their place in it.
+PAGE = Path(__file__).parents[1] / "docs" / "embedding.md"
+OPENING, CLOSING = "<!-- begin: bench/generated_c.py -->", "<!-- end -->"
 #: Cases whose C before was that of their first task at their first pose.
 COMBINED = ("flight-simulator", "camera-mount")
 #: A case whose C before takes too long for a second compiler.
@@ -177,7 +182,7 @@ def compiled(name: str, version: str, checkout: Path | None, root: Path, cortex:
     graphs = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.ci")}
     # The pointers of a version before are others: its stack is painted only.
     bound = stack_bound(graphs, prefix) if checkout is None else None
-    painted = int(output(folder, "stack", "0", "0"))
+    painted = int(output(folder, "./driver", "stack", "0", "0"))
     return Build(name, version, folder, flash, flash_m7, seconds, 8 * doubles + 4 * ints, bound, painted)
 
 
@@ -188,8 +193,8 @@ def size(program: str, folder: Path, objects: list[str]) -> int:
 
 
 def output(folder: Path, *words: str) -> str:
-    """Run a driver and return what it prints."""
-    return subprocess.run([folder / "driver", *words], capture_output=True, text=True, check=True).stdout
+    """Run a program in a folder and return what it prints."""
+    return subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
 def instructions(build: Build, *words: str) -> int:
@@ -206,7 +211,7 @@ def times(builds: list[Build], kind: str) -> list[str]:
     found: dict[str, list[list[float]]] = {each.version: [] for each in builds}
     for turn in range(ROUNDS):
         for build in builds if turn % 2 else builds[::-1]:
-            lines = output(build.folder, kind, str(turn * count), str(count)).splitlines()
+            lines = output(build.folder, "./driver", kind, str(turn * count), str(count)).splitlines()
             found[build.version] += [[float(part) for part in line.split()] for line in lines]
     rows = []
     for build in builds:
@@ -223,50 +228,90 @@ def times(builds: list[Build], kind: str) -> list[str]:
     return rows
 
 
-def show(columns: str) -> None:
-    """Print the head of a table."""
-    print(f"| {columns} |\n|{'---|' * (columns.count('|') + 1)}", flush=True)
+class Tables:
+    """Lines of the tables, printed as they come."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def add(self, *lines: str) -> None:
+        """Add lines."""
+        self.lines.extend(lines)
+        print("\n".join(lines), flush=True)
+
+    def begin(self, columns: str) -> None:
+        """Begin a table."""
+        self.add(f"| {columns} |", f"|{'---|' * (columns.count('|') + 1)}")
+
+    def write(self, page: Path) -> None:
+        """Put the tables into their place in a page."""
+        before, _, rest = page.read_text(encoding="utf-8").partition(OPENING)
+        after = rest.partition(CLOSING)[2]
+        page.write_text("\n".join([before + OPENING, "", *self.lines, "", CLOSING + after]), encoding="utf-8")
+
+
+def say(began: float, words: str) -> None:
+    """Say the progress, with the seconds so far."""
+    print(f"{time.perf_counter() - began:5.0f} s  {words}", file=sys.stderr, flush=True)
+
+
+def versions() -> str:
+    """Return the compilers and the machine in words."""
+    found = [name for name in ("gcc", CORTEX_M7.compilers[0]) if shutil.which(name)]
+    lines = [output(Path(), name, "--version").splitlines()[0] for name in found]
+    cores, load = os.cpu_count(), os.getloadavg()[0]
+    return f"{', '.join(lines)}; {' '.join(FLAGS)}; {cores} cores, load {load:.1f} at the begin."
+
+
+def sizes_of(build: Build) -> str:
+    """Return a row of sizes of a build, with the instructions of a solve from all starting points."""
+    seeds = instructions(build, "seeds", "0", "1") - instructions(build, "seeds", "0", "0")
+    cells = [f"{build.flash / 1e3:.0f}", "-" if build.flash_m7 is None else f"{build.flash_m7 / 1e3:.0f}"]
+    cells += [f"{build.workspace / 1e3:.1f}", "-" if build.bound is None else str(build.bound)]
+    cells += [str(build.painted), f"{build.seconds:.1f}", f"{seeds / 1e6:.1f}"]
+    return f"| `{build.name}` | {build.version} | {' | '.join(cells)} |"
 
 
 def main() -> None:
-    """Print the tables."""
+    """Measure, print, and write the tables where that is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--old", type=Path, help="a checkout of the version before")
     parser.add_argument("--all", action="store_true", help="for a Cortex-M7 also what takes long to compile")
+    parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
     parser.add_argument("cases", nargs="*", default=CASES)
     given = parser.parse_args()
-    began = time.perf_counter()
+    began, tables, made = time.perf_counter(), Tables(), dict[tuple[str, str], Build]()
     jobs = [(name, "after") for name in given.cases]
     jobs += [(name, "before") for name in given.cases if given.old and name not in COMBINED]
     # What takes longest comes first.
     jobs.sort(key=lambda job: (job[0] != LARGE, job[1] != "before"))
+    tables.add(versions(), "")
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
 
-        def make(job: tuple[str, str]) -> Build:
-            name, version = job
+        def make(name: str, version: str) -> Build:
             old = version == "before"
             cortex = given.all or not (old and name == LARGE)
             return compiled(name, version, given.old if old else None, Path(folder), cortex)
 
-        made = list(pool.map(make, jobs))
-        print(f"compiled after {time.perf_counter() - began:.0f} s", file=sys.stderr)
-        by_case = {
-            name: sorted((each for each in made if each.name == name), key=lambda each: each.version)[::-1]
-            for name in given.cases
-        }
-        show("case | version | flash kB | on a Cortex-M7 | workspace kB | stack bound | stack | gcc s | M instructions")
-        for build in (each for builds in by_case.values() for each in builds):
-            seeds = instructions(build, "seeds", "0", "1") - instructions(build, "seeds", "0", "0")
-            cells = [f"{build.flash / 1e3:.0f}", "-" if build.flash_m7 is None else f"{build.flash_m7 / 1e3:.0f}"]
-            cells += [f"{build.workspace / 1e3:.1f}", "-" if build.bound is None else str(build.bound)]
-            cells += [str(build.painted), f"{build.seconds:.1f}", f"{seeds / 1e6:.1f}"]
-            print(f"| `{build.name}` | {build.version} | {' | '.join(cells)} |", flush=True)
-        print("\nTimes in microseconds; instructions above are those of a solve from all starting points.\n")
-        show("case | version | solves | median | 99.9 % | largest | iterations, mean and largest | OK")
-        for builds in by_case.values():
+        waiting = {pool.submit(make, *job): job for job in jobs}
+        for done in as_completed(waiting):
+            made[waiting[done]] = done.result()
+            say(began, f"{len(made)} of {len(jobs)}: compiled {' '.join(waiting[done])}")
+        order = [(name, version) for name in given.cases for version in VERSIONS if (name, version) in made]
+        tables.begin(
+            "case | version | flash kB | on a Cortex-M7 | workspace kB | stack bound | stack | gcc s | M instructions"
+        )
+        for job in order:
+            tables.add(sizes_of(made[job]))
+        tables.add("", "Times in microseconds; instructions above are those of a solve from all starting points.", "")
+        tables.begin("case | version | solves | median | 99.9 % | largest | iterations, mean and largest | OK")
+        for name in given.cases:
             for kind in KINDS:
-                print("\n".join(times(builds, kind)), flush=True)
-    print(f"took {time.perf_counter() - began:.0f} s", file=sys.stderr)
+                tables.add(*times([made[job] for job in order if job[0] == name], kind))
+                say(began, f"{name}, {kind}")
+    if given.write:
+        tables.write(PAGE)
+        say(began, f"written to {PAGE}")
 
 
 if __name__ == "__main__":

@@ -118,7 +118,8 @@ def span_of_leg(inputs: SX) -> SX:
 def find_calls(program: Program) -> Calls:
     """Return the calls of a program.
 
-    At a single pose limits of few operations are no calls, and the objective is one only where limits take F.
+    At a single pose limits of few operations are no calls. The objective is one where limits take F, or where there
+    are other calls and its second derivatives are many operations.
     """
     several = len(program.robots) > 1
     is_spectral = any(each.spectral is not None for each in program.constraints)
@@ -135,7 +136,9 @@ def find_calls(program: Program) -> Calls:
     chosen = [each for members in by_form(final) if _is_worthwhile(program, members, taken) for each in members]
     of_F = {each.element_hash() for robot in program.robots for each in ca.vertsplit(robot.F)}
     takes_F = several or any(each.element_hash() in of_F for item in chosen for each in ca.vertsplit(item.call.inputs))
-    if program.objective_call is not None and takes_F:
+    # Beside other loops the code of those is there already.
+    is_large = bool(chosen) and bool(of_F & values) and _second_operations(program, program.objective) > _FEW
+    if program.objective_call is not None and (takes_F or is_large):
         chosen.append(FinalCall(program.objective_call, len(program.constraints)))
     return Calls(inner, tuple(chosen), matrices)
 
@@ -254,8 +257,13 @@ def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[i
         return True
     multipliers = SX.sym("multipliers", len(members))
     total = ca.dot(multipliers, ca.vertcat(*[item.call.value for item in members]))
-    hessian = ca.Function("hessian", [program.x, program.p, multipliers], [ca.hessian(total, program.x)[0]])
-    return len(members) > 1 and int(hessian.n_instructions()) > _FEW
+    return len(members) > 1 and _second_operations(program, total, multipliers) > _FEW
+
+
+def _second_operations(program: Program, expression: SX, *others: SX) -> int:
+    """Return the number of operations of an expression's second derivatives; it is of x, p and the other symbols."""
+    inputs = [program.x, program.p, *others]
+    return int(ca.Function("hessian", inputs, [ca.hessian(expression, program.x)[0]]).n_instructions())
 
 
 def by_form(final: Iterable[FinalCall]) -> list[list[FinalCall]]:

@@ -1,7 +1,8 @@
-"""C as CasADi generates it, without the functions by which CasADi loads a library.
+"""C as CasADi generates it, without what a controller does not need.
 
-Beside each function CasADi writes a dozen that return names, sizes and sparsities. A controller calls none of them, and
-together they are a fifth of the machine code.
+Beside each function CasADi writes a dozen that return names, sizes and sparsities, by which it loads a library. A
+controller calls none of them, and together they are a fifth of the machine code. Each number of an input is read after
+a test whether the input is given at all. Here every input is given, and the tests are a tenth of the machine code.
 """
 
 from __future__ import annotations
@@ -13,15 +14,19 @@ _QUERIES = (
     "alloc_mem|init_mem|free_mem|checkout|release|incref|decref|n_in|n_out|default_in|name_in|name_out|"
     "sparsity_in|sparsity_out|work|work_bytes"
 )
-#: One of them: its body has no empty line.
-_DEFINITION = re.compile(rf"^CASADI_SYMBOL_EXPORT [^\n]*_(?:{_QUERIES})\([^\n]*\) \{{\n(?:[^\n]+\n)+\n?", re.MULTILINE)
+#: One of them: its body has no empty line, and may end on the first line.
+_DEFINITION = re.compile(
+    rf"^CASADI_SYMBOL_EXPORT [^\n]*_(?:{_QUERIES})\([^\n]*\) \{{[^\n]*\n(?:[^\n]+\n)*\n?", re.MULTILINE
+)
 _DECLARATION = re.compile(rf"^CASADI_SYMBOL_EXPORT [^\n]*_(?:{_QUERIES})\([^\n]*\);\n", re.MULTILINE)
 #: Sparsities, which only these functions read.
 _SPARSITY = re.compile(r"^(?:#define casadi_s\d+ |static const casadi_int casadi_s\d+\[)[^\n]*\n", re.MULTILINE)
+#: A number of an input, with its test.
+_TESTED = re.compile(r"(arg\[\d+\])\? (\1\[\d+\]) : 0;")
 
 
-def without_queries(text: str) -> str:
-    """Return the text of a source or of a header without these functions and their tables."""
+def for_controllers(text: str) -> str:
+    """Return the text of a source or of a header without these functions, their tables, and tests of inputs."""
     for pattern in (_DEFINITION, _DECLARATION, _SPARSITY):
         text = pattern.sub("", text)
-    return text
+    return _TESTED.sub(r"\2;", text)

@@ -28,7 +28,7 @@ from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from .apitexts import index_macros, version_texts
-from .casaditext import without_queries
+from .casaditext import for_controllers
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
@@ -147,7 +147,7 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + os.sep)
         texts = {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
-    return {end: without_queries(text) for end, text in texts.items()}
+    return {end: for_controllers(text) for end, text in texts.items()}
 
 
 def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:

@@ -16,15 +16,17 @@ _PARTS = ("1.0", "0.25", "0.0625", "0.015625", "0.00390625", "0.0")
 #: Second derivatives in one iteration: for the step; along the sides that are active at the point, to recognise a
 #: saddle; and again for the step.
 _CURVATURES = 3
+#: First derivatives that a search may have for each iteration so far, beside those of one line search. Of 34,000
+#: searches in seven cases none had more than 3.7 for each iteration on the whole.
+_DERIVATIVES = 4
 
 
 def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
-    First derivatives in an iteration are those of each trial length, and of one step that is corrected for curvature.
-    The search for a feasible point has no such correction, and one evaluation at its iterate instead. Beside iterations
-    a search evaluates once to scale the constraints; at the begin and the end of each part, of which it has one for
-    each scale of F and for each feasible point found; and twice at the begin of each search for a feasible point.
+    A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
+    search: it judges one point in each iteration, and one at the end of each part, of which it has one for each scale
+    of F and for each feasible point found. Before the first of them it evaluates once to scale the constraints.
 
     Args:
         n: number of variables.
@@ -32,7 +34,7 @@ def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
         searches: largest number of searches of a solve.
     """
     parts = _ROUNDS + _RESTORES
-    by_iteration, by_search = _TRIALS + 1, 1 + 2 * parts + 2 * _RESTORES
+    by_iteration, by_search = _DERIVATIVES, 1 + _TRIALS + _DERIVATIVES * parts
     programs = len(_PARTS) + 1
     passes = 20 * (2 * (n + c) + 5)
     iterations = searches * _ITERATIONS

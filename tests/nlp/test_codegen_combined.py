@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from screwsynth.nlp import Case, Nlp, case_from_tables, load_case, solve
+from screwsynth.nlp import Case, Limits, Nlp, RateShare, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.subject import find_subject
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.program.sampling import starting_points
@@ -142,6 +143,19 @@ def test_the_c_has_the_programs_values_and_its_optimum(name: str, embed: Callabl
         assert solved.status == 0
         better = 1 if subject.nlp.sign < 0 else -1
         assert better * (solved.F - subject.optimum) >= -1e-6 * max(1.0, abs(subject.optimum))
+
+
+def test_f_is_a_loop_beside_other_loops(embed: Callable[..., Embedded]) -> None:
+    """No limit of this case takes F, but its limits are loops, and F is many operations."""
+    shipped = load_case("hexapod-machining")
+    kept = [limit for limit in shipped.limits if not isinstance(limit, RateShare)]
+    case = replace(shipped, name="without-rate-share", limits=Limits(*kept))
+    assert len(kept) == len(shipped.limits) - 1
+    nlp = formulate(case)
+    assert find_loops(nlp.program).has_objective
+    c = embed(case, "-O0")
+    c.compare(nlp, 20, 1e-13)
+    curvatures(c, nlp, 1e-12)
 
 
 @pytest.mark.parametrize("name", ["camera-mount", "flight-simulator"])
