@@ -20,7 +20,7 @@ from screwsynth.nlp.solver.multistart import solve_program
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT = range(4)
 FEASIBLE, STATIONARY = 1e-9, 1e-7
 #: Random robots of the test below. A thousand take some minutes and were run by hand.
-ROBOTS = int(os.environ.get("SCREWSYNTH_ROBOTS", "40"))
+ROBOTS = int(os.environ.get("SCREWSYNTH_ROBOTS", "25"))
 
 Embedded = Any
 Embed = Callable[..., Embedded]

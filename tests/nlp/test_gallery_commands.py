@@ -133,7 +133,7 @@ def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: R
 @pytest.mark.parametrize("name", ["3-rps", "6-rus", "delta", "planar-3-rrr"])  # the others compile for a minute
 def test_c_has_the_values_of_the_program(name: str, embed: Callable[[Case], Any]) -> None:
     case = starter(name)
-    c, nlp = embed(case), formulate(case)
+    c, nlp = embed(case, "-O0"), formulate(case)
     p, n, count = np.ascontiguousarray(nlp.arguments), nlp.n, len(nlp.program.constraints)
     k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
     F, gradient, g, dg = np.zeros(1), np.zeros(n), np.zeros(count), np.zeros((count, n))

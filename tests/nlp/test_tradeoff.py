@@ -239,17 +239,3 @@ def test_in_python() -> None:
         tradeoff(at, [])
     with pytest.raises(CaseError, match="x1"):
         tradeoff(at, [10, -1])
-
-
-def test_a_page_shows_curves_where_slices_would_show_little(tmp_path: Path, cli: Run) -> None:
-    pytest.importorskip("plotly")
-    page = tmp_path / "page.html"
-    assert cli("report", "hexapod-machining", "--starts", "4", "--out", str(page))[0] == 0
-    text = page.read_text(encoding="utf-8")
-    for key in ("limits.footprint.platform", "limits.footprint.base", "limits.leg_length.min"):
-        assert f"<caption>{key} from " in text
-    assert "no point of it keeps every limit" not in text
-    assert "the only one of its points within them" not in text
-    # Around this point there is room.
-    assert cli("report", "paper-4.1-helical", "--starts", "2", "--out", str(page))[0] == 0
-    assert "<caption>limits." not in page.read_text(encoding="utf-8")
