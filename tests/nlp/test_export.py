@@ -340,18 +340,13 @@ def _pitched(yaw: float) -> Array:
     return _about(2, yaw) @ _about(1, np.pi / 2)
 
 
-def test_links_that_are_limbs_are_exported_and_coupled_joints_are_refused() -> None:
+def test_links_that_are_limbs_are_exported_with_the_labels_of_limbs() -> None:
     nlp, _ = placed("3-rps", 0)
     found = exported("3-rps", 0)
-    tables = links_of(found.mechanism)
-    program = rebuilt(tables, nlp)
+    program = rebuilt(links_of(found.mechanism), nlp)
     again = mechanism_of(program, closed_start(program))
     assert [(joint.label, joint.actuator) for joint in again.joints] == [
         (joint.label, joint.actuator) for joint in found.joints
     ]
     for one, other in zip(again.mechanism.joints, found.mechanism.joints, strict=True):
         np.testing.assert_allclose(one.point, other.point, atol=1e-12)
-    program = rebuilt(tables | {"coupling": [{"factors": {"joint_1_1": 0.5, "joint_1_2": 1.0}}]}, nlp)
-    fault = "joints joint_1_1, joint_1_2, joint_1_3 are no limb with branches (its joints are coupled)"
-    with pytest.raises(InputError, match=re.escape(fault)):
-        mechanism_of(program, closed_start(program))

@@ -41,19 +41,19 @@ def joint_range(
     from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
 
     is_slide = step.kind == "P"
+    measure = "actuator_angle" if step.lever is None and not is_slide else "actuator_length"
     lower, upper = -math.inf, math.inf
     for limit in case.limits:
-        at = None
+        at, lever = None, 1.0
         if isinstance(limit, LegLength) and step.actuated and step.actuator in lengths:
             at = lengths[step.actuator]
         elif isinstance(limit, QuantityLimit) and step.actuated and joint is not None:
-            measure = "actuator_length" if is_slide else "actuator_angle"
-            at = value if limit.measure == measure else None
+            at, lever = (value, step.lever or 1.0) if limit.measure == measure else (None, 1.0)
         elif isinstance(limit, JointMotion) and joint is not None and joint.is_called(limit.joint):
             at = value if limit.part == step.part else None
         if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
-            lower = max(lower, -math.inf if limit.min is None else limit.min - at)
-            upper = min(upper, math.inf if limit.max is None else limit.max - at)
+            lower = max(lower, -math.inf if limit.min is None else limit.min / lever - at)
+            upper = min(upper, math.inf if limit.max is None else limit.max / lever - at)
     if math.isinf(lower) and math.isinf(upper):
         return None
     # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.
