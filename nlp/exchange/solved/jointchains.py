@@ -124,7 +124,7 @@ def _steps(
     if joint.type == "S":
         return [Step(name, label, joint.name, "", "S", points[0], np.zeros(3))]
     axes = [numbers.of(each.axis) for each in joint.axes]
-    pitch, side = 0.0, None
+    pitch, side, lever = 0.0, None, None
     parts: Sequence[str] = PARTS.get(joint.type, ("",))
     kinds: list[ElementaryKind]
     match joint.type:
@@ -140,13 +140,15 @@ def _steps(
             kinds, parts, axes = ["R", "R"], ("", "back"), axes * 2
             rod = numbers.of(joint.axes[0].rod)
             points = [points[0], points[0] + rod]
-            side = _APART * np.cross(axes[0], rod)
+            side, lever = _APART * np.cross(axes[0], rod), float(np.linalg.norm(rod))
         case _:
             kinds = ["R"]
     found = []
     for k, (kind, part) in enumerate(zip(kinds, parts, strict=True)):
         follows = joint.type == "Pa" and k == 1
         value = coordinates.get((label, "" if follows else part))
+        if value is not None and lever is not None:  # the way of a parallelogram, as the angle of its rods
+            value /= lever
         found.append(
             Step(
                 f"{name}_{part}" if part else name,
@@ -162,7 +164,7 @@ def _steps(
                 coordinate=-value if follows and value is not None else value,
                 follows=follows,
                 side=side,
-                lever=None if side is None else float(np.linalg.norm(points[1] - points[0])),
+                lever=lever,
             )
         )
     return found

@@ -70,7 +70,8 @@ def nested_mechanism(
     steps = {joint.name: _step(joint, known, places) for joint in at_home.joints}
 
     def from_home(step: Step) -> float | None:
-        return coordinates.get((step.label, step.part))
+        value = coordinates.get((step.label, step.part))
+        return value if value is None or step.lever is None else value / step.lever
 
     driven = {joint.name: from_home(steps[joint.name]) for joint in at_home.joints if joint.actuated}
     closed = close(at_home, actuators={name: value for name, value in driven.items() if value is not None})

@@ -42,13 +42,13 @@ def joint_range(
 
     is_slide = step.kind == "P"
     measure = "actuator_angle" if step.lever is None and not is_slide else "actuator_length"
-    lower, upper = -math.inf, math.inf
+    lower, upper, lever = -math.inf, math.inf, step.lever or 1.0
     for limit in case.limits:
-        at, lever = None, 1.0
+        at = None
         if isinstance(limit, LegLength) and step.actuated and step.actuator in lengths:
             at = lengths[step.actuator]
         elif isinstance(limit, QuantityLimit) and step.actuated and joint is not None:
-            at, lever = (value, step.lever or 1.0) if limit.measure == measure else (None, 1.0)
+            at = value if limit.measure == measure else None
         elif isinstance(limit, JointMotion) and joint is not None and joint.is_called(limit.joint):
             at = value if limit.part == step.part else None
         if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
