@@ -80,6 +80,11 @@ def test_every_broken_file_of_links_is_refused_in_one_sentence(tmp_path: Path) -
 
 def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, cli: Run) -> None:
     name = put(tmp_path, ROBOT)
+    slides = {member.label: member.slide for member in load_case(name).model.members}
+    assert list(slides) == ["1", "2"]
+    # The centre of the nested loops is any point of the axis of their hinge at the platform.
+    assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
+    assert slides["1"] is not None
     status, out, err = cli("evaluate", name)
     assert (status, err) == (0, "")
     assert "freedoms  2 with free actuators" in out
