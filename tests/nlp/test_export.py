@@ -84,7 +84,7 @@ def work_rates(J: Array) -> Array:
     return squares / np.abs(squares).max()
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
     for name in ROBOTS:
         nlp, x = placed(name, seed)
