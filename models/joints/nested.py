@@ -247,7 +247,16 @@ def pseudo_inverse(matrix: SX, rank: int) -> SX:
 
 def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:
     """Return a member of a network, with the kinds of its wrenches still to be measured."""
-    return Member(limb, _centre(network, each), screws, rank, ())
+    return Member(limb, _centre(network, each), screws, rank, (), slide=_slide(network, each))
+
+
+def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
+    """Return the current unit axis (3, 1) along which the centre could lie elsewhere; None where it is determined."""
+    if member.is_meeting or len(member.centre) != 1 or network.joint(member.centre[0]).type in ("S", "U", "Pa"):
+        return None
+    (k,) = member.centre
+    screw = network.screws[k][-1]
+    return screw[3:] if network.joint(k).axes[-1].kind is AxisKind.TRANSLATION else screw[:3]
 
 
 def _centre(network: OpenNetwork, member: NestedMember) -> SX:

@@ -178,8 +178,8 @@ def nested_joints(limb: NestedLimb) -> list[LimbJoint]:
         coordinates: list[JointCoordinate] = []
         if own:
             for value, axis, part in zip(own, joint.axes, _PARTS.get(joint.type, ("",)), strict=True):
-                slides = axis.kind is AxisKind.TRANSLATION
-                coordinates.append(JointCoordinate(part, Dimension.LENGTH if slides else Dimension.ANGLE, value))
+                dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
+                coordinates.append(JointCoordinate(part, dimension, axis.way(value)))
         elif joint.type == "R":
             base, other = (network.motions[body] for body in network.ends(k))
             angle = rotation_angle(joint.axes[0].axis, base.rotation.T @ other.rotation)

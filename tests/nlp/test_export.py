@@ -21,8 +21,12 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
 from screwsynth.nlp import (
     Case,
+    Free,
     InputError,
+    JointMotion,
+    Limits,
     Nlp,
+    QuantityLimit,
     Task,
     case_from_tables,
     evaluate,
@@ -80,7 +84,7 @@ def work_rates(J: Array) -> Array:
     return squares / np.abs(squares).max()
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
     for name in ROBOTS:
         nlp, x = placed(name, seed)
@@ -340,18 +344,29 @@ def _pitched(yaw: float) -> Array:
     return _about(2, yaw) @ _about(1, np.pi / 2)
 
 
-def test_links_that_are_limbs_are_exported_and_coupled_joints_are_refused() -> None:
+def test_links_that_are_limbs_are_exported_with_the_labels_of_limbs() -> None:
     nlp, _ = placed("3-rps", 0)
     found = exported("3-rps", 0)
-    tables = links_of(found.mechanism)
-    program = rebuilt(tables, nlp)
+    program = rebuilt(links_of(found.mechanism), nlp)
     again = mechanism_of(program, closed_start(program))
     assert [(joint.label, joint.actuator) for joint in again.joints] == [
         (joint.label, joint.actuator) for joint in found.joints
     ]
     for one, other in zip(again.mechanism.joints, found.mechanism.joints, strict=True):
         np.testing.assert_allclose(one.point, other.point, atol=1e-12)
-    program = rebuilt(tables | {"coupling": [{"factors": {"joint_1_1": 0.5, "joint_1_2": 1.0}}]}, nlp)
-    fault = "joints joint_1_1, joint_1_2, joint_1_3 are no limb with branches (its joints are coupled)"
-    with pytest.raises(InputError, match=re.escape(fault)):
-        mechanism_of(program, closed_start(program))
+
+
+def test_a_driven_parallelogram_has_the_range_of_its_way_as_an_angle() -> None:
+    rod = 2.0
+    driven = {"type": "Pa", "at": (0, 0, 0), "to": (0, 0, rod), "axis": "y", "actuated": True}
+    model = robot("swing", home=(0, 0, rod), limb=[{"joints": [driven]}])
+    limits = Limits(QuantityLimit("actuator_length", max=1.5), JointMotion("1:1", min=-1.0))
+    nlp = formulate(Case(model, {}, [Free(-2, 2), 0.0, Free(0, 3)], [Task(np.eye(6)[3])], limits=limits))
+    x = close_equations(nlp, np.array([rod * np.sin(0.4), rod * np.cos(0.4), 0.4]))
+    found = mechanism_of(nlp, x)
+    (joint,) = (each for each in found.mechanism.joints if each.actuated)
+    words = next(each for each in found.joints if each.actuator)
+    assert words.coordinate is not None
+    assert 0.3 < words.coordinate < 0.5
+    np.testing.assert_allclose(joint.range, np.array([-1.0, 1.5]) / rod - words.coordinate, atol=1e-12)
+    assert Tree(mjcf_text(found.mechanism), found.size).open <= 1e-9

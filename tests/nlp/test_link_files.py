@@ -8,81 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from link_robots import CASE, COUPLING, ROBOT
 
 from screwsynth.nlp import CaseError, load_case
 
 Run = Callable[..., tuple[int, str, str]]
-
-#: Planar: two driven cranks, and a rocker that couples them to the platform by a nested four-bar.
-ROBOT = """name = "links"
-home = [0, 1, 0]
-links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]
-points = { A = [0, 0, 0], B = [-0.2, "0.5*s", 0], C = [0.5, 0.6, 0], D = [0.6, 0, 0], E = [0.3, 1, 0] }
-[dimensions]
-s = { typical = 1.0 }
-[[joint]]
-name = "motor"
-type = "R"
-between = ["base", "crank"]
-at = "A"
-axis = "z"
-actuated = true
-[[joint]]
-name = "knee"
-type = "R"
-between = ["crank", "coupler"]
-at = "B"
-axis = "z"
-[[joint]]
-name = "wrist"
-type = "R"
-between = ["coupler", "rocker"]
-at = "C"
-axis = "z"
-[[joint]]
-name = "pivot"
-type = "R"
-between = ["base", "rocker"]
-at = "D"
-axis = "z"
-[[joint]]
-name = "hand"
-type = "R"
-between = ["rocker", "platform"]
-at = "E"
-axis = "z"
-[[joint]]
-name = "slide"
-type = "P"
-between = ["base", "rod"]
-at = [-1, 1.3, 0]
-axis = "x"
-actuated = true
-[[joint]]
-name = "tip"
-type = "R"
-between = ["rod", "bar"]
-at = [-0.6, 1.3, 0]
-axis = "z"
-[[joint]]
-name = "toe"
-type = "R"
-between = ["bar", "platform"]
-at = [-0.3, 1, 0]
-axis = "z"
-"""
-CASE = """[robot]
-file = "robot.toml"
-[robot.parameters]
-s = { min = 0.9, max = 1.1 }
-[pose]
-position = [0, 1, 0]
-[[task]]
-sense = "max"
-axis = [1, 0, 0]
-pitch = inf
-"""
-COUPLING = '[[coupling]]\nfactors = { motor = 1, pivot = "-s" }\n'
 
 FAULTS: list[tuple[str, str, str]] = [
     ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: cannot stand beside limb: give the robot by limbs, or by links and joints"),
@@ -150,6 +80,11 @@ def test_every_broken_file_of_links_is_refused_in_one_sentence(tmp_path: Path) -
 
 def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, cli: Run) -> None:
     name = put(tmp_path, ROBOT)
+    slides = {member.label: member.slide for member in load_case(name).model.members}
+    assert list(slides) == ["1", "2"]
+    # The centre of the nested loops is any point of the axis of their hinge at the platform.
+    assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
+    assert slides["1"] is not None
     status, out, err = cli("evaluate", name)
     assert (status, err) == (0, "")
     assert "freedoms  2 with free actuators" in out

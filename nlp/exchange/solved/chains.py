@@ -36,6 +36,7 @@ class Step:
         coordinate: its coordinate from home, where it is known: radians or length.
         follows: whether it turns back by the angle of the step before it, as a parallelogram does.
         side: (3,) from the middle of a parallelogram to one of its two rods, length; None for other joints.
+        lever: length of a parallelogram's rod, which turns its coordinate into the way of its actuator; else None.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Step:
     coordinate: float | None = None
     follows: bool = False
     side: FloatArray | None = None
+    lever: float | None = None
 
 
 class Chain(NamedTuple):

@@ -16,15 +16,12 @@ from ....models.joints.graphwords import read_robot
 from ....models.joints.linkgraph import home_of
 from ....models.mechanism.graph import ElementaryKind
 from ...case.plain import plain_value
-from ...errors import InputError, listing
 from .chains import Chain, Chains, Step
 
 #: Names of the elementary joints of a joint that has several, and the suffix of each.
-_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
+PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
 #: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
 _APART = 0.1
-#: Most names that a message lists.
-_MOST_NAMES = 8
 
 
 def is_given_by_joints(model: Model) -> bool:
@@ -32,24 +29,22 @@ def is_given_by_joints(model: Model) -> bool:
     return bool(_tables(model))
 
 
-def joint_chains(model: Model, dimensions: FloatArray, coordinates: Mapping[tuple[str, str], float]) -> Chains:
+def robot_at_home(model: Model) -> HomeRobot:
+    """Return a robot given joint by joint, at home."""
+    return home_of(read_robot(_tables(model)))
+
+
+def joint_chains(
+    model: Model, robot: HomeRobot, dimensions: FloatArray, coordinates: Mapping[tuple[str, str], float]
+) -> Chains:
     """Return the limbs of a robot given joint by joint, at home.
 
     Args:
-        model: the robot.
+        model: the robot, without nested loops.
+        robot: the same at home.
         dimensions: (d,) its dimensions in order, radians for angles.
         coordinates: known coordinates from home by label and part of a joint, such as ``("2:3", "first")``.
-
-    Raises:
-        InputError: the robot has a part that is no limb with branches, such as nested loops.
     """
-    robot = home_of(read_robot(_tables(model)))
-    if robot.graph is not None and robot.graph.networks:
-        indices, reason = robot.graph.networks[0]
-        names = listing(robot.graph.joints[k].name for k in indices[:_MOST_NAMES])
-        more = ", ..." if len(indices) > _MOST_NAMES else ""
-        fault = f"joints {names}{more} are no limb with branches ({reason}), and only these are exported"
-        raise InputError(f"robot {model.name!r} cannot be exported: {fault}")
     numbers = _Numbers(robot, dimensions)
     actuators = (each.name for each in model.actuators)
     known: dict[int, list[Step]] = {}
@@ -129,8 +124,8 @@ def _steps(
     if joint.type == "S":
         return [Step(name, label, joint.name, "", "S", points[0], np.zeros(3))]
     axes = [numbers.of(each.axis) for each in joint.axes]
-    pitch, side = 0.0, None
-    parts: Sequence[str] = _PARTS.get(joint.type, ("",))
+    pitch, side, lever = 0.0, None, None
+    parts: Sequence[str] = PARTS.get(joint.type, ("",))
     kinds: list[ElementaryKind]
     match joint.type:
         case "U":
@@ -145,13 +140,15 @@ def _steps(
             kinds, parts, axes = ["R", "R"], ("", "back"), axes * 2
             rod = numbers.of(joint.axes[0].rod)
             points = [points[0], points[0] + rod]
-            side = _APART * np.cross(axes[0], rod)
+            side, lever = _APART * np.cross(axes[0], rod), float(np.linalg.norm(rod))
         case _:
             kinds = ["R"]
     found = []
     for k, (kind, part) in enumerate(zip(kinds, parts, strict=True)):
         follows = joint.type == "Pa" and k == 1
         value = coordinates.get((label, "" if follows else part))
+        if value is not None and lever is not None:  # the way of a parallelogram, as the angle of its rods
+            value /= lever
         found.append(
             Step(
                 f"{name}_{part}" if part else name,
@@ -167,6 +164,7 @@ def _steps(
                 coordinate=-value if follows and value is not None else value,
                 follows=follows,
                 side=side,
+                lever=lever,
             )
         )
     return found

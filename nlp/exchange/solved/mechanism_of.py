@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from ....models.joints.chain import HomeRobot
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism
 from ...case.case import Case
@@ -16,8 +17,9 @@ from ...evidence.state import RobotState, evaluate
 from ...program.nlp import Nlp
 from .assembled import BASE, PLATFORM, assembled
 from .chains import Chains, Step, with_unique_names
-from .jointchains import is_given_by_joints, joint_chains
+from .jointchains import is_given_by_joints, joint_chains, robot_at_home
 from .legchains import PosedLeg, axes_of, check_legs, leg_chains
+from .nested import has_networks, nested_mechanism
 from .placing import Values, place
 from .ranges import joint_range, joints_by_label
 
@@ -71,7 +73,9 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         pose: number of the pose, from 1.
 
     Raises:
-        InputError: the joints of the robot's limbs are not known, or a leg has zero length.
+        InputError: the joints of the robot's limbs are not known, a leg has zero length, or the configuration of nested
+            loops is not reached from home.
+        MechanismError: nested loops do not close.
         EvaluationError: a number is not finite at the point, or a loop is open.
     """
     state = evaluate(nlp, x, pose - 1)
@@ -79,8 +83,11 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     labelled: Mapping[str, LimbJoint] = {}
     lengths: Mapping[str, float] = {}
     if is_given_by_joints(model):
+        robot = robot_at_home(model)
+        if has_networks(robot):
+            return _nested(nlp, x, pose, robot, state)
         dimensions = np.concatenate([np.zeros(0), *[state.parameters[each.name] for each in model.parameters]])
-        chains = joint_chains(model, dimensions, _coordinates(nlp, x, pose - 1))
+        chains = joint_chains(model, robot, dimensions, _coordinates(nlp, x, pose - 1))
         labelled = joints_by_label(nlp.program.robots[pose - 1].joints)
     else:
         check_legs(model)
@@ -112,6 +119,27 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     )
     mechanism = Mechanism(model.name, placed.links, joints, BASE, PLATFORM)
     return Exported(nlp.case, pose, mechanism, words, size, chains.notes)
+
+
+def _nested(nlp: Nlp, x: FloatArray, pose: int, robot: HomeRobot, state: RobotState) -> Exported:
+    """Return a robot with nested loops at a point of its program as a mechanism."""
+    known = nlp.program.robots[pose - 1].joints
+    found = nested_mechanism(
+        nlp.program.model,
+        robot,
+        state.parameters,
+        known,
+        _coordinates(nlp, x, pose - 1),
+        (state.rotation, state.position),
+    )
+    size = float(np.linalg.norm(np.ptp([joint.point for joint in found.mechanism.joints], axis=0))) or 1.0
+    labelled, joints, words = joints_by_label(known), [], []
+    for joint, step in zip(found.mechanism.joints, found.steps, strict=True):
+        value = step.coordinate or 0.0
+        own = joint_range(nlp.case, step, labelled.get(step.label), value, {}, size)
+        joints.append(replace(joint, range=own))
+        words.append(ExportedJoint(joint.name, step.label, step.part, step.actuator, step.coordinate))
+    return Exported(nlp.case, pose, replace(found.mechanism, joints=tuple(joints)), tuple(words), size, ())
 
 
 def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:

@@ -41,19 +41,19 @@ def joint_range(
     from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
 
     is_slide = step.kind == "P"
-    lower, upper = -math.inf, math.inf
+    measure = "actuator_angle" if step.lever is None and not is_slide else "actuator_length"
+    lower, upper, lever = -math.inf, math.inf, step.lever or 1.0
     for limit in case.limits:
         at = None
         if isinstance(limit, LegLength) and step.actuated and step.actuator in lengths:
             at = lengths[step.actuator]
         elif isinstance(limit, QuantityLimit) and step.actuated and joint is not None:
-            measure = "actuator_length" if is_slide else "actuator_angle"
             at = value if limit.measure == measure else None
         elif isinstance(limit, JointMotion) and joint is not None and joint.is_called(limit.joint):
             at = value if limit.part == step.part else None
         if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
-            lower = max(lower, -math.inf if limit.min is None else limit.min - at)
-            upper = min(upper, math.inf if limit.max is None else limit.max - at)
+            lower = max(lower, -math.inf if limit.min is None else limit.min / lever - at)
+            upper = min(upper, math.inf if limit.max is None else limit.max / lever - at)
     if math.isinf(lower) and math.isinf(upper):
         return None
     # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.
