@@ -62,8 +62,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
 def task_numbers(tables: Mapping[str, Any]) -> dict[str, tuple[Any, int | str]]:
     """Return the numbers of a document's tasks that can be set: table or list, and key or index within it, by name.
 
-    A vector has its own name and one for each component, such as ``task.point`` and ``task.point_x``. Those of the first
-    of several tasks are called ``task[0].point``.
+    A vector has its own name and one for each component, such as ``task.point`` and ``task.point_x``. With several
+    tasks, those of the first one are called ``task[0].point``.
     """
     tasks = tables.get("task", [])
     found: dict[str, tuple[Any, int | str]] = {}

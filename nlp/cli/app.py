@@ -15,6 +15,7 @@ from .new import new
 from .report import report
 from .schema import schema
 from .solve import solve
+from .sweep import sweep
 from .tradeoff import tradeoff
 from .verify_proof import verify_proof
 
@@ -29,7 +30,7 @@ app = typer.Typer(
 )
 
 # In the order in which help lists them.
-for command in (solve, report, tradeoff, certify, verify_proof, check, evaluate, codegen, models, schema, new):
+for command in (solve, report, tradeoff, sweep, certify, verify_proof, check, evaluate, codegen, models, schema, new):
     app.command()(command)
 
 

@@ -1,7 +1,7 @@
 """Optima of one program judged many at a time, where its numbers differ from point to point.
 
-The conditions are those of :mod:`.kkt` and :mod:`.optimality`, on arrays with one row for each point. A verdict is given
-only where they decide plainly: a feasible, stationary point with independent active normals, positive multipliers
+The conditions are those of :mod:`.kkt` and :mod:`.optimality`, on arrays with one row for each point. A verdict is
+given only where they decide plainly: a feasible, stationary point with independent active normals, positive multipliers
 and a positive reduced Hessian. :func:`~.optimality.examine` judges every other point, one at a time.
 """
 
@@ -191,7 +191,7 @@ def _linearise(nlp: Nlp, x: FloatArray, numbers: Numbers, scales: _Scales) -> _L
     noise = np.where(noise > NOTABLE, noise, 0.0)
     slack = np.where(sides.equal, -np.abs(residual), -residual)
     weight = nlp.sign / scales.objective
-    violation = np.maximum(0.0, -(slack + noise).min(axis=1, initial=0.0))
+    violation = np.maximum(-(slack + noise).min(axis=1, initial=0.0), 0.0) + 0.0  # without minus zero
     is_defined = np.isfinite(F) & np.isfinite(slack).all(axis=1)
     return _Linear(
         F,
@@ -255,7 +255,8 @@ def _hessians(
     n, sides = nlp.n, nlp.sides
     terms = sides.sign * mu * at.per_unit[rows]
     weights = np.zeros((len(rows), n + len(nlp.program.constraints)))
-    np.add.at(weights, (slice(None), sides.place), terms)
+    for side, place in enumerate(sides.place):
+        weights[:, place] += terms[:, side]
     weight = nlp.sign / scales.objective[rows]
     found = nlp.program.hessian(x.T, numbers.arguments.T, weight[None], weights[:, n:].T).full()
     scale = scales.scale[rows]

@@ -6,7 +6,8 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 
@@ -48,6 +49,20 @@ def write_bytes(target: str, content: bytes) -> None:
             path.write_bytes(content)
         else:
             _replace(path.resolve(), content)
+    except OSError as error:
+        raise _cannot_be_written(target, error) from None
+
+
+@contextmanager
+def write_whole(target: str) -> Iterator[Path]:
+    """Give an empty file to write in parts, which appears under the target's name when the block ends without an error.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    try:
+        with _temporary(Path(target).resolve()) as temporary:
+            yield temporary
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 
@@ -179,17 +194,25 @@ def _replace(path: Path, content: bytes) -> None:
 
 def _write_and_rename(path: Path, content: bytes) -> None:
     """Write a temporary file and give it the name of the result."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    with _temporary(path) as temporary:
+        temporary.write_bytes(content)
+
+
+@contextmanager
+def _temporary(path: Path) -> Iterator[Path]:
+    """Give an empty file beside a path, which gets the path's name at the end; an error removes it."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    os.close(handle)
+    temporary = Path(name)
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
+        yield temporary
         # Only its owner may read a temporary file; the result gets the permissions of any new file.
         mask = os.umask(0)
         os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
 
 
