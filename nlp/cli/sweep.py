@@ -79,24 +79,24 @@ def sweep(
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
-        journal = found.journal_of(out)
-        before = len(chosen) - len(journal.missing)
-        if before:
-            typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
         show = sys.stderr.isatty()
-        run_sweep(
-            found,
-            journal,
-            engine=None if engine is None else kinds[engine],
-            jobs=jobs,
-            dask=dask,
-            progress=_show_progress if show else None,
-            notice=lambda text: typer.echo(text, err=True),
-        )
-        if show:
-            sys.stderr.write(_CLEAR_LINE)
-        write_table(out, found, journal.rows())
-        journal.remove()
+        with found.journal_of(out) as journal:
+            before = len(chosen) - len(journal.missing)
+            if before:
+                typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
+            run_sweep(
+                found,
+                journal,
+                engine=None if engine is None else kinds[engine],
+                jobs=jobs,
+                dask=dask,
+                progress=_show_progress if show else None,
+                notice=lambda text: typer.echo(text, err=True),
+            )
+            if show:
+                sys.stderr.write(_CLEAR_LINE)
+            write_table(out, found, journal.rows())
+            journal.remove()
     raise typer.Exit(_show(found, out, plot))
 
 

@@ -12,7 +12,7 @@ from .rows import Row
 from .workers import PointBlock
 
 #: Seconds to wait for an answer of the cluster's scheduler.
-_WAIT = 10
+_WAIT = 5
 #: Blocks at the cluster for each of its threads: enough to keep it busy, few enough to fit into this memory.
 _AHEAD = 3
 #: Number of times that a block is given to the cluster again after its worker was lost.
@@ -54,7 +54,7 @@ def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> I
 
         threads = max(1, sum(client.nthreads().values()))
         first = [submit(block, 0) for _, block in zip(range(_AHEAD * threads), source, strict=False)]
-        running = dask.as_completed(first)
+        running = dask.as_completed(first, loop=client.loop)
         for future in running:
             block, tries = given.pop(future.key)
             error = future.exception() if future.status != "cancelled" else OSError("cancelled")

@@ -96,14 +96,22 @@ class Journal:
                 after = place + len(line)
                 yield row_of(line)
 
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Close the file, which another process may hold from then on."""
+        """Close the file, which another process may hold from then on; without rows it is removed."""
+        if not self._file.closed and (self._places < 0).all():
+            self.path.unlink(missing_ok=True)
         self._file.close()
 
     def remove(self) -> None:
         """Remove the file, once its rows are in the table."""
         self.path.unlink(missing_ok=True)
-        self.close()
+        self._file.close()
 
     def _hold(self) -> None:
         """Hold the file for this process alone.
