@@ -12,6 +12,7 @@ from .codegen import codegen
 from .evaluate import evaluate
 from .models import models
 from .new import new
+from .pareto import pareto
 from .report import report
 from .schema import schema
 from .solve import solve
@@ -30,7 +31,21 @@ app = typer.Typer(
 )
 
 # In the order in which help lists them.
-for command in (solve, report, tradeoff, sweep, certify, verify_proof, check, evaluate, codegen, models, schema, new):
+for command in (
+    solve,
+    report,
+    tradeoff,
+    sweep,
+    pareto,
+    certify,
+    verify_proof,
+    check,
+    evaluate,
+    codegen,
+    models,
+    schema,
+    new,
+):
     app.command()(command)
 
 

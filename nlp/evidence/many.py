@@ -123,20 +123,24 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
         stationarity, curvature = np.full(count, np.inf), np.full(count, np.nan)
         is_decided = np.zeros(count, dtype=bool)
         regular = np.isfinite(at.gradient).all(axis=1) & (at.violation <= FEASIBLE)
+        tangents: list[tuple[NDArray[np.intp], FloatArray]] = []
         for rows, held in _groups(active, regular, nlp.n):
             found = _multipliers(at.gradient[rows], at.normals[rows][:, held])
             mu[rows[:, None], held], stationarity[rows] = found.mu, found.stationarity
             strong = (found.mu > STRONG) | sides.equal[held]
-            is_decided[rows] = found.is_independent & strong.all(axis=1) & (found.stationarity <= STATIONARY)
-            inner = np.flatnonzero(is_decided[rows])
-            if len(held) == nlp.n:
-                curvature[rows[inner]] = np.inf
-            elif len(inner):
-                H = _hessians(nlp, x[rows[inner]], numbers.at(rows[inner]), mu[rows[inner]], scales, at, rows[inner])
-                Z = found.tangents[inner]
-                reduced = np.swapaxes(Z, 1, 2) @ H @ Z
-                whole = np.isfinite(reduced).all(axis=(1, 2))
-                curvature[rows[inner[whole]]] = np.linalg.eigvalsh(reduced[whole])[:, 0]
+            decided = found.is_independent & strong.all(axis=1) & (found.stationarity <= STATIONARY)
+            is_decided[rows] = decided
+            tangents.append((rows[decided], found.tangents[decided]))
+        chosen = np.flatnonzero(is_decided)
+        H = np.zeros((count, nlp.n, nlp.n))
+        if len(chosen):
+            H[chosen] = _hessians(nlp, x[chosen], numbers.at(chosen), mu[chosen], scales, at, chosen)
+        is_decided &= np.isfinite(H).all(axis=(1, 2))
+        for rows, Z in tangents:
+            if not Z.shape[2]:
+                curvature[rows] = np.inf
+            elif len(rows) and np.isfinite(H[rows]).all():
+                curvature[rows] = np.linalg.eigvalsh(np.swapaxes(Z, 1, 2) @ H[rows] @ Z)[:, 0]
         is_strict = is_decided & (curvature > CURVED)
     weights = at.per_unit * scales.objective[:, None]
     return Verdicts(is_strict, at.F, stationarity, at.violation, curvature, active, mu, weights)
