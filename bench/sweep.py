@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.output.sweeptable import write_table
+from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.sweep.points import grid
 from screwsynth.nlp.sweep.rows import Row
 from screwsynth.nlp.sweep.source import CaseSource
@@ -83,6 +83,7 @@ def memory(folder: str) -> None:
         write_table(out, sweep, journal.rows())
         written = time.perf_counter() - with_rows
         journal.remove()
+    table_points(out)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     times = f"journal of {size / 1e6:.0f} MB in {appended:.0f} s, table in {written:.0f} s"
     print(f"{count:,} rows: {times}, {peak:.0f} MB of memory")

@@ -55,14 +55,23 @@ def write_bytes(target: str, content: bytes) -> None:
 
 @contextmanager
 def write_whole(target: str) -> Iterator[Path]:
-    """Give an empty file to write in parts, which appears under the target's name when the block ends without an error.
+    """Give a new file to write in parts, which appears under the target's name when the block ends without an error.
+
+    Until then its name is the same at each run: what a killed run leaves is replaced by the next one.
 
     Raises:
         InputError: the file cannot be written.
     """
+    path = Path(target).resolve()
+    waiting = path.with_name(f".screwsynth.{path.name}")
     try:
-        with _temporary(Path(target).resolve()) as temporary:
-            yield temporary
+        waiting.unlink(missing_ok=True)
+        try:
+            yield waiting
+            waiting.replace(path)
+        except BaseException:
+            waiting.unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 
@@ -194,25 +203,17 @@ def _replace(path: Path, content: bytes) -> None:
 
 def _write_and_rename(path: Path, content: bytes) -> None:
     """Write a temporary file and give it the name of the result."""
-    with _temporary(path) as temporary:
-        temporary.write_bytes(content)
-
-
-@contextmanager
-def _temporary(path: Path) -> Iterator[Path]:
-    """Give an empty file beside a path, which gets the path's name at the end; an error removes it."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
-    os.close(handle)
-    temporary = Path(name)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
     try:
-        yield temporary
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
         # Only its owner may read a temporary file; the result gets the permissions of any new file.
         mask = os.umask(0)
         os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        Path(temporary).unlink(missing_ok=True)
         raise
 
 
