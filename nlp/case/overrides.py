@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias
 
@@ -17,6 +18,10 @@ Settings: TypeAlias = Mapping[str, float | list[float]]
 _LIMITS = "limits."
 #: What a free number has.
 _ENDS = ("min", "max", "start")
+#: Beginning of the name of a number of a task, such as ``task.pitch`` or ``task[1].point_x``.
+_TASK = re.compile(r"task(\[\d+\])?\..+")
+#: Names of the six numbers of a task's twist.
+_TWIST = tuple(f"twist_{k}" for k in range(6))
 #: Tables within that of a joint in ``limits.joint``.
 _PARTS_OF_JOINTS = ("first", "second", "angle", "stroke")
 
@@ -27,7 +32,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     Args:
         tables: the document, as ``tomllib`` returns it; changed in place.
         name: the name in the case; behind the name of a free number ``.min``, ``.max`` or ``.start`` may stand; or
-            the dotted key of a limit, such as ``limits.leg_length.max``.
+            the dotted key of a limit, such as ``limits.leg_length.max``, or of a number of a task, such as
+            ``task.pitch`` and ``task.point_x``, with its place among several as in ``task[1].pitch``.
         value: a number, or three, in the file's units.
 
     Raises:
@@ -35,6 +41,9 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     """
     if name.startswith(_LIMITS):
         _override_limit(tables, name, value)
+        return
+    if _TASK.fullmatch(name):
+        _override_task(tables, name, value)
         return
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
@@ -46,6 +55,35 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         return
     if name not in places:
         raise CaseError(name, f"cannot be set; {nearest(name, [*places, *rotations])}")
+    table, place = places[name]
+    table[place] = value
+
+
+def task_numbers(tables: Mapping[str, Any]) -> dict[str, tuple[Any, int | str]]:
+    """Return the numbers of a document's tasks that can be set: table or list, and key or index within it, by name.
+
+    A vector has its own name and one for each component, such as ``task.point`` and ``task.point_x``. With several
+    tasks, those of the first one are called ``task[0].point``.
+    """
+    tasks = tables.get("task", [])
+    found: dict[str, tuple[Any, int | str]] = {}
+    for index, task in enumerate(tasks):
+        for prefix in (f"task[{index}].", *(("task.",) if len(tasks) == 1 else ())):
+            for part, given in task.items():
+                if isinstance(given, list):
+                    names = _TWIST if part == "twist" else component_names(part, len(given))
+                    found |= {f"{prefix}{each}": (given, k) for k, each in enumerate(names[: len(given)])}
+                if part in ("axis", "point", "pitch", "weight"):
+                    found[f"{prefix}{part}"] = (task, part)
+            found.setdefault(f"{prefix}weight", (task, "weight"))
+    return found
+
+
+def _override_task(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace a number of a task; arguments and errors are those of :func:`override_number`."""
+    places = task_numbers(tables)
+    if name not in places:
+        raise CaseError(name, f"cannot be set; {nearest(name, places)}")
     table, place = places[name]
     table[place] = value
 

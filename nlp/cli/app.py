@@ -14,9 +14,11 @@ from .export import export
 from .importing import SeveralValues, import_
 from .models import models
 from .new import new
+from .pareto import pareto
 from .report import report
 from .schema import schema
 from .solve import solve
+from .sweep import sweep
 from .tradeoff import tradeoff
 from .verify_proof import verify_proof
 from .workspace import workspace
@@ -36,6 +38,8 @@ for command in (
     solve,
     report,
     tradeoff,
+    sweep,
+    pareto,
     certify,
     verify_proof,
     workspace,

@@ -31,10 +31,10 @@ STATIONARY = 1e-7
 #: Largest distance outside a side, in scaled variables, of a feasible point.
 FEASIBLE = 1e-9
 #: Gradient of a constraint, as a part of its typical size, that counts as zero.
-_NO_GRADIENT = 1e-9
+NO_GRADIENT = 1e-9
 #: Rounding error of a constraint's distance, in rounding units of its bound, and the smallest that is allowed for.
-_ROUNDINGS = 4
-_NOTABLE = 1e-10
+ROUNDINGS = 4
+NOTABLE = 1e-10
 #: Largest number of Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a
 #: change of the active set, or an optimum where F is flatter than a parabola, takes more.
 _NEWTON_STEPS = 40
@@ -107,16 +107,16 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     # Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
     typical = np.where(nlp.row_sizes > 0, np.minimum(nlp.row_sizes, 1.0), 1.0)
-    sizes = np.where(sizes > _NO_GRADIENT * typical, sizes, typical)
+    sizes = np.where(sizes > NO_GRADIENT * typical, sizes, typical)
     per_unit = 1 / np.concatenate([scale, sizes])[sides.place]
     residual = sides.sign * (np.concatenate([x, g.ravel()])[sides.place] - sides.limit) * per_unit
     outward = sides.sign * per_unit
     normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[sides.place]
     # Of a constraint the value is rounded, and the variables that it depends on are.
     steps = np.abs(normals) @ (np.abs(x) / scale)
-    noise = _ROUNDINGS * np.finfo(float).eps * (np.abs(sides.limit) * per_unit + steps)
+    noise = ROUNDINGS * np.finfo(float).eps * (np.abs(sides.limit) * per_unit + steps)
     noise[sides.place < nlp.n] = 0.0
-    noise = np.where(noise > _NOTABLE, noise, 0.0)
+    noise = np.where(noise > NOTABLE, noise, 0.0)
     weight = nlp.sign / nlp.objective_scale
     return Linearisation(
         x=np.asarray(x, dtype=np.float64),

@@ -6,7 +6,8 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 
@@ -48,6 +49,29 @@ def write_bytes(target: str, content: bytes) -> None:
             path.write_bytes(content)
         else:
             _replace(path.resolve(), content)
+    except OSError as error:
+        raise _cannot_be_written(target, error) from None
+
+
+@contextmanager
+def write_whole(target: str) -> Iterator[Path]:
+    """Give a new file to write in parts, which appears under the target's name when the block ends without an error.
+
+    Until then its name is the same at each run: what a killed run leaves is replaced by the next one.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    path = Path(target).resolve()
+    waiting = path.with_name(f".screwsynth.{path.name}")
+    try:
+        waiting.unlink(missing_ok=True)
+        try:
+            yield waiting
+            waiting.replace(path)
+        except BaseException:
+            waiting.unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 

@@ -207,12 +207,11 @@ class Nlp(Whole):
         The change is the largest sum of its scaled derivatives at a few points.
         """
         size = self.objective_size
-        # A free direction runs over its whole sphere: that is never narrow.
-        if not self.n or self.size is not None or self.program.places.directions:
+        if not self.has_scale_of_changes:
             return size
         changes = [float(np.abs(row[0]).sum()) for row in self._scaled_rows]
         change = max((each for each in changes if np.isfinite(each)), default=size)
-        return size if change >= _NARROW * size else max(change, _SMALLEST_CHANGE * size)
+        return float(scale_of_change(np.array(size), np.array(change)))
 
     @cached_property
     def rounding(self) -> float:
@@ -228,9 +227,19 @@ class Nlp(Whole):
     @cached_property
     def _scaled_rows(self) -> list[FloatArray]:
         """Derivatives (1 + c, n) of objective and constraints in scaled variables, at a few points of the box."""
-        shares = [np.zeros(self.n), *(2 * self._spread(k) for k in range(1, _POINTS))]
-        found = [self.program.kernels.derivatives(self.centre + self.scale * each, self.arguments) for each in shares]
+        points = [self.centre + self.scale * each for each in self.shares]
+        found = [self.program.kernels.derivatives(point, self.arguments) for point in points]
         return [np.vstack([each.gradient.reshape(1, -1), each.jacobian]) * self.scale for each in found]
+
+    @property
+    def has_scale_of_changes(self) -> bool:
+        """Whether the objective's scale may be its change between the bounds: a free direction is never narrow."""
+        return bool(self.n) and self.size is None and not self.program.places.directions
+
+    @property
+    def shares(self) -> list[FloatArray]:
+        """Points (n,) at which changes are measured, in half ranges from the middle of the box."""
+        return [np.zeros(self.n), *(2 * self._spread(k) for k in range(1, _POINTS))]
 
     def _spread(self, k: int) -> FloatArray:
         """Return the k-th of evenly spread points (n,), in half ranges from the middle, k >= 1."""
@@ -251,3 +260,8 @@ class Nlp(Whole):
             if np.isfinite(size) and size > 0:
                 return size
         return 1.0
+
+
+def scale_of_change(size: FloatArray, change: FloatArray) -> FloatArray:
+    """Return the scale of objectives from their sizes and from what they change by between the bounds."""
+    return np.where(change >= _NARROW * size, size, np.maximum(change, _SMALLEST_CHANGE * size))

@@ -22,6 +22,7 @@ COMMANDS = [
     ("check", "CASE", "--json", "OUT"),
     ("check", "CASE", "--junit", "OUT"),
     ("report", "CASE", "--starts", "1", "--out", "OUT"),
+    ("pareto", "CASE", "--goals", "max F", "--goals", "min limits.x", "--csv", "OUT"),
 ]
 
 

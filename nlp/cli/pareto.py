@@ -1,0 +1,77 @@
+"""The command ``pareto``."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from .numbers import WholeNumber
+from .options import CaseName, CurveFile, Jobs, Seed, SettingTexts, Starts, check_picture, read_settings
+
+#: Leaves the cursor at the beginning of an empty line.
+_CLEAR_LINE = "\r\033[K"
+
+
+def pareto(
+    case: CaseName,
+    goals: Annotated[
+        list[str], typer.Option(metavar="GOAL", help="Twice: 'max F:TASK', 'min F:TASK' or 'min limits.KEY'.")
+    ],
+    points: Annotated[
+        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front; 16.")
+    ] = 16,
+    settings: SettingTexts = None,
+    starts: Starts = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    certify: Annotated[bool, typer.Option("--certify", help="Prove each point's optimum too.")] = False,
+    csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the front as CSV.")] = None,
+    plot: CurveFile = None,
+) -> None:
+    """Find the front of two goals of a case."""
+    from ..case.reader import read_case
+    from ..errors import InputError, UncoveredError
+    from ..front.front import find_front
+    from ..front.goals import read_goals
+    from ..output.files import check_outputs, write_bytes, write_text
+    from ..output.fronttable import front_csv, front_words
+
+    check_picture(plot)
+    read = read_case(case, read_settings(settings))
+    wanted = read_goals(goals, read.case)
+    check_outputs(read.inputs, {"--csv": csv_file, "--plot": plot})
+    show = sys.stderr.isatty()
+
+    def show_progress(done: int, total: int) -> None:
+        sys.stderr.write(f"{_CLEAR_LINE}{done} of {total} points")
+        sys.stderr.flush()
+
+    try:
+        found = find_front(
+            read.case,
+            wanted,
+            points,
+            search=read.case.search.but(starts, seed),
+            jobs=jobs,
+            certify=certify,
+            progress=show_progress if show else None,
+        )
+    except UncoveredError as error:
+        raise InputError(f"--certify: {error}") from None
+    finally:
+        if show:
+            sys.stderr.write(_CLEAR_LINE)
+    if csv_file is not None:
+        write_text(csv_file, front_csv(found))
+    if plot is not None:
+        from ..output.pictures.fronts import front_picture
+        from ..output.pictures.requirements import ending_of
+
+        write_bytes(plot, front_picture(found, ending_of(plot)))
+    if csv_file != "-":
+        for line in front_words(found):
+            typer.echo(line)
+    is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
+    raise typer.Exit(0 if is_proved else 1)

@@ -1,0 +1,144 @@
+"""The command ``sweep``."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .numbers import WholeNumber
+from .options import CaseName, Jobs, Seed, SettingTexts, check_picture, read_settings
+
+if TYPE_CHECKING:
+    from ..sweep.points import Points
+    from ..sweep.sweep import Sweep
+
+#: Leaves the cursor at the beginning of an empty line.
+_CLEAR_LINE = "\r\033[K"
+
+
+def sweep(
+    case: CaseName,
+    out: Annotated[
+        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a killed run is resumed.")
+    ],
+    over: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=FIRST:LAST:COUNT", help="A number to vary, or NAME=V1,V2,...; several make a grid."),
+    ] = None,
+    points: Annotated[
+        str | None,
+        typer.Option("--points", metavar="FILE", help="A CSV file of points instead, names in its first row."),
+    ] = None,
+    settings: SettingTexts = None,
+    starts: Annotated[
+        int | None,
+        typer.Option(parser=WholeNumber("--starts", 1, 100_000), metavar="N", help="Starting points at each point; 8."),
+    ] = None,
+    seed: Seed = None,
+    jobs: Jobs = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
+    ] = None,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
+    ] = None,
+    plot: Annotated[
+        str | None, typer.Option("--plot", metavar="FILE", help="Draw F over one or two numbers: .png, .svg or .pdf.")
+    ] = None,
+) -> None:
+    """Solve at thousands of values of fixed numbers."""
+    from ..case.reader import read_case
+    from ..errors import InputError
+    from ..output.files import check_outputs
+    from ..output.sweeptable import check_table, is_written, write_table
+    from ..sweep.engines import EngineKind
+    from ..sweep.source import CaseSource
+    from ..sweep.sweep import Sweep, run_sweep
+
+    kinds = {kind.value: kind for kind in EngineKind}
+    if engine is not None and engine not in kinds:
+        raise InputError(f"--engine {engine}: must be compiled or ipopt")
+    chosen = _read_points(over, points)
+    check_picture(plot)
+    if plot is not None:
+        from ..output.pictures.sweeps import check_axes
+
+        check_axes(chosen)
+    check_table(out)
+    read = read_case(case, read_settings(settings))
+    inputs = dict(read.inputs)
+    if points is not None:
+        from pathlib import Path
+
+        inputs[Path(points)] = "the file of the points"
+    check_outputs(inputs, {"--out": out, "--plot": plot})
+    found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed)
+    if is_written(out, found):
+        typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
+    else:
+        show = sys.stderr.isatty()
+        with found.journal_of(out) as journal:
+            before = len(chosen) - len(journal.missing)
+            if before:
+                typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
+            run_sweep(
+                found,
+                journal,
+                engine=None if engine is None else kinds[engine],
+                jobs=jobs,
+                dask=dask,
+                progress=_show_progress if show else None,
+                notice=lambda text: typer.echo(text, err=True),
+            )
+            if show:
+                sys.stderr.write(_CLEAR_LINE)
+            write_table(out, found, journal.rows())
+            journal.remove()
+    raise typer.Exit(_show(found, out, plot))
+
+
+def _read_points(over: list[str] | None, file: str | None) -> Points:
+    """Return the points that the options state.
+
+    Raises:
+        InputError: there are none, or both options are given.
+    """
+    from ..errors import InputError
+    from ..output.files import read_text
+    from ..sweep.points import grid, points_of_csv
+
+    if bool(over) == (file is not None):
+        raise InputError("a sweep needs points: either --over NAME=FIRST:LAST:COUNT, once or more, or --points FILE")
+    return points_of_csv(read_text(file), file) if file is not None else grid(over or [])
+
+
+def _show(found: Sweep, out: str, plot: str | None) -> int:
+    """Draw the picture, print a line about the table, and return the exit status."""
+    import math
+
+    from ..output.sweeptable import table_points
+
+    rows = table_points(out)
+    if plot is not None:
+        from ..output.files import write_bytes
+        from ..output.pictures.requirements import ending_of
+        from ..output.pictures.sweeps import sweep_picture
+
+        case = found.source.case_at(found.points.settings(0))
+        write_bytes(plot, sweep_picture(case, found.points, rows, ending_of(plot)))
+    values = [row.F for row in rows if not math.isnan(row.F)]
+    regions = len({row.active for row in rows if not math.isnan(row.F)})
+    ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
+    typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
+    return 0 if values else 1
+
+
+def _show_progress(before: int, done: int, total: int, seconds: float) -> None:
+    """Write how far the sweep is, and the time left, on one line of standard error."""
+    left = seconds * (total - done) / done
+    words = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 100 else f"{left:.0f} s"
+    sys.stderr.write(f"{_CLEAR_LINE}{before + done:,} of {before + total:,} points, {words} left")
+    sys.stderr.flush()

@@ -1,0 +1,174 @@
+"""Programs of a front: one goal is optimised while the other keeps a bound (epsilon-constraint method).
+
+Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
+integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray
+from ..case.case import Case
+from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.pose import Free, OverPoses
+from ..case.task import Sense
+from ..errors import InputError, listing
+from ..program.assembly import assemble
+from ..program.epigraph import total_over_poses
+from ..program.formulation import formulate
+from ..program.layout import Layout, lay_out
+from ..program.nlp import Nlp
+from .goals import Goal
+
+
+@dataclass(frozen=True, eq=False)
+class GoalProgram:
+    """A program of a front.
+
+    Attributes:
+        nlp: the program; a limit that is optimised is its last variable.
+        optimised: index of the goal that is optimised.
+        values: ``(x, p)`` to the expressions of each goal, (k, 1); for a limit those of its constraints.
+        readings: how these expressions read, for each goal.
+        goals: both goals.
+    """
+
+    nlp: Nlp
+    optimised: int
+    values: ca.Function
+    readings: tuple[tuple[Reading, ...], ...]
+    goals: tuple[Goal, Goal]
+
+    def measure(self, x: FloatArray) -> FloatArray:
+        """Return the goals (2,) at a point (n,), lengths in the case's unit and angles in radians."""
+        found = self.values(x, self.nlp.arguments)
+        values = []
+        for goal, raw, readings in zip(self.goals, found, self.readings, strict=True):
+            each = [r.from_value(float(v)) for r, v in zip(readings, raw.full().ravel(), strict=True)]
+            # The limit holds for all of its constraints: its number is the worst of them.
+            values.append(each[0] if goal.task is not None else max(each) if goal.sense is Sense.MIN else min(each))
+        return np.array(values)
+
+
+def check_goals(case: Case, goals: Sequence[Goal]) -> None:
+    """Refuse goals that a front of the case cannot have.
+
+    Raises:
+        InputError: a limit is not in the case or cannot move, or the case combines poses by their worst.
+    """
+    if case.over_poses is OverPoses.WORST and case.pose_count > 1:
+        raise InputError("pareto: a case with the worst of several poses has no front here; use sum or mean")
+    layout = lay_out(case, [case.tasks[0]])
+    for goal in goals:
+        if goal.task is None:
+            _range(layout, goal)
+
+
+def program_of(case: Case, goals: tuple[Goal, Goal], optimised: int, bound: float | None) -> GoalProgram:
+    """Return the program that optimises one goal.
+
+    Args:
+        case: the case, whose own limits hold too.
+        goals: both goals.
+        optimised: index of the goal to optimise.
+        bound: number that the other goal must reach; None for none.
+
+    Raises:
+        CaseError: the case contradicts itself.
+        InputError: a limit is not in the case or cannot move.
+    """
+    best, other = goals[optimised], goals[1 - optimised]
+    tasks = [each.task for each in (best, other) if each.task is not None]
+    layout = lay_out(case, [case.tasks[task] for task in tasks])
+    added: list[BoundedConstraint] = []
+    if bound is not None and other.task is not None:
+        F = _total(layout, tasks.index(other.task))
+        sides = (bound, math.inf) if other.sense is Sense.MAX else (-math.inf, bound)
+        added.append(BoundedConstraint(Constraint(f"F of {other.label[2:]}", F, Reading(Dimension.NUMBER)), *sides))
+    if bound is not None and other.task is None:
+        layout = replace(layout, constraints=tuple(_moved(item, other, bound) for item in layout.constraints))
+    raw, readings = zip(*[_raw(layout, goal, tasks) for goal in goals], strict=True)
+    if best.task is not None:
+        objective, size = _total(layout, 0), formulate(case, best.task).objective_scale
+    else:
+        least, most = _range(layout, best)
+        dimension = readings[optimised][0].dimension
+        level = layout.table.add(best.label, dimension, Free(least, most)).symbols
+        layout = replace(
+            layout, constraints=tuple(each for item in layout.constraints for each in _below(item, best, level))
+        )
+        objective, size = level, most - least
+    nlp = replace(assemble(layout, objective, best.sense, added), size=size)
+    values = ca.Function("goals", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in raw])
+    return GoalProgram(nlp, optimised, values, readings, goals)
+
+
+def _total(layout: Layout, task: int) -> SX:
+    """Return F of a task of a layout over all poses."""
+    return total_over_poses([robot.F[task] for robot in layout.robots], layout.case.over_poses)
+
+
+def _raw(layout: Layout, goal: Goal, tasks: Sequence[int]) -> tuple[SX, tuple[Reading, ...]]:
+    """Return the expressions of a goal one below the other, and how each reads."""
+    if goal.task is not None:
+        return _total(layout, tasks.index(goal.task)), (Reading(Dimension.NUMBER),)
+    found = [item.constraint for item in layout.constraints if _is_of(item, goal)]
+    return ca.vertcat(*[each.expression for each in found]), tuple(each.reading for each in found)
+
+
+def _is_of(item: BoundedConstraint, goal: Goal) -> bool:
+    """Return whether a constraint is one of a goal's limit: an upper one for a minimum, a lower one for a maximum."""
+    return item.constraint.keys[int(goal.sense is Sense.MIN)] == goal.key
+
+
+def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
+    """Return the smallest and the largest number that a limit can have; the case's own is the loosest.
+
+    Raises:
+        InputError: the case has no such limit, or it has no end in the goal's direction.
+    """
+    found = [item for item in layout.constraints if _is_of(item, goal)]
+    if not found:
+        side = int(goal.sense is Sense.MIN)
+        keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
+        fault = "is no limit of the case that a front can move in this sense"
+        raise InputError(f"--goals {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
+    reading = found[0].constraint.reading
+    if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
+        raise InputError(f"--goals {goal.label}: is a limit on an estimate, which a front cannot move")
+    if goal.sense is Sense.MIN:
+        least, most = reading.above, min(reading.from_value(item.upper) for item in found)
+    else:
+        least, most = max(reading.from_value(item.lower) for item in found), reading.most
+        upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
+        most = min([most, *upper])
+    if not (math.isfinite(least) and math.isfinite(most) and least < most):
+        raise InputError(f"--goals {goal.label}: has no end in this direction; give the limit's other number too")
+    return least, most
+
+
+def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstraint:
+    """Return a constraint with a goal's number as its bound, where it is one of the goal's limit."""
+    if not _is_of(item, goal):
+        return item
+    value = float(item.constraint.reading.to_value(SX(bound)))
+    return replace(item, upper=value) if goal.sense is Sense.MIN else replace(item, lower=value)
+
+
+def _below(item: BoundedConstraint, goal: Goal, level: SX) -> tuple[BoundedConstraint, ...]:
+    """Return a constraint of a goal's limit against a level that is a variable, and its other side."""
+    if not _is_of(item, goal):
+        return (item,)
+    constraint, is_upper = item.constraint, goal.sense is Sense.MIN
+    expression = constraint.expression - constraint.reading.to_value(level)
+    plain = Constraint(constraint.name, expression, Reading(Dimension.NUMBER), pose=constraint.pose)
+    moved = BoundedConstraint(plain, -math.inf, 0.0) if is_upper else BoundedConstraint(plain, 0.0, math.inf)
+    rest = replace(item, upper=math.inf) if is_upper else replace(item, lower=-math.inf)
+    return (moved, rest) if math.isfinite(rest.lower) or math.isfinite(rest.upper) else (moved,)

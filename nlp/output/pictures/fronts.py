@@ -1,0 +1,48 @@
+"""The front of two goals as a picture."""
+
+from __future__ import annotations
+
+import textwrap
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...front.front import Front
+from ..fronttable import goal_values
+from .canvas import INK, MUTED
+from .figures import picture_of
+
+_SIZE = (6.4, 5.0)
+
+
+def front_picture(front: Front, ending: str) -> bytes:
+    """Return the content of a picture file of a front.
+
+    Args:
+        front: the front.
+        ending: ``.png``, ``.svg`` or ``.pdf``.
+    """
+    return picture_of(lambda: front_figure(front), ending)
+
+
+def front_figure(front: Front) -> Figure:
+    """Return one goal over the other as a Matplotlib figure; a gap of the front has no line."""
+    figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
+    axes = figure.add_subplot()
+    values = np.array([goal_values(front, point) for point in front.points])
+    first = 0
+    for last in (*front.gaps, len(values) - 1):
+        axes.plot(*values[first : last + 1].T, color="#08519c", marker="o", markersize=4.5, linewidth=1.4, gid="front")
+        first = last + 1
+    labels = [f"{goal.label} ({goal.sense.value})" for goal in front.goals]
+    axes.set_xlabel(labels[0], color=INK, parse_math=False)
+    axes.set_ylabel(labels[1], color=INK, parse_math=False)
+    axes.grid(color="#e3e6e8", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=INK, labelsize=9)
+    for spine in axes.spines.values():
+        spine.set_edgecolor(MUTED)
+    axes.ticklabel_format(useOffset=False)
+    title = "\n".join(textwrap.wrap(front.case.title or front.case.name, 60, max_lines=2, placeholder=" …"))
+    axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
+    return figure

@@ -1,0 +1,120 @@
+"""Engines of a sweep, made from a job that other processes and machines can read."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+from ..errors import CaseError, InputError
+from .compiled import CompiledEngine
+from .interpreted import solve_point
+from .places import NotPlacedError
+from .points import Points
+from .rows import Row
+from .source import CaseSource
+
+
+class EngineKind(enum.Enum):
+    """Kind of an engine; each value is the word of ``--engine``."""
+
+    COMPILED = "compiled"
+    IPOPT = "ipopt"
+
+
+class Job(NamedTuple):
+    """A sweep without its points.
+
+    Attributes:
+        source: the case.
+        names: numbers that change.
+        chosen: their values at the points at which programs are compared.
+        starts: number of searches at each point.
+        seed: seed instead of the case's.
+        kind: of the engine.
+    """
+
+    source: CaseSource
+    names: tuple[str, ...]
+    chosen: tuple[tuple[float, ...], ...]
+    starts: int
+    seed: int | None
+    kind: EngineKind
+
+
+class Choice(NamedTuple):
+    """A kind of engine, and the reason why it is not the compiled one; empty where it is, or was asked for."""
+
+    kind: EngineKind
+    reason: str
+
+
+def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> Choice:
+    """Return the kind of engine for a job: the compiled one where it covers the job.
+
+    Args:
+        job: the job.
+        wanted: the kind that is asked for; None for none.
+        threads: as for :func:`compiled_engine`.
+
+    Raises:
+        CaseError: the case has no number of a name, or does not allow a value.
+        InputError: the compiled engine is asked for and cannot be had.
+    """
+    if wanted is EngineKind.IPOPT:
+        for values in job.chosen:
+            job.source.case_at(dict(zip(job.names, values, strict=True)))
+        return Choice(EngineKind.IPOPT, "")
+    try:
+        compiled_engine(job, threads)
+    except CaseError:
+        raise
+    except (NotPlacedError, InputError) as error:
+        if wanted is EngineKind.COMPILED:
+            raise InputError(f"--engine compiled: {error}") from None
+        for values in job.chosen:
+            job.source.case_at(dict(zip(job.names, values, strict=True)))
+        return Choice(EngineKind.IPOPT, str(error))
+    return Choice(EngineKind.COMPILED, "")
+
+
+def answer(job: Job, indices: Sequence[int], values: FloatArray) -> list[Row]:
+    """Return the rows of a block of points by one thread.
+
+    Args:
+        job: the job.
+        indices: of the points.
+        values: (N, m) their numbers.
+    """
+    if job.kind is EngineKind.COMPILED:
+        engine = compiled_engine(job, 1)
+        return engine.rows(engine.solve(indices, values))
+    return [
+        solve_point(job.source, dict(zip(job.names, row.tolist(), strict=True)), index, job.starts, job.seed)
+        for index, row in zip(indices, values, strict=True)
+    ]
+
+
+@lru_cache(maxsize=2)
+def _engine(job: Job, threads: int | None) -> CompiledEngine:
+    chosen = Points(job.names, np.array(job.chosen))
+    return CompiledEngine(job.source, chosen, job.starts, job.seed, threads)
+
+
+def compiled_engine(job: Job, threads: int | None) -> CompiledEngine:
+    """Return the compiled engine of a job, made once in each process.
+
+    Args:
+        job: the job; its kind does not matter.
+        threads: number of threads; as many as there are processors where None.
+
+    Raises:
+        NotPlacedError: one program does not serve all points.
+        CaseError: the case has no number of a name, or does not allow a value.
+        InputError: there is no C compiler, or it fails.
+    """
+    return _engine(job._replace(kind=EngineKind.COMPILED), threads)

@@ -1,0 +1,61 @@
+"""Points of a sweep solved one at a time by Ipopt from many starts, as the command ``solve`` does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from ..errors import CaseError
+from ..evidence.optimality import Evidence
+from ..solver.solution import Solution
+from ..solver.solve import solve
+from .rows import REFUSED, Row, finite
+from .source import CaseSource
+
+
+def solve_point(
+    source: CaseSource, settings: Mapping[str, float | list[float]], index: int, starts: int, seed: int | None
+) -> Row:
+    """Return the row of one point.
+
+    Args:
+        source: the case.
+        settings: the point's numbers by name.
+        index: of the point.
+        starts: number of starting points.
+        seed: seed instead of the case's.
+    """
+    began = time.perf_counter()
+    try:
+        solution = solve(source.case_at(settings), starts=starts, seed=seed, jobs=1)
+    except CaseError as error:
+        return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
+    return row_of_solution(solution, index, time.perf_counter() - began)
+
+
+def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
+    """Return the row of a solution."""
+    units, own = solution.case.units, solution.outcomes[0].own
+    variables = own.nlp.program.variables
+    decided = solution.decided_by
+    evidence: Evidence | None = solution.evidence
+    row = Row(index, solution.status.value, None, engine="ipopt", seconds=seconds)
+    row = row._replace(
+        x=tuple(units.shown(value, each.dimension) for value, each in zip(solution.x, variables, strict=False))
+    )
+    if solution.status.is_answer:
+        value = solution.F if solution.combination is None else solution.combination.value
+        row = row._replace(F=None if value is None else finite(value))
+    if decided is not None:
+        converged = sum(optimum.count for optimum in decided.optima)
+        row = row._replace(starts=len(decided.starts), converged=converged)
+    if evidence is None:
+        return row
+    return row._replace(
+        active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
+        multipliers=tuple(side.multiplier for side in evidence.active),
+        verdict=evidence.kind.value,
+        stationarity=finite(evidence.stationarity),
+        feasibility=finite(evidence.feasibility),
+        curvature=finite(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
+    )

@@ -1,0 +1,155 @@
+"""Journal of a sweep: a file to which rows are appended as they finish, and from which a killed run is resumed.
+
+The first line is the head, each other line a row as JSON. What a killed process leaves of its last line is cut off when
+the journal is opened again. One process at a time holds a journal.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..interruption import WRITING
+from .rows import Row, line_of, row_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+try:
+    import fcntl
+except ImportError:  # a system without locks of files
+    fcntl = None  # type: ignore[assignment]
+
+#: Ending of a journal's name behind that of the table.
+ENDING = ".journal"
+
+
+class Journal:
+    """Rows of a sweep that are solved, in a file.
+
+    Args:
+        path: of the file, which is made when missing.
+        fingerprint: of the sweep.
+        count: number of its points.
+
+    Raises:
+        InputError: the file cannot be written, belongs to another sweep, or is held by another process.
+    """
+
+    def __init__(self, path: Path, fingerprint: str, count: int) -> None:
+        self.path = path
+        self._head = (json.dumps({"screwsynth": "sweep", "fingerprint": fingerprint, "points": count}) + "\n").encode()
+        self._places: NDArray[np.int64] = np.full(count, -1, dtype=np.int64)
+        try:
+            self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        try:
+            self._hold()
+            self._end = self._read()
+        except BaseException:
+            self._file.close()
+            raise
+
+    @property
+    def missing(self) -> NDArray[np.intp]:
+        """Indices of the points without a row, ascending."""
+        return np.flatnonzero(self._places < 0)
+
+    def append(self, rows: Iterable[Row]) -> None:
+        """Append rows; those of points that have one already are left out.
+
+        Raises:
+            InputError: the file cannot be written, as on a full disk; what is in it already stays.
+        """
+        lines: list[bytes] = []
+        with WRITING:
+            end = self._end
+            for row in rows:
+                if self._places[row.point] >= 0:
+                    continue
+                self._places[row.point] = end
+                lines.append(line_of(row).encode())
+                end += len(lines[-1])
+            try:
+                self._file.seek(self._end)
+                self._file.write(b"".join(lines))
+                self._file.flush()
+            except OSError as error:
+                raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from None
+            self._end = end
+
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows in the order of their points."""
+        with self.path.open("rb") as file:
+            after = -1
+            for place in self._places[self._places >= 0].tolist():
+                if place != after:
+                    file.seek(place)
+                line = file.readline()
+                after = place + len(line)
+                yield row_of(line)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, which another process may hold from then on; without rows it is removed."""
+        if not self._file.closed and (self._places < 0).all():
+            self.path.unlink(missing_ok=True)
+        self._file.close()
+
+    def remove(self) -> None:
+        """Remove the file, once its rows are in the table."""
+        self.path.unlink(missing_ok=True)
+        self._file.close()
+
+    def _hold(self) -> None:
+        """Hold the file for this process alone.
+
+        Raises:
+            InputError: another process holds it.
+        """
+        if fcntl is None:
+            return
+        try:
+            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError(f"{self.path}: another run of this sweep is writing it; wait for its end") from None
+
+    def _read(self) -> int:
+        """Read the places of the rows, cut off an incomplete last line, and return the file's end.
+
+        Raises:
+            InputError: the journal is of another sweep, or no journal.
+        """
+        head = self._file.readline()
+        if not head.endswith(b"\n") and self._head.startswith(head):
+            self._file.seek(0)
+            self._file.truncate()
+            self._file.write(self._head)
+            self._file.flush()
+        elif head != self._head:
+            raise InputError(f"{self.path}: belongs to another sweep; choose another --out, or remove it")
+        place = len(self._head)
+        for line in self._file:
+            if not line.endswith(b"\n"):
+                break
+            try:
+                index = row_of(line).point
+            except ValueError:
+                index = -1
+            if 0 <= index < len(self._places) and self._places[index] < 0:
+                self._places[index] = place
+            place += len(line)
+        self._file.truncate(place)
+        return place

@@ -1,0 +1,258 @@
+"""Numbers of a sweep placed in the arrays of one program, so that one program serves every point.
+
+A number that changes is an argument, a bound of a free variable, a limit, or a number of the task, from which the twist
+follows. The places are held to cases that are read and formulated anew at a few points: where anything differs, the
+sweep does not use them.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+from ..case.case import Case
+from ..case.overrides import task_numbers
+from ..case.task import unit_twist
+from ..embedding.runtimelimits import RunTimeLimits, run_time_limits
+from ..errors import CaseError
+from ..evidence.many import Numbers
+from ..program.formulation import formulate
+from ..program.layout import WIDENING
+from ..program.nlp import Nlp
+from ..program.pairs import with_all_pairs
+from .points import Points
+from .source import CaseSource
+
+#: Largest relative difference of a placed number from one that is read: rounding of a conversion.
+_SAME = 1e-12
+#: Largest relative difference of values of the two programs at one point: rounding of a thousand operations.
+_SAME_VALUE = 1e-9
+#: Number of points of the box at which values of the two programs are compared.
+_SHARES = 3
+_LIMITS = "limits."
+_ENDS = ("min", "max")
+
+
+class NotPlacedError(Exception):
+    """Reason why one program does not serve every point of a sweep, in words."""
+
+
+class _Limit(NamedTuple):
+    """A limit that changes: its index among those that C sets, and by what its values are multiplied."""
+
+    place: int
+    factor: float
+
+
+class Block(NamedTuple):
+    """Numbers of the program at N points of a sweep.
+
+    Attributes:
+        numbers: of the program.
+        limits: (N,) values of the limits that change, by key, as C takes them.
+        is_placed: (N,) whether the case may have the point's numbers; the others have those of the case.
+    """
+
+    numbers: Numbers
+    limits: Mapping[str, FloatArray]
+    is_placed: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places of the numbers of a sweep.
+
+    Attributes:
+        nlp: the program at the case's own numbers, with every constraint of its limits on pairs.
+        limits: the limits that C sets.
+        arguments: index of an argument, and by what the value is multiplied, by column of the points.
+        bounds: index of a variable, whether the bound is the upper one, and the factor, by column.
+        limited: the limit by column.
+        task: part of the task by column: its key, and the index in it, None for a single number.
+        written: the task's table in the case.
+    """
+
+    nlp: Nlp
+    limits: RunTimeLimits
+    arguments: Mapping[int, tuple[int, float]]
+    bounds: Mapping[int, tuple[int, bool, float]]
+    limited: Mapping[int, _Limit]
+    task: Mapping[int, tuple[str, int | None]]
+    written: Mapping[str, Any]
+
+    @property
+    def has_bounds(self) -> bool:
+        """Whether bounds of variables change."""
+        return bool(self.bounds)
+
+    def block(self, values: FloatArray) -> Block:
+        """Return the program's numbers at points with values (N, m)."""
+        nlp, count = self.nlp, len(values)
+        arguments, lower, upper, g_lower, g_upper = (
+            np.repeat(each[None], count, axis=0)
+            for each in (nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper)
+        )
+        is_placed = np.ones(count, dtype=bool)
+        for column, (index, factor) in self.arguments.items():
+            arguments[:, index] = values[:, column] * factor
+        for column, (index, is_upper, factor) in self.bounds.items():
+            (upper if is_upper else lower)[:, index] = values[:, column] * factor
+        crossed = ~(lower < upper).all(axis=1)
+        is_placed &= ~crossed
+        lower[crossed], upper[crossed] = nlp.lower, nlp.upper
+        if self.task:
+            (twist,) = nlp.program.places.twists
+            for k in range(count):
+                try:
+                    arguments[k, twist] = self._twist(values[k])
+                except CaseError:
+                    is_placed[k] = False
+        limits: dict[str, FloatArray] = {}
+        if self.limited:
+            for column, limit in self.limited.items():
+                limits[self.limits.limits[limit.place].key] = values[:, column] * limit.factor
+            for key, column_values in limits.items():
+                each = next(item for item in self.limits.limits if item.key == key)
+                allowed = (each.above < column_values) & (column_values <= each.most)
+                is_placed &= allowed
+                column_values[~allowed] = each.default
+            self._set_limits(limits, count, Numbers(arguments, lower, upper, g_lower, g_upper))
+        return Block(Numbers(arguments, lower, upper, g_lower, g_upper), limits, is_placed)
+
+    def _twist(self, values: FloatArray) -> FloatArray:
+        """Return the task's twist (6,) at one point.
+
+        Raises:
+            CaseError: the task may not have these numbers.
+        """
+        written = {key: list(each) if isinstance(each, list) else each for key, each in self.written.items()}
+        for column, (key, index) in self.task.items():
+            if index is None:
+                written[key] = float(values[column])
+            else:
+                written[key][index] = float(values[column])
+        if "twist" in written:
+            return np.array(written["twist"], dtype=np.float64)
+        pitch: Any = written.get("pitch")
+        return unit_twist(written.get("axis"), written.get("point"), pitch, "task")
+
+    def _set_limits(self, limits: Mapping[str, FloatArray], count: int, numbers: Numbers) -> None:
+        """Write the bounds that follow from limits into a program's numbers, as the C does."""
+        function = self.limits.function
+        if function is None:
+            return
+        rows = [limits.get(each.key, np.full(count, each.default)) for each in self.limits.limits]
+        converted = function(np.array(rows)).full()
+        changed = {k for k, each in enumerate(self.limits.limits) if each.key in limits}
+        for side in self.limits.sides:
+            if self.limits.owners[side.converted] in changed:
+                (numbers.g_upper if side.is_upper else numbers.g_lower)[:, side.constraint] = converted[side.converted]
+        for widened in self.limits.widenings:
+            if self.limits.owners[widened.converted] in changed:
+                bound = np.minimum(WIDENING * np.sqrt(converted[widened.converted]), 1.0)
+                numbers.lower[:, widened.variable], numbers.upper[:, widened.variable] = -bound, bound
+
+
+def place(source: CaseSource, chosen: Points) -> Places:
+    """Return the places of a sweep's numbers, after they have been compared with cases read anew.
+
+    Args:
+        source: the case.
+        chosen: points of the sweep at which the programs are compared, at least one; see :meth:`.Points.chosen`.
+
+    Raises:
+        NotPlacedError: one program does not serve all points, or is not covered here.
+        CaseError: the case has no number of a name, or does not allow a value.
+    """
+    tables = tomllib.loads(source.text)
+    programs = [_program(source.case_at(chosen.settings(k))) for k in range(len(chosen))]
+    nlp = programs[0]
+    program = nlp.program
+    limits = run_time_limits(nlp, "sweep")
+    arguments: dict[int, tuple[int, float]] = {}
+    bounds: dict[int, tuple[int, bool, float]] = {}
+    limited: dict[int, _Limit] = {}
+    task: dict[int, tuple[str, int | None]] = {}
+    of_task = {f"task.{name.partition('.')[2]}": found for name, found in task_numbers(tables).items()}
+    written = tables["task"][0]
+    keys = [each.key for each in limits.limits]
+    for column, name in enumerate(chosen.names):
+        plain = name.replace("task[0].", "task.")
+        whole, _, end = name.rpartition(".")
+        key = name.removeprefix(_LIMITS)
+        if plain in of_task and plain != "task.weight":
+            part = plain.removeprefix("task.")
+            table, where = of_task[plain]
+            if table is written:
+                task[column] = (part, None)
+            else:
+                task[column] = (part.rpartition("_")[0], int(where))
+        elif name in [each.name for each in program.arguments]:
+            index = [each.name for each in program.arguments].index(name)
+            arguments[column] = (index, nlp.case.units.to_internal(1.0, program.arguments[index].dimension))
+        elif end in _ENDS and whole in [each.name for each in program.variables]:
+            index = [each.name for each in program.variables].index(whole)
+            factor = nlp.case.units.to_internal(1.0, program.variables[index].dimension)
+            bounds[column] = (index, end == "max", factor)
+        elif key in keys or f"{key}.max" in keys:
+            k = keys.index(key) if key in keys else keys.index(f"{key}.max")
+            limited[column] = _Limit(k, nlp.case.units.to_internal(1.0, limits.limits[k].dimension))
+        else:
+            raise NotPlacedError(f"{name} changes the program itself")
+    found = Places(nlp, limits, arguments, bounds, limited, task, written)
+    for k, other in enumerate(programs):
+        _compare(found, other, chosen.values[[k]])
+    return found
+
+
+def _program(case: Case) -> Nlp:
+    """Return the program of a case.
+
+    Raises:
+        NotPlacedError: it is not covered.
+        CaseError: the case contradicts itself.
+    """
+    if len(case.tasks) > 1:
+        raise NotPlacedError("the case has several tasks")
+    nlp = formulate(case)
+    if not nlp.n:
+        raise NotPlacedError("the case has no free number")
+    if nlp.program.places.epigraph is not None:
+        raise NotPlacedError("the case is a worst case over poses")
+    if nlp.program.model.unknowns or nlp.program.model.loops:
+        raise NotPlacedError("the robot has loops to close")
+    if nlp.constant_limits:
+        raise NotPlacedError("the case has limits that depend on fixed numbers alone")
+    return with_all_pairs(nlp)
+
+
+def _compare(found: Places, other: Nlp, values: FloatArray) -> None:
+    """Compare placed numbers and values with those of a program that was formulated at one point with values (1, m).
+
+    Raises:
+        NotPlacedError: they differ.
+    """
+    block = found.block(values)
+    placed = block.numbers.put_into(found.nlp, 0)
+    names = [
+        [*(each.name for each in nlp.program.variables), *(each.name for each in nlp.program.constraints)]
+        + [each.name for each in nlp.program.arguments]
+        for nlp in (placed, other)
+    ]
+    pairs = [
+        (getattr(placed, name), getattr(other, name)) for name in ("arguments", "lower", "upper", "g_lower", "g_upper")
+    ]
+    is_same = names[0] == names[1] and bool(block.is_placed.all()) and placed.sense is other.sense
+    is_same = is_same and all(np.allclose(one, two, rtol=_SAME, atol=_SAME) for one, two in pairs)
+    for share in other.shares[:_SHARES] if is_same else ():
+        x = other.centre + 0.5 * share * other.scale
+        one, two = placed.evaluate(x), other.evaluate(x)
+        close = np.allclose([one.F, *one.g], [two.F, *two.g], rtol=_SAME_VALUE, atol=_SAME_VALUE, equal_nan=True)
+        is_same = is_same and bool(close)
+    if not is_same:
+        raise NotPlacedError("its program differs from point to point in more than numbers")

@@ -1,0 +1,152 @@
+"""Points of a sweep: a grid of lists and ranges, or the rows of a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...models import FloatArray, frozen_array
+from ..errors import InputError
+
+#: Largest number of points: their numbers and places in the journal then take less than a gigabyte.
+MOST_POINTS = 10_000_000
+#: Number of points, evenly spread, that are read beside those with an extreme number.
+_BETWEEN = 3
+_FORMS = "NAME=FIRST:LAST:COUNT or NAME=V1,V2,..., such as x1=10:14:41"
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of a sweep.
+
+    Attributes:
+        names: the m numbers that change, as ``--set`` names them.
+        values: (N, m) their values, in the case's units.
+        axes: values of each number on a grid; empty for the rows of a file.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    axes: tuple[FloatArray, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def settings(self, k: int) -> dict[str, float | list[float]]:
+        """Return the numbers of point k by name."""
+        return dict(zip(self.names, self.values[k].tolist(), strict=True))
+
+    def chosen(self) -> Points:
+        """Return the points with the smallest and the largest value of each number, and some between.
+
+        What a case allows of a number is an interval: where these points are allowed, so is almost every other.
+        """
+        ends = {int(f(column)) for column in self.values.T for f in (np.argmin, np.argmax)}
+        rows = sorted(ends | {int(k) for k in np.linspace(0, len(self) - 1, _BETWEEN)})
+        return Points(self.names, self.values[rows])
+
+
+def grid(texts: Sequence[str]) -> Points:
+    """Return the grid of one or more ranges and lists; the last number changes fastest.
+
+    Args:
+        texts: each ``NAME=FIRST:LAST:COUNT`` or ``NAME=V1,V2,...``.
+
+    Raises:
+        InputError: a text is neither, a number is named twice, or there are too many points.
+    """
+    read = [_read_axis(text) for text in texts]
+    names = tuple(name for name, _ in read)
+    _check_names(names, "--over")
+    axes = [values for _, values in read]
+    count = math.prod(map(len, axes))
+    if count > MOST_POINTS:
+        raise InputError(f"--over: makes {count:,} points, and at most {MOST_POINTS:,} are allowed")
+    values = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=1)
+    return Points(names, frozen_array(values, values.shape), tuple(axes))
+
+
+def points_of_csv(text: str, source: str) -> Points:
+    """Return the points of a CSV file, whose first row has the numbers' names.
+
+    Args:
+        text: of the file.
+        source: its name, for messages.
+
+    Raises:
+        InputError: the file has no points, a row has another length, or something is no finite number.
+    """
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    if not rows:
+        raise InputError(f"{source}: is empty: the first row must have the names of the numbers")
+    names = tuple(name.strip() for name in rows[0])
+    _check_names(names, source)
+    if len(rows) == 1:
+        raise InputError(f"{source}: has 0 points: a row of values must follow the names")
+    if len(rows) - 1 > MOST_POINTS:
+        raise InputError(f"{source}: has {len(rows) - 1:,} points, and at most {MOST_POINTS:,} are allowed")
+    values = np.empty((len(rows) - 1, len(names)))
+    for k, row in enumerate(rows[1:]):
+        if len(row) != len(names):
+            raise InputError(f"{source}: point {k + 1} has {len(row)} values, and must have {len(names)}")
+        for j, part in enumerate(row):
+            values[k, j] = _number(part, f"{source}: point {k + 1}, {names[j]}")
+    return Points(names, frozen_array(values, values.shape))
+
+
+def _read_axis(text: str) -> tuple[str, FloatArray]:
+    """Return name and values of one range or list; the errors are those of :func:`grid`."""
+    name, equals, right = (part.strip() for part in text.partition("="))
+    if not (name and equals and right):
+        raise InputError(f"--over {text}: must be {_FORMS}")
+    parts = right.split(":")
+    if len(parts) == 1:
+        values = [_number(part, f"--over {text}: value") for part in right.split(",")]
+        if len(set(values)) < len(values):
+            raise InputError(f"--over {text}: has a value twice; each point must be another one")
+        return name, np.array(values)
+    if len(parts) != 3:
+        raise InputError(f"--over {text}: must be {_FORMS}")
+    first, last = (_number(part, f"--over {text}: {end}") for part, end in zip(parts, ("FIRST", "LAST"), strict=False))
+    try:
+        count = int(parts[2])
+    except ValueError:
+        count = 0
+    if not 1 <= count <= MOST_POINTS:
+        raise InputError(f"--over {text}: COUNT = {parts[2].strip()} must be a whole number from 1 to {MOST_POINTS:,}")
+    if (first == last) != (count == 1):
+        raise InputError(f"--over {text}: FIRST and LAST must differ, or be equal with a COUNT of 1")
+    return name, np.linspace(first, last, count)
+
+
+def _check_names(names: Sequence[str], source: str) -> None:
+    """Refuse names that are missing or given twice.
+
+    Raises:
+        InputError: one is.
+    """
+    if not all(names):
+        raise InputError(f"{source}: the name of number {list(names).index('') + 1} is empty")
+    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+    if twice is not None:
+        raise InputError(f"{source}: {twice} is given twice; each number changes in one way")
+
+
+def _number(text: str, where: str) -> float:
+    """Return a finite number.
+
+    Raises:
+        InputError: the text is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where} = {text.strip()!r}: must be a finite number")
+    return value

@@ -1,0 +1,71 @@
+"""Rows of a sweep's table: the answer at one point, as the journal stores it."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import NamedTuple
+
+#: Status of a point at which the case contradicts itself; the other statuses are those of a solve.
+REFUSED = "refused"
+
+
+class Row(NamedTuple):
+    """The answer at one point.
+
+    Attributes:
+        point: index of the point.
+        status: that of the solve, or ``refused`` where the case is none at this point.
+        F: objective; for several tasks the value of their combination. None where there is no answer.
+        x: the free variables in the case's units; empty for a point that is refused.
+        active: sides of bounds and limits on which the point lies, such as ``p_z max``.
+        multipliers: of the active sides, in F per unit of the limit, per radian for angles.
+        verdict: on the point, in words.
+        stationarity: largest scaled derivative of the Lagrangian.
+        feasibility: largest distance outside a side, in half ranges.
+        curvature: smallest eigenvalue of the reduced Hessian; None where no direction is left, or it is not computed.
+        starts: number of searches.
+        converged: number of searches that ended at an optimum.
+        engine: ``compiled`` or ``ipopt``: whose point it is.
+        seconds: wall time; of points solved together, an equal share.
+        note: a sentence where the point is refused; empty otherwise.
+    """
+
+    point: int
+    status: str
+    F: float | None
+    x: tuple[float, ...] = ()
+    active: tuple[str, ...] = ()
+    multipliers: tuple[float, ...] = ()
+    verdict: str = ""
+    stationarity: float | None = None
+    feasibility: float | None = None
+    curvature: float | None = None
+    starts: int = 0
+    converged: int = 0
+    engine: str = ""
+    seconds: float = 0.0
+    note: str = ""
+
+
+def finite(value: float) -> float | None:
+    """Return a number as a row has it: None where it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def line_of(row: Row) -> str:
+    """Return a row as one line of JSON, with its line end."""
+    return json.dumps(row, separators=(",", ":"), allow_nan=False) + "\n"
+
+
+def row_of(line: str | bytes) -> Row:
+    """Return the row of a line.
+
+    Raises:
+        ValueError: the line is none of :func:`line_of`.
+    """
+    data = json.loads(line)
+    if not isinstance(data, list) or len(data) != len(Row._fields):
+        raise ValueError
+    row = Row(*data)
+    return row._replace(x=tuple(row.x), active=tuple(row.active), multipliers=tuple(row.multipliers))

@@ -1,0 +1,112 @@
+"""Blocks of a sweep answered in several processes.
+
+A worker reads its blocks from a pipe of its own, and ends when the other end is closed: none is left behind by a killed
+run. The block of a worker that dies is given to a new one.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import NamedTuple
+
+from ...models import FloatArray
+from ..errors import InputError
+from .engines import Job, answer
+from .rows import Row
+
+#: Number of workers that may die with one block: the block itself is then the cause.
+_DEATHS = 3
+
+
+class PointBlock(NamedTuple):
+    """A block of points: indices, and (N, m) values of their numbers."""
+
+    indices: Sequence[int]
+    values: FloatArray
+
+
+class _Worker(NamedTuple):
+    """A process, and this end of its pipe."""
+
+    process: BaseProcess
+    pipe: Connection
+
+
+def answer_in_processes(job: Job, blocks: Iterable[PointBlock], count: int) -> Iterator[list[Row]]:
+    """Answer blocks in several processes.
+
+    Args:
+        job: the job.
+        blocks: the blocks.
+        count: number of processes.
+
+    Yields:
+        The rows of each block, in the order in which they finish.
+
+    Raises:
+        InputError: a block kills every process that tries it.
+    """
+    waiting, source = deque[PointBlock](), iter(blocks)
+    busy: dict[Connection, tuple[_Worker, PointBlock]] = {}
+    deaths: dict[int, int] = {}
+    idle = deque(_start(job) for _ in range(count))
+    workers = set(idle)
+    try:
+        while True:
+            while idle:
+                block = waiting.popleft() if waiting else next(source, None)
+                if block is None:
+                    break
+                worker = idle.popleft()
+                worker.pipe.send(block)
+                busy[worker.pipe] = worker, block
+            if not busy:
+                return
+            ready = wait(list(busy))
+            for worker, block in [busy.pop(pipe) for pipe in list(busy) if pipe in ready]:
+                try:
+                    rows = worker.pipe.recv()
+                except (EOFError, OSError):
+                    first = block.indices[0]
+                    deaths[first] = deaths.get(first, 0) + 1
+                    if deaths[first] >= _DEATHS:
+                        fault = f"ended {_DEATHS} processes without an answer; the points before it are kept"
+                        raise InputError(f"point {first}: {fault}") from None
+                    workers.discard(worker)
+                    waiting.append(block)
+                    idle.append(_start(job))
+                    workers.add(idle[-1])
+                    continue
+                idle.append(worker)
+                yield rows
+    finally:
+        for worker in workers:
+            worker.pipe.close()
+            worker.process.terminate()
+            worker.process.join()
+
+
+def _start(job: Job) -> _Worker:
+    """Start a worker. It begins anew instead of as a copy of this process, whose threads would be lost in a copy."""
+    context = get_context("spawn")
+    mine, its = context.Pipe()
+    process = context.Process(target=_serve, args=(its, job), daemon=True)
+    process.start()
+    its.close()
+    return _Worker(process, mine)
+
+
+def _serve(pipe: Connection, job: Job) -> None:
+    """Answer blocks until the other end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to every process: the first one closes the pipe
+    while True:
+        try:
+            block = pipe.recv()
+            pipe.send(answer(job, block.indices, block.values))
+        except (EOFError, OSError):
+            return

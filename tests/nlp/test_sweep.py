@@ -1,0 +1,328 @@
+"""Sweeps: every row is an answer with evidence, and a killed run loses and doubles nothing."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from screwsynth.nlp import InputError, load_case, solve
+from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp.evidence.many import Numbers, judge_many
+from screwsynth.nlp.evidence.optimality import examine
+from screwsynth.nlp.output.sweeptable import table_points, write_table
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.sweep.engines import EngineKind, Job
+from screwsynth.nlp.sweep.journal import Journal
+from screwsynth.nlp.sweep.points import Points, grid
+from screwsynth.nlp.sweep.rows import Row, line_of
+from screwsynth.nlp.sweep.source import CaseSource
+from screwsynth.nlp.sweep.sweep import Sweep, run_sweep
+from screwsynth.nlp.sweep.workers import PointBlock, answer_in_processes
+
+Run = Callable[..., tuple[int, str, str]]
+
+CASE = "paper-4.1-helical"
+#: Case files that say the same number in two ways are the same to this part.
+SAME = 1e-9
+OVER = ("--over", "task.pitch=0.2:2:4", "--over", "x1=10,12.5,14")
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def answers(rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """All columns of rows but the time that each took."""
+    return [{name: cell for name, cell in row.items() if name != "seconds"} for row in rows]
+
+
+@pytest.fixture
+def sweep() -> Callable[..., Sweep]:
+    def of(*over: str, starts: int = 2) -> Sweep:
+        return Sweep.of(CaseSource.from_file(read_case(CASE)), grid(over), starts)
+
+    return of
+
+
+def test_many_verdicts_are_those_of_single_points() -> None:
+    at = [
+        load_case(CASE, {"task.pitch": pitch, "x1": x1}) for pitch, x1 in ((0.2, 10), (1.0, 12), (2.0, 14), (1.5, 10))
+    ]
+    nlps = [formulate(case) for case in at]
+    optima = [solve(case, starts=1).x for case in at]
+    middle = [nlp.centre + 0.1 * nlp.scale for nlp in nlps]
+    outside = [x + 3 * nlp.scale for x, nlp in zip(optima, nlps, strict=True)]
+    x, several = np.array([*optima, *middle, *outside]), nlps * 3
+    numbers = Numbers(
+        *(
+            np.array([getattr(nlp, name) for nlp in several])
+            for name in ("arguments", "lower", "upper", "g_lower", "g_upper")
+        )
+    )
+    # The program is that of another case: the numbers alone tell the points apart.
+    found = judge_many(formulate(load_case(CASE)), x, numbers)
+    single = [examine(nlp, point) for nlp, point in zip(several, x, strict=True)]
+    assert found.is_strict.tolist() == [each.kind.is_optimum for each in single] == [True] * 4 + [False] * 8
+    assert found.feasibility == pytest.approx([each.feasibility for each in single], abs=1e-14)
+    for k, (nlp, evidence) in enumerate(zip(several, single, strict=True)):
+        sides = np.flatnonzero(found.active[k])
+        assert [nlp.sides.sides[j].name for j in sides] == [side.name for side in evidence.active]
+        if k < 4:
+            assert found.F[k] == pytest.approx(nlp.evaluate(x[k]).F, rel=1e-14)
+            assert found.stationarity[k] == pytest.approx(evidence.stationarity, abs=1e-12)
+            assert found.curvature[k] == pytest.approx(evidence.eigenvalues[0], rel=1e-6)
+            bounds = [j for j in sides if nlp.sides.sides[j].variable is not None]
+            mine = [found.multipliers[k, j] * found.weights[k, j] for j in bounds]
+            theirs = [side.multiplier for side in evidence.active][: len(bounds)]
+            assert mine == pytest.approx(theirs, rel=1e-6)
+
+
+def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
+    out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.svg"
+    command = ("sweep", CASE, *OVER, "--out", str(out))
+    code, said, _ = cli(*command, "--engine", "compiled", "--plot", str(picture))
+    rows = table(out)
+    assert (code, len(rows), [row["index"] for row in rows]) == (0, 12, [str(k) for k in range(12)])
+    assert said.startswith("12 of 12 points have an answer")
+    assert {row["engine"] for row in rows} == {"compiled"}
+    assert not list(tmp_path.glob("*.journal"))
+    assert b"region" in picture.read_bytes()
+    for k in (0, 7, 11):
+        row = rows[k]
+        one = solve(load_case(CASE, {name: float(row[name]) for name in ("task.pitch", "x1")}), starts=8)
+        assert one.evidence is not None
+        assert float(row["F"]) == pytest.approx(one.F, rel=SAME)
+        assert row["active"] == "; ".join(f"{side.name} {side.bound}" for side in one.evidence.active)
+        multipliers = [side.multiplier for side in one.evidence.active]
+        assert [float(each) for each in row["multipliers"].split("; ")] == pytest.approx(multipliers, rel=1e-5)
+    before = out.read_bytes()
+    code, _, err = cli(*command)
+    assert (code, out.read_bytes()) == (0, before)
+    assert "holds all 12 points already" in err
+    code, _, err = cli("sweep", CASE, *OVER, "--starts", "3", "--out", str(out))
+    assert (code, out.read_bytes()) == (2, before)
+    assert (
+        err
+        == f"screwsynth: --out {out}: exists and is not the table of this sweep; choose another name, or remove it\n"
+    )
+
+
+def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    points, out = tmp_path / "points.csv", tmp_path / "sweep.parquet"
+    # The limit on the rotation is a bound of the program; the axis of the last point is none.
+    points.write_text("task.axis_x,task.axis_y,task.axis_z,p_x.max\n2,2,1,10\n0,0,1,9\n1,0,0,5\n0,0,0,7\n0,1,1,8\n")
+    code, said, err = cli(
+        "sweep", CASE, "--points", str(points), "--starts", "2", "--engine", "ipopt", "--jobs", "1", "--out", str(out)
+    )
+    assert (code, err) == (0, ""), err
+    found = pq.read_table(out).to_pydict()
+    assert found["index"] == list(range(5))
+    assert found["status"] == ["optimal", "optimal", "optimal", "refused", "optimal"]
+    assert "task[0].axis" in found["note"][3]
+    assert found["F"][3] is None
+    assert said.startswith("4 of 5 points have an answer")
+    assert [each.active for each in table_points(str(out))] == found["active"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--over", "x9=1:2:3"), "x9: cannot be set; allowed: x1, x2,"),
+        (("--over", "task.pich=1:2:3"), "did you mean 'task.pitch'?"),
+        (("--over", "x1=1:2:0"), "COUNT = 0 must be a whole number from 1 to"),
+        (("--over", "x1=1:2"), "must be NAME=FIRST:LAST:COUNT or NAME=V1,V2,..."),
+        (("--over", "x1=1,nan"), "value = 'nan': must be a finite number"),
+        (("--over", "x1=1,1"), "has a value twice"),
+        (("--over", "x1=-4:2:3"), "robot.parameters.x1 = -4.0: must be at least 0"),
+        (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "and at most 10,000,000 are allowed"),
+        (("--over", "x1=1,2", "--over", "x1=3,4"), "x1 is given twice"),
+        (("--points", "EMPTY"), "has 0 points"),
+        (("--points", "SHORT"), "point 2 has 1 values, and must have 2"),
+        (("--over", "x1=1,2", "--points", "EMPTY"), "either --over NAME=FIRST:LAST:COUNT, once or more, or --points"),
+        ((), "a sweep needs points"),
+        (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
+        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "has 16 starting points, and 17 are wanted"),
+        (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "3 numbers change on a grid"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path, cli: Run) -> None:
+    files = {"EMPTY": tmp_path / "empty.csv", "SHORT": tmp_path / "short.csv"}
+    files["EMPTY"].write_text("x1,x2\n")
+    files["SHORT"].write_text("x1,x2\n10,11\n12\n")
+    out = tmp_path / "out.csv"
+    given = [str(files.get(word, word)) for word in arguments]
+    code, said, err = cli("sweep", CASE, *given, "--out", str(out))
+    assert (code, said, len(err.splitlines())) == (2, "", 1), err
+    assert words in err
+    assert not out.exists()
+    assert not list(tmp_path.glob("*.journal"))
+
+
+def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
+    out = tmp_path / "out.csv"
+    for name, words in (
+        (tmp_path / "out.txt", "must end in .parquet or .csv"),
+        (tmp_path / "no" / "x.csv", "is no folder"),
+    ):
+        code, _, err = cli("sweep", CASE, *OVER, "--out", str(name))
+        assert (code, words in err) == (2, True), err
+    out.write_text("mine\n")
+    code, _, err = cli("sweep", CASE, *OVER, "--out", str(out))
+    assert (code, out.read_text()) == (2, "mine\n")
+    assert "is not the table of this sweep" in err
+    out.unlink()
+    journal = tmp_path / "out.csv.journal"
+    journal.write_text("mine\n")
+    code, _, err = cli("sweep", CASE, *OVER, "--out", str(out))
+    assert (code, journal.read_text()) == (2, "mine\n")
+    assert "belongs to another sweep" in err
+
+
+def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
+    path, rows = tmp_path / "journal", [Row(k, "optimal", k / 3, x=(k / 7,), active=("ä max",)) for k in (2, 0, 3, 1)]
+    whole = Journal(path, "abc", 4)
+    whole.append(rows[:2])
+    whole.append([*rows, rows[0]])
+    with pytest.raises(InputError, match="another run of this sweep is writing it"):
+        Journal(path, "abc", 4)
+    assert list(whole.rows()) == sorted(rows)
+    whole.close()
+    content = path.read_bytes()
+    head = len(content) - sum(len(line_of(row).encode()) for row in rows)
+    for length in range(len(content)):
+        path.write_bytes(content[:length])
+        journal = Journal(path, "abc", 4)
+        kept = 4 - len(journal.missing)
+        assert kept == content[head:length].count(b"\n") if length >= head else kept == 0
+        journal.append(rows)
+        assert (len(journal.missing), list(journal.rows())) == (0, sorted(rows))
+        journal.close()
+        assert path.read_bytes() == content
+    with pytest.raises(InputError, match="belongs to another sweep"):
+        Journal(path, "abd", 4)
+
+
+def test_ipopt_without_a_compiler(sweep: Callable[..., Sweep], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", str(tmp_path / "no-compiler"))
+    monkeypatch.setenv("PATH", "")
+    one, said = sweep("x1=11.5,11.75", starts=1), list[str]()
+    journal = one.journal_of(str(tmp_path / "out.csv"))
+    run_sweep(one, journal, jobs=1, notice=said.append)
+    rows = list(journal.rows())
+    journal.close()
+    assert [row.engine for row in rows] == ["ipopt", "ipopt"]
+    assert "needs a C compiler" in said[0]
+    alone = solve(load_case(CASE, {"x1": 11.75}), starts=1)
+    one_F = rows[1].F
+    assert one_F == pytest.approx(alone.F, rel=1e-12)
+
+
+def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    one = sweep("x1=10:14:45000")
+    asked = 0
+
+    def rows() -> Iterator[Row]:
+        nonlocal asked
+        for k in range(45_000):
+            asked = k
+            yield Row(k, "optimal", float(k), x=(0.0,) * 6)
+
+    write_table(str(tmp_path / "out.parquet"), one, rows())
+    file = pq.ParquetFile(tmp_path / "out.parquet")
+    assert [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)] == [20_000, 20_000, 5_000]
+    assert asked == 44_999
+    assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
+
+
+def _run(*arguments: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+@pytest.mark.slow
+def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -> None:
+    over = ("--over", "task.pitch=0:2:60", "--over", "x1=10:14:100", "--starts", "4")
+    whole, parts = tmp_path / "whole.csv", tmp_path / "parts.csv"
+    assert cli("sweep", CASE, *over, "--out", str(whole))[0] == 0
+    journal, sizes = Path(f"{parts}.journal"), [0]
+    for _ in range(3):
+        process = _run("sweep", CASE, *over, "--out", str(parts))
+        # A kill where the journal has grown, at a moment that differs from run to run.
+        while process.poll() is None and not (journal.exists() and journal.stat().st_size > sizes[-1] + 1000):
+            time.sleep(0.003)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+        sizes.append(journal.stat().st_size)
+    assert sizes == sorted(sizes)
+    assert not parts.exists()
+    assert _run("sweep", CASE, *over, "--out", str(parts)).wait() == 0
+    found = answers(table(parts))
+    assert len(found) == 6000
+    assert found == answers(table(whole))
+
+
+@pytest.mark.slow
+def test_processes_of_ipopt_and_one_that_is_killed(sweep: Callable[..., Sweep]) -> None:
+    one = sweep("x1=10:14:12", starts=2)
+    chosen = tuple(map(tuple, one.points.values.tolist()))
+    job = Job(one.source, one.points.names, chosen, 2, None, EngineKind.IPOPT)
+    blocks = [PointBlock([k], one.points.values[[k]]) for k in range(12)]
+    found: list[Row] = []
+    for rows in answer_in_processes(job, iter(blocks), 2):
+        found += rows
+        if len(found) == 3:
+            children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+            spawned = [pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+            os.kill(int(spawned[0]), signal.SIGKILL)
+    assert sorted(row.point for row in found) == list(range(12))
+    alone = solve(load_case(CASE, one.points.settings(7)), starts=2, jobs=1)
+    assert [row.F for row in found if row.point == 7] == pytest.approx([alone.F], rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    one = sweep("task.pitch=0:2:30", "x1=10:14:100", starts=2)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, scheduler_port=0
+    ) as cluster:
+        journal, killed = one.journal_of(str(tmp_path / "out.csv")), list[int]()
+
+        def kill(_before: int, done: int, total: int, _seconds: float) -> None:
+            if not killed and done < total:
+                worker = next(iter(cluster.workers.values()))
+                killed.append(worker.pid)
+                os.kill(worker.pid, signal.SIGKILL)
+
+        run_sweep(one, journal, dask=cluster.scheduler_address, progress=kill)
+        rows = list(journal.rows())
+        journal.close()
+    assert len(killed) == 1
+    assert [row.point for row in rows] == list(range(3000))
+    here = replace(one, points=Points(one.points.names, one.points.values[::1000]))
+    local = here.journal_of(str(tmp_path / "local.csv"))
+    run_sweep(here, local, engine=EngineKind.COMPILED)
+    assert [row.F for row in local.rows()] == pytest.approx([row.F for row in rows[::1000]], rel=SAME)
+    local.close()
+
+
+@pytest.mark.slow
+def test_an_unreachable_cluster(tmp_path: Path, cli: Run) -> None:
+    pytest.importorskip("distributed")
+    out = tmp_path / "out.csv"
+    code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
+    assert (code, out.exists()) == (2, False)
+    assert "no Dask scheduler answers there" in err.splitlines()[-1]
