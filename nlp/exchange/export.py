@@ -19,8 +19,8 @@ from ..program.nlp import Nlp
 from .solved.mechanism_of import mechanism_of
 from .writing.folder import check_formats, exported_files
 
-#: Largest difference of the Jacobian of a result from that of its numbers, in parts of its largest entry: results are
-#: closed to the solver's accuracy, and another assembly of the joints differs by parts of 1.
+#: Largest difference of J'J of a result from that of its numbers, in parts of its largest entry: results are closed to
+#: the solver's accuracy, and another assembly of the joints differs by parts of 1.
 _SAME = 1e-6
 
 if TYPE_CHECKING:
@@ -85,7 +85,9 @@ def is_assembled(nlp: Nlp, x: FloatArray) -> bool:
 
 
 def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
-    """Refuse a point whose Jacobian is not that of a result.
+    """Refuse a point whose Jacobian is not that of a result, up to the basis of the wrenches of a member.
+
+    F of every twist follows from J'J, which no choice of orthonormal wrenches within a member changes.
 
     Args:
         nlp: the program.
@@ -96,7 +98,10 @@ def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
         InputError: the same numbers give another Jacobian.
     """
     J = evaluate(nlp, x).jacobian
-    if J.shape != jacobian.shape or not np.abs(J - jacobian).max() <= _SAME * np.abs(jacobian).max():
+    # Moments in parts of their largest entry: J'J then has no units.
+    scale = np.repeat([np.abs(jacobian[:, :3]).max() or 1.0, np.abs(jacobian[:, 3:]).max() or 1.0], 3)
+    own, other = ((each / scale).T @ (each / scale) for each in (J, jacobian))
+    if J.shape != jacobian.shape or not np.abs(own - other).max() <= _SAME * np.abs(other).max():
         fault = "another assembly of its joints than the path from home leads to, or of another version of the case"
         raise InputError(f"the result is of {fault}: export the case without it")
 
