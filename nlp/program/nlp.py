@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
 
-from ...models import FloatArray
+from ...models import FloatArray, frozen_vector
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
@@ -223,6 +224,16 @@ class Nlp(Whole):
         """(c,) longest gradient of each constraint in scaled variables at a few points; 0 where there is none."""
         rows = [np.linalg.norm(each[1:], axis=1) for each in self._scaled_rows]
         return np.asarray(np.nan_to_num(np.array(rows), nan=0.0, posinf=0.0).max(axis=0), dtype=np.float64)
+
+    def with_constraints(self, added: Sequence[BoundedConstraint]) -> Self:
+        """Return the program with further constraints."""
+        program = replace(self.program, constraints=(*self.program.constraints, *(item.constraint for item in added)))
+        return replace(
+            self,
+            program=program,
+            g_lower=frozen_vector([*self.g_lower, *(item.lower for item in added)]),
+            g_upper=frozen_vector([*self.g_upper, *(item.upper for item in added)]),
+        )
 
     @cached_property
     def _scaled_rows(self) -> list[FloatArray]:

@@ -48,15 +48,7 @@ def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
     if not fresh:
         return nlp
     added = _without_repeated(nlp, [item for place in fresh for item in pair_constraints(nlp, place)])
-    program = replace(nlp.program, constraints=(*nlp.program.constraints, *(item.constraint for item in added)))
-    return replace(
-        nlp,
-        program=program,
-        g_lower=frozen_vector([*nlp.g_lower, *(item.lower for item in added)]),
-        g_upper=frozen_vector([*nlp.g_upper, *(item.upper for item in added)]),
-        pairs=(*nlp.pairs, *fresh),
-        pair_count=nlp.pair_count + len(added),
-    )
+    return replace(nlp.with_constraints(added), pairs=(*nlp.pairs, *fresh), pair_count=nlp.pair_count + len(added))
 
 
 def with_shared_pairs(nlps: Sequence[Nlp], places: Iterable[PairPlace]) -> list[Nlp]:

@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, RobotInstance, Substitution, frozen_vector, instantiate
+from ...models import FloatArray, RobotInstance, Substitution, instantiate
 from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.limit import Design, PosedRobot
@@ -148,13 +148,7 @@ def with_binding_poses(nlp: Nlp, case: Case, binding: Sequence[BindingPose]) -> 
         binding: the poses.
     """
     added = [item for k, each in enumerate(binding) for item in _constraints(nlp, case, each, k)]
-    program = replace(nlp.program, constraints=(*nlp.program.constraints, *(item.constraint for item in added)))
-    return replace(
-        nlp,
-        program=program,
-        g_lower=frozen_vector([*nlp.g_lower, *(item.lower for item in added)]),
-        g_upper=frozen_vector([*nlp.g_upper, *(item.upper for item in added)]),
-    )
+    return nlp.with_constraints(added)
 
 
 def _check(case: Case) -> None:

@@ -24,7 +24,7 @@ from ..solver.status import Status
 from .interpreted import solve_point
 from .places import Block, NotPlacedError, Places, place
 from .points import Points
-from .rows import Row, finite
+from .rows import Row, finite, with_evidence
 from .source import CaseSource
 
 #: Number of starting points in the table of the generated C.
@@ -143,16 +143,7 @@ class CompiledEngine:
     def _with_evidence(self, row: Row, block: Block, x: FloatArray, k: int) -> Row | None:
         """Return a row with evidence that is computed for its point alone; None where that is no optimum."""
         evidence = examine(block.numbers.put_into(self.places.nlp, k), x)
-        if not evidence.kind.is_optimum:
-            return None
-        return row._replace(
-            active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
-            multipliers=tuple(side.multiplier for side in evidence.active),
-            verdict=evidence.kind.value,
-            stationarity=finite(evidence.stationarity),
-            feasibility=finite(evidence.feasibility),
-            curvature=finite(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
-        )
+        return with_evidence(row, evidence) if evidence.kind.is_optimum else None
 
     def _multiplier(self, verdicts: Verdicts, block: Block, k: int, j: int) -> float:
         """Return the multiplier of side j at point k in F per unit of its limit."""

@@ -9,7 +9,7 @@ from ..errors import CaseError
 from ..evidence.optimality import Evidence
 from ..solver.solution import Solution
 from ..solver.solve import solve
-from .rows import REFUSED, Row, finite
+from .rows import REFUSED, Row, finite, with_evidence
 from .source import CaseSource
 
 
@@ -49,13 +49,4 @@ def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     if decided is not None:
         converged = sum(optimum.count for optimum in decided.optima)
         row = row._replace(starts=len(decided.starts), converged=converged)
-    if evidence is None:
-        return row
-    return row._replace(
-        active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
-        multipliers=tuple(side.multiplier for side in evidence.active),
-        verdict=evidence.kind.value,
-        stationarity=finite(evidence.stationarity),
-        feasibility=finite(evidence.feasibility),
-        curvature=finite(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
-    )
+    return row if evidence is None else with_evidence(row, evidence)

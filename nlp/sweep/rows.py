@@ -6,6 +6,8 @@ import json
 import math
 from typing import NamedTuple
 
+from ..evidence.optimality import Evidence
+
 #: Status of a point at which the case contradicts itself; the other statuses are those of a solve.
 REFUSED = "refused"
 
@@ -46,6 +48,18 @@ class Row(NamedTuple):
     engine: str = ""
     seconds: float = 0.0
     note: str = ""
+
+
+def with_evidence(row: Row, evidence: Evidence) -> Row:
+    """Return a row with the evidence at its point."""
+    return row._replace(
+        active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
+        multipliers=tuple(side.multiplier for side in evidence.active),
+        verdict=evidence.kind.value,
+        stationarity=finite(evidence.stationarity),
+        feasibility=finite(evidence.feasibility),
+        curvature=finite(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
+    )
 
 
 def finite(value: float) -> float | None:

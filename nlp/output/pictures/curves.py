@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from ...case.case import Case
 from ...results.tradeoff import TradeoffResult
 from ...results.tradeoffwording import objective_label, tradeoff_words
-from .canvas import INK, MUTED, RED
+from .canvas import INK, RED
 from .figures import picture_of
+from .frame import draw_frame
 
 #: Width and height of the picture, inches.
 _SIZE = (7.2, 4.6)
@@ -46,15 +47,8 @@ def tradeoff_figure(case: Case, result: TradeoffResult) -> Figure:
         axes.axvline(value, color=RED, linewidth=0.8, linestyle=":", gid="no answer")
     axes.set_xlabel(f"{result.over}, {result.unit}" if result.unit else result.over, color=INK, parse_math=False)
     axes.set_ylabel(objective_label(case), color=INK, parse_math=False)
-    axes.grid(color="#e3e6e8", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
-    axes.ticklabel_format(useOffset=False)
+    draw_frame(axes, case.title or case.name)
     axes.margins(x=0.03)
-    title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
-    axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     if several:
         for text in axes.legend(frameon=False, fontsize=9).get_texts():
             text.set_parse_math(False)

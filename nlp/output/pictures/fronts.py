@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from ...front.front import Front
 from ..fronttable import goal_values
-from .canvas import INK, MUTED
+from .canvas import INK
 from .figures import picture_of
+from .frame import draw_frame
 
 _SIZE = (6.4, 5.0)
 
@@ -37,12 +36,5 @@ def front_figure(front: Front) -> Figure:
     labels = [f"{goal.label} ({goal.sense.value})" for goal in front.goals]
     axes.set_xlabel(labels[0], color=INK, parse_math=False)
     axes.set_ylabel(labels[1], color=INK, parse_math=False)
-    axes.grid(color="#e3e6e8", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
-    axes.ticklabel_format(useOffset=False)
-    title = "\n".join(textwrap.wrap(front.case.title or front.case.name, 60, max_lines=2, placeholder=" …"))
-    axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
+    draw_frame(axes, front.case.title or front.case.name)
     return figure
