@@ -42,11 +42,13 @@ def test_a_thousand_random_starts_end_at_the_global_optimum(name: str, embedded:
     best = solve_program(nlp, case.search).F
     size = abs(best) if abs(best) > 1e-6 * nlp.objective_scale else nlp.objective_scale
     statuses: Counter[int] = Counter()
-    for x in starting_points(nlp, 1001, 5)[1:] if nlp.n else [nlp.start] * 3:
+    for k, x in enumerate(starting_points(nlp, 1001, 5)[1:] if nlp.n else [nlp.start] * 3):
         solved = c.solve(x0=x, seeds=0)
         statuses[solved.status] += 1
         if solved.status == OK:
             assert abs(solved.F - best) <= 1e-6 * size
+            if k % 5:  # Python's own judgement takes longer than the search
+                continue
             violation, residual = kkt(nlp, solved.x)
             assert violation <= FEASIBLE
             assert residual <= STATIONARY

@@ -41,6 +41,10 @@ DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]
 Run = Callable[..., tuple[int, str, str]]
 
 
+#: Shipped cases with an axis to draw; hexapod-workspace has the robot of hexapod-machining, and takes long to solve.
+PICTURED = [name for name in shipped_cases() if name not in {"paper-4.2", "hexapod-workspace"}]
+
+
 def drawing(name: str) -> Drawing:
     case = load_case(name)
     case = replace(case, search=case.search.but(4, None))
@@ -60,20 +64,22 @@ def exponential(twist: np.ndarray, t: float) -> np.ndarray:
     return total
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_cases() if name != "paper-4.2"])
+@pytest.mark.parametrize("name", PICTURED)
 def test_limbs_are_drawn_between_their_joints_in_the_view(name: str) -> None:
     robot = drawing(name)
     view = clearest_view(robot)
     figure = figure_of([robot], view=view)
-    lines = {line.get_gid(): np.asarray(line.get_xydata()) for line in figure.axes[0].lines}
+    lines = [(line.get_gid(), np.asarray(line.get_xydata())) for line in figure.axes[0].lines]
     for first, last, link in robot.links:
         if link.limb is None:
             continue
         ends = view.project(robot.posture.points[[first, last]])
-        assert np.max(np.abs(lines[f"limb {link.limb}"][[0, -1]] - ends)) <= 1e-9 * robot.size
+        # A limb of several links has a line for each.
+        apart = [np.max(np.abs(line[[0, -1]] - ends)) for gid, line in lines if gid == f"limb {link.limb}"]
+        assert min(apart) <= 1e-9 * robot.size
     assert robot.motion is not None
     if math.isfinite(robot.motion.pitch):  # a translation has an arrow instead
-        assert np.max(np.abs(lines["axis"][[0, -1]] - view.project(robot.motion.line))) <= 1e-9 * robot.size
+        assert np.max(np.abs(dict(lines)["axis"][[0, -1]] - view.project(robot.motion.line))) <= 1e-9 * robot.size
 
 
 def test_a_unit_is_as_long_across_as_upwards() -> None:
@@ -231,7 +237,7 @@ def assert_labels_are_clear(robots: list[Drawing]) -> Figure:
     return figure
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_cases() if name != "paper-4.2"])
+@pytest.mark.parametrize("name", PICTURED)
 def test_labels_stand_on_no_other_limb(name: str) -> None:
     assert_labels_are_clear([drawing(name)])
 
