@@ -11,6 +11,7 @@ import enum
 import os
 import signal
 import sys
+from collections.abc import Callable
 from threading import Event, Lock
 from types import FrameType
 
@@ -36,6 +37,8 @@ WRITING = Lock()
 _awaited: set[Milestone] = set()
 _answers = Event()
 _requested = Event()
+#: Process that has something to say where it is ended, and the function that returns its sentence.
+_parting: list[tuple[int, Callable[[], str]]] = []
 
 
 def answer_after(milestone: Milestone) -> None:
@@ -47,6 +50,11 @@ def reached(milestone: Milestone) -> None:
     """Declare that a milestone is reached."""
     if milestone in _awaited:
         _answers.set()
+
+
+def say_on_leaving(sentence: Callable[[], str]) -> None:
+    """Declare a function whose sentence is written where a request ends this process, but none that it starts."""
+    _parting[:] = [(os.getpid(), sentence)]
 
 
 def is_requested() -> bool:
@@ -71,12 +79,13 @@ def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
 
 
 def leave() -> None:
-    """End the process with a newline on standard error, once a file that is being written is complete."""
+    """End the process once a file that is being written is complete, with its sentence, or a newline, on stderr."""
     WRITING.acquire(timeout=_TO_WRITE)
     try:
         # Only a bar of progress hides the cursor.
         is_shown = "rich.progress" in sys.modules and os.isatty(2)
-        os.write(2, f"{_CLEAR if is_shown else ''}\n".encode())
+        words = "".join(f"\n{sentence()}" for process, sentence in _parting if process == os.getpid())
+        os.write(2, f"{_CLEAR if is_shown else ''}{words}\n".encode())
     except OSError:  # nobody reads any more
         pass
     os._exit(INTERRUPTED)

@@ -23,13 +23,14 @@ _ROTATIONS = (
 )
 
 
-def starter_case(model: Model) -> str:
+def starter_case(model: Model, robot_file: str | None = None) -> str:
     """Return the text of a case file for a robot at its typical dimensions, with the pose and one dimension free.
 
     The case can be solved as it is. Comments in the text explain its keys.
 
     Args:
         model: the robot.
+        robot_file: name of the file that the robot is from, beside the case; None for a robot by name or definition.
     """
     z, search = model.home[2], Search()
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
@@ -39,6 +40,8 @@ def starter_case(model: Model) -> str:
     definition = model.options.get("definition")
     units = _units_of(model)
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
+    if robot_file is not None:
+        robot = f"file = {json.dumps(robot_file, ensure_ascii=False)}"
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -69,7 +72,7 @@ def starter_case(model: Model) -> str:
         'name = "my task"',
         'sense = "max"                 # or "min": much or little work rate into this motion',
         "axis = [0, 1, 2]              # direction of the screw axis, any length but zero",
-        f"point = [0, 0, {z:g}]            # any point on it",
+        f"point = [0, 0, {z:g}]".ljust(30) + "# any point on it",
         "pitch = 2                     # translation per radian; 0: a rotation; inf: a translation along the axis",
         "",
         "# [limits]                    # what can be built; see the documentation for all of them",

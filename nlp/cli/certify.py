@@ -43,7 +43,7 @@ def certify(
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
     from ..case.reader import read_case
-    from ..errors import InputError
+    from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
     from ..output.files import check_outputs, write_text
     from ..output.terminal import show
@@ -74,8 +74,12 @@ def certify(
     except OptionError as error:
         raise InputError(f"--{error}") from None
     result = certified_of(certified)
-    if proof is not None and certified.tree is not None:
-        write_text(proof, proof_of(certified, text).as_text())
+    if proof is not None:
+        if certified.tree is not None:
+            write_text(proof, proof_of(certified, text).as_text())
+        else:
+            # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
+            typer.echo(f"--proof {one_line(proof)}: not written, as there is no complete proof", err=True)
     if json_file is not None:
         write_json(json_file, result)
     if "-" not in (json_file, proof):

@@ -37,7 +37,7 @@ def codegen(
     if measure:
         files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)
-    typer.echo(f"{len(files)} files in {one_line(out)}: make -C {one_line(out)} test")
+    typer.echo(f"{len(files)} files in {one_line(out)}; make -C {one_line(out)} test compiles and tests them")
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .numbers import WholeNumber
-from .options import CaseName, CurveFile, Jobs, Seed, SettingTexts, Starts, check_picture, read_settings
+from .options import CaseName, CurveFile, Jobs, Seed, SettingTexts, Starts, check_picture, console, read_settings
 
 #: Leaves the cursor at the beginning of an empty line.
 _CLEAR_LINE = "\r\033[K"
@@ -17,7 +17,8 @@ _CLEAR_LINE = "\r\033[K"
 def pareto(
     case: CaseName,
     goals: Annotated[
-        list[str], typer.Option(metavar="GOAL", help="Twice: 'max F:TASK', 'min F:TASK' or 'min limits.KEY'.")
+        list[str],
+        typer.Option(metavar="GOAL", help="Twice: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
     ],
     points: Annotated[
         int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front; 16.")
@@ -36,7 +37,8 @@ def pareto(
     from ..front.front import find_front
     from ..front.goals import read_goals
     from ..output.files import check_outputs, write_bytes, write_text
-    from ..output.fronttable import front_csv, front_words
+    from ..output.fronttable import front_csv, front_table, front_words
+    from ..output.terminal import show as show_items
 
     check_picture(plot)
     read = read_case(case, read_settings(settings))
@@ -73,5 +75,6 @@ def pareto(
     if csv_file != "-":
         for line in front_words(found):
             typer.echo(line)
+        show_items(console(), [front_table(found)])
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
     raise typer.Exit(0 if is_proved else 1)

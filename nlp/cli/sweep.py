@@ -52,6 +52,7 @@ def sweep(
     """Solve at thousands of values of fixed numbers."""
     from ..case.reader import read_case
     from ..errors import InputError
+    from ..interruption import say_on_leaving
     from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweep.engines import EngineKind
@@ -84,6 +85,12 @@ def sweep(
             before = len(chosen) - len(journal.missing)
             if before:
                 typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
+            say_on_leaving(
+                lambda: (
+                    f"{len(chosen) - len(journal.missing):,} of {len(chosen):,} points are in {journal.path}: "
+                    "the same command goes on from there"
+                )
+            )
             run_sweep(
                 found,
                 journal,

@@ -1,14 +1,17 @@
-"""The front of two goals as CSV and in words."""
+"""The front of two goals as CSV, in words, and as a table of text."""
 
 from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 
 from ..certificate.certificate import CertificateStatus
 from ..front.front import Front, FrontPoint
 from ..front.goals import Goal
 from ..program.places import Scalar
+from ..results.text import TextTable
+from ..results.tradeoffwording import unit_of_objective
 
 _SEPARATOR = "; "
 
@@ -32,7 +35,7 @@ def front_csv(front: Front) -> str:
             "" if point.bound is None else _shown(front, 1 - point.program.optimised, point.bound),
             point.solution.status.value,
             *design,
-            "" if evidence is None else _SEPARATOR.join(f"{side.name} {side.bound}" for side in evidence.active),
+            "" if evidence is None else _SEPARATOR.join(_active(point)),
             "" if evidence is None else _SEPARATOR.join(repr(side.multiplier) for side in evidence.active),
             "" if evidence is None else evidence.kind.value,
             "" if evidence is None else evidence.stationarity,
@@ -66,6 +69,50 @@ def front_words(front: Front) -> list[str]:
         proved = sum(each.status is CertificateStatus.PROVED for each in proofs)
         lines.append(f"{proved} of {len(proofs)} points are proved: no point of the box within its bound is better")
     return lines
+
+
+def front_table(front: Front) -> TextTable:
+    """Return a row for each point of a front: goals, whose optimum it is, its proof and its active limits."""
+    proved = any(point.certificate is not None for point in front.points)
+    units = (f"\n{unit}" if unit else "" for unit in goal_units(front))
+    named = (f"{name}{unit}" for name, unit in zip(goal_names(front), units, strict=True))
+    headers = (*named, "optimum of", *(("certificate",) if proved else ()), "active")
+    rows = tuple(
+        (
+            *(f"{value:.7g}" for value in goal_values(front, point)),
+            front.goals[point.program.optimised].label,
+            *((point.certificate.status.value if point.certificate is not None else "",) if proved else ()),
+            ", ".join(_counted(point)),
+        )
+        for point in front.points
+    )
+    return TextTable(headers, rows)
+
+
+def goal_names(front: Front) -> list[str]:
+    """Return each goal with its sense."""
+    return [_words(goal) for goal in front.goals]
+
+
+def goal_units(front: Front) -> list[str]:
+    """Return the unit of each goal; an empty text for a plain number."""
+    readings = [each[0].dimension for each in front.points[0].program.readings]
+    return [
+        front.case.units.label(dimension) if goal.task is None else unit_of_objective(front.case, goal.task)
+        for goal, dimension in zip(front.goals, readings, strict=True)
+    ]
+
+
+def _active(point: FrontPoint) -> list[str]:
+    evidence = point.solution.evidence
+    return [] if evidence is None else [f"{side.name} {side.bound}" for side in evidence.active]
+
+
+def _counted(point: FrontPoint) -> list[str]:
+    """Return the active sides without the limbs and joints that they are about, and how many each stands for."""
+    evidence = point.solution.evidence
+    sides = [] if evidence is None else [f"{side.name.split()[0]} {side.bound}" for side in evidence.active]
+    return [name if count == 1 else f"{name} ({count})" for name, count in Counter(sides).items()]
 
 
 def _words(goal: Goal) -> str:

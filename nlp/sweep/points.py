@@ -120,7 +120,8 @@ def _read_axis(text: str) -> tuple[str, FloatArray]:
     if not 1 <= count <= MOST_POINTS:
         raise InputError(f"--over {text}: COUNT = {parts[2].strip()} must be a whole number from 1 to {MOST_POINTS:,}")
     if (first == last) != (count == 1):
-        raise InputError(f"--over {text}: FIRST and LAST must differ, or be equal with a COUNT of 1")
+        fault = "FIRST and LAST differ, so that COUNT must be 2 or more" if count == 1 else "FIRST and LAST must differ"
+        raise InputError(f"--over {text}: {fault}; one value alone is NAME=VALUE")
     return name, np.linspace(first, last, count)
 
 

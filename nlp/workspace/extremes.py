@@ -133,7 +133,9 @@ def _extreme(
             outcome = Outcome.REFUTED
         else:
             outcome = Outcome.PROVED if sign * (bound - claim.limit) <= slack and math.isfinite(bound) else Outcome.OPEN
-            reason = reason or ("the limit is closer than the gap" if outcome is Outcome.OPEN else "")
+            reason = reason or (
+                "the limit is closer than the gap: a smaller --gap may decide" if outcome is Outcome.OPEN else ""
+            )
     read = claim.reading.from_value
     return Extreme(
         name=claim.name,

@@ -96,7 +96,7 @@ def _from_minimum(
         outcome = Outcome.REFUTED
     elif found.bound >= limit - slack:
         outcome = Outcome.PROVED
-    reason = found.reason or "the limit is closer than the gap"
+    reason = found.reason or "the limit is closer than the gap: a smaller --gap may decide"
     return Extreme(
         name=name,
         sense=Sense.MIN if sign > 0 else Sense.MAX,
@@ -147,7 +147,7 @@ def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: flo
         outcome = Outcome.REFUTED
     elif math.isfinite(bound) and sign * (bound - limit) <= slack:
         outcome = Outcome.PROVED
-    reason = "the limit is closer than the gap of the lengths"
+    reason = "the limit is closer than the gap of the lengths: a smaller --gap may decide"
     if not math.isfinite(bound):
         reason = "the leg's lengths are not bounded"
     return Extreme(

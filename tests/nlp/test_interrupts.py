@@ -120,6 +120,18 @@ def test_during_imports_nothing_is_shown(after: float, case: str) -> None:
     assert plain(ended.shown).strip("\r\n") == ""
 
 
+def test_an_interrupted_sweep_says_how_many_points_are_kept(case: str, tmp_path: Path) -> None:
+    out = tmp_path / "sweep.csv"
+    grid = ("--over", "limits.leg_length.max=400:500:200", "--engine", "ipopt", "--starts", "1", "--jobs", "1")
+    ended = interrupted(" of 200 points,", "sweep", case, *grid, "--out", str(out))
+    assert ended.status == 130
+    assert ended.seconds <= _AT_ONCE, ended
+    rows = len(out.with_name("sweep.csv.journal").read_text(encoding="utf-8").splitlines()) - 1
+    assert 0 < rows < 200
+    words = "".join(plain(ended.shown).split())
+    assert f"{rows} of 200 points are in {out}.journal: the same command goes on from there".replace(" ", "") in words
+
+
 def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -> None:
     result = tmp_path / "result.json"
     ended = interrupted(", best ", "solve", case, "--json", str(result))

@@ -63,6 +63,9 @@ def test_two_objectives_on_a_line(case: str, tmp_path: Path, cli: Run) -> None:
     assert (code, err) == (0, "")
     assert said.startswith("9 points on the front of max F:up and max F:side\n")
     rows = table(out.read_text())
+    # The terminal has the same points.
+    shown = [line.split()[:2] for line in said.splitlines()[-9:]]
+    assert shown == [[f"{float(row[name]):.7g}" for name in ("F:up", "F:side")] for row in rows]
     up, side = (np.array([float(row[name]) for row in rows]) for name in ("F:up", "F:side"))
     assert up + 2 * side == pytest.approx(np.full(9, 6.0), abs=EXACT)
     heights = [float(row["p_z"]) for row in (rows[0], rows[-1])]

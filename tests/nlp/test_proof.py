@@ -176,6 +176,13 @@ def test_the_command_line_writes_and_checks_proofs(cli: Run, tmp_path: Path) -> 
     assert "other expressions" in err
 
 
+def test_no_proof_is_written_of_a_search_that_ends_before(cli: Run, tmp_path: Path) -> None:
+    target = tmp_path / "proof.json"
+    code, _, err = cli("certify", "paper-4.3", "--starts", "1", "--time", "0.01", "--proof", str(target))
+    assert (code, err) == (1, f"--proof {target}: not written, as there is no complete proof\n")
+    assert not target.exists()
+
+
 def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path: Path, proof: Proof) -> None:
     target = tmp_path / "proof.json"
     content = json.loads(proof.as_text())

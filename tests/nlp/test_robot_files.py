@@ -129,6 +129,16 @@ def test_a_robot_file_beside_a_case_is_solved(
     assert again.model.options["definition"] == case.model.options["definition"]
 
 
+def test_a_new_case_of_a_robot_file_is_read_beside_it(tmp_path: Path, cli: Run) -> None:
+    (tmp_path / "robot.toml").write_text(RPS, encoding="utf-8")
+    code, text, err = cli("new", str(tmp_path / "robot.toml"))
+    assert (code, err) == (0, "")
+    case = tmp_path / "case.toml"
+    case.write_text(text, encoding="utf-8")
+    assert cli("evaluate", str(case))[0] == 0
+    assert cli("new", str(case))[0] == 2
+
+
 def test_an_output_never_takes_the_place_of_the_robot_file(tmp_path: Path, cli: Run) -> None:
     name = put(tmp_path, RPS, RPS_CASE)
     status, out, err = cli("solve", name, "--starts", "1", "--json", str(tmp_path / "robot.toml"))

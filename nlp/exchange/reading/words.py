@@ -51,7 +51,7 @@ def _loops(found: Imported) -> str:
     worst = max(found.gaps, key=lambda gap: gap_share(gap, found.size))
     share = gap_share(worst, found.size)
     most = f"{share:.2g} of the size, where {OPEN:g} is allowed"
-    return f"{len(found.gaps)} closing joints, which the file leaves open by up to {_gap(worst)} ({most})"
+    return f"open in the file by up to {_gap(worst)} ({most})"
 
 
 def _gap(gap: Gap) -> str:

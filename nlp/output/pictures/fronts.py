@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...front.front import Front
-from ..fronttable import goal_values
+from ..fronttable import goal_names, goal_units, goal_values
 from .canvas import INK
 from .figures import picture_of
 from .frame import draw_frame
@@ -33,7 +33,9 @@ def front_figure(front: Front) -> Figure:
     for last in (*front.gaps, len(values) - 1):
         axes.plot(*values[first : last + 1].T, color="#08519c", marker="o", markersize=4.5, linewidth=1.4, gid="front")
         first = last + 1
-    labels = [f"{goal.label} ({goal.sense.value})" for goal in front.goals]
+    labels = [
+        f"{name}, {unit}" if unit else name for name, unit in zip(goal_names(front), goal_units(front), strict=True)
+    ]
     axes.set_xlabel(labels[0], color=INK, parse_math=False)
     axes.set_ylabel(labels[1], color=INK, parse_math=False)
     draw_frame(axes, front.case.title or front.case.name)

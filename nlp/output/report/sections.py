@@ -85,8 +85,12 @@ def _case(report: Report) -> Markup:
     if len(case.tasks) > 1:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
     program = first.nlp.program
-    level = None if program.places.epigraph is None else program.places.epigraph.level
-    names = [variable.name for k, variable in enumerate(program.variables) if k != level and not first.nlp.is_fixed]
+    # The epigraph's level and the joint positions that close the loops are the program's, not the case's.
+    internal = {k for indices in program.places.unknowns for k in indices}
+    if program.places.epigraph is not None:
+        internal.add(program.places.epigraph.level)
+    free = () if first.nlp.is_fixed else enumerate(program.variables)
+    names = [variable.name for k, variable in free if k not in internal]
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
