@@ -21,6 +21,8 @@ def without_ties(expressions: SX, x: SX) -> SX:
     work: list[SX] = [SX(0)] * function.sz_w()
     # Operands of the comparison that a value is, by their hashes.
     compared: dict[int, tuple[int, int]] = {}
+    # A hash is the address of a node, which another node may get once nothing holds the first one.
+    held: list[SX] = []
     results = [SX(0)] * expressions.nnz()
     for k in range(count):
         op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
@@ -39,4 +41,5 @@ def without_ties(expressions: SX, x: SX) -> SX:
             work[target[0]] = SX(1) if is_tie else SX.binary(op, a, b)
             if op == ca.OP_LE:
                 compared[work[target[0]].element_hash()] = (a.element_hash(), b.element_hash())
+                held.append(work[target[0]])
     return SX(expressions.sparsity(), ca.vertcat(*results))
