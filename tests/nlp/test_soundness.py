@@ -1,17 +1,25 @@
-"""Cases in which a bound could be stated as proven and be wrong: each was found by reading the search as an opponent."""
+"""Cases in which a bound could be stated as proven and be wrong."""
+
+import math
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-import pytest
 from casadi import SX
 
-from screwsynth.nlp import Free, Nlp, Sense, load_case
+from screwsynth.models import Dimension, hexapod
+from screwsynth.nlp import Case, Free, Nlp, Sense, load_case
+from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.kinks import without_ties
+from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.proofwriter import ProofWriter
 from screwsynth.nlp.program.assembly import assemble
 from screwsynth.nlp.program.layout import lay_out
-from dataclasses import replace
+
+NUMBER = Reading(Dimension.NUMBER)
 
 
 def test_derivatives_with_kinks_are_those_of_casadi_off_the_kinks() -> None:
@@ -32,18 +40,38 @@ def test_derivatives_with_kinks_are_those_of_casadi_off_the_kinks() -> None:
     assert found.max() < 1e-20
 
 
-def program(expression: object, ends: tuple[float, float] = (-3.0, 3.0)) -> Nlp:
-    """Return the minimisation of an expression of two numbers within ends; those are a platform's position."""
-    case = load_case("hexapod-machining")
-    case = replace(case, position=(Free(*ends), Free(*ends), 20.0), limits=(), further=(), displacements=case.displacements[:1])
-    layout = lay_out(case, case.tasks[:1])
-    layout = replace(layout, constraints=(), constant_limits=(), families=())
-    return assemble(layout, expression(*ca.vertsplit(layout.table.variables_vector)), Sense.MIN)
+def program(objective: Callable[[SX, SX], SX], limit: Callable[[SX, SX], SX] | None = None) -> Nlp:
+    """Return the minimisation of an objective of two numbers from -3 to 3, with another number of at least a half."""
+    rng = np.random.default_rng(0)
+    points = {f"{end}_{leg + 1}": rng.normal(size=3).tolist() for end in ("base", "platform") for leg in range(6)}
+    task = load_case("hexapod-machining").tasks[0]
+    layout = lay_out(Case(hexapod(), points, [Free(-3.0, 3.0), Free(-3.0, 3.0), 20.0], [task]), [task])
+    x, y = ca.vertsplit(layout.table.variables_vector)
+    limits = [] if limit is None else [BoundedConstraint(Constraint("limit", limit(x, y), NUMBER), 0.5, math.inf)]
+    return assemble(layout, objective(x, y), Sense.MIN, limits)
 
 
 def test_parts_of_a_claim_by_limbs_add_up() -> None:
-    """The first limb is closed while the second one is far from its best: both together need more than the claim has."""
+    """The first limb is closed while the second is far from its best: together they need more than the claim has."""
     nlp = program(lambda x, y: -2 * ca.exp(-((50 * (x - 0.737)) ** 2)) + y**2)
-    found = certify_program(nlp, np.array([2.5, 3.0]), above=-1.0)
-    print(found.statement, found.bound, found.status)
-    assert found.status is not CertificateStatus.PROVED
+    start = np.array([2.5, 3.0])
+    found = certify_program(nlp, start, above=-1.0)
+    assert found.status is CertificateStatus.REFUSED
+    recorder = ProofWriter(1)
+    found = certify_program(nlp, start, above=-2.1, recorder=recorder)
+    assert found.status is CertificateStatus.PROVED
+    assert -2.1 < found.bound <= -2
+    proof = Proof("", "none", Statement(), fingerprint(nlp), -found.bound, recorder.tree())
+    assert check_proof(proof, nlp).bound == -found.bound
+
+
+def test_boxes_closed_by_a_claim_say_nothing_of_limits() -> None:
+    """No start reaches the one place that keeps the limit, and every box has F above the claim all the same."""
+    nlp = program(
+        lambda x, y: (x + y) ** 2 + x * y + 20,
+        lambda x, y: ca.exp(-((200 * (x - 0.737)) ** 2)) * ca.exp(-((200 * (y - 0.211)) ** 2)),
+    )
+    found = certify_program(nlp, above=0.0)
+    assert found.x is None
+    assert found.status is CertificateStatus.PROVED
+    assert found.statement.startswith("proved: F is above 0 on the whole box within the limits")
