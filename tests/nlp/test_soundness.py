@@ -5,19 +5,28 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
+import pytest
 from casadi import SX
 
 from screwsynth.models import Dimension, hexapod
 from screwsynth.nlp import Case, Free, Nlp, Sense, load_case
 from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.kinks import without_ties
-from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.proof import Node, Proof, Statement, fingerprint
 from screwsynth.nlp.certificate.proofcheck import check_proof
 from screwsynth.nlp.certificate.proofwriter import ProofWriter
+from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.program.assembly import assemble
 from screwsynth.nlp.program.layout import lay_out
+from screwsynth.nlp.workspace import search
+from screwsynth.nlp.workspace.machine import Legs
+from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.workspace.regularity import NumpyRankEngine
+from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.verdict import Outcome
 
 NUMBER = Reading(Dimension.NUMBER)
 
@@ -75,3 +84,30 @@ def test_boxes_closed_by_a_claim_say_nothing_of_limits() -> None:
     assert found.x is None
     assert found.status is CertificateStatus.PROVED
     assert found.statement.startswith("proved: F is above 0 on the whole box within the limits")
+
+
+@pytest.mark.parametrize("jump", [lambda x: x >= 0, ca.sign], ids=["comparison", "sign"])
+def test_a_value_that_jumps_has_no_rule(jump: Callable[[SX], SX]) -> None:
+    """Its derivative is written as 0, and so a search along rising values would step over the place of the optimum."""
+    nlp = program(lambda x, y: 10 * jump(x) - x + (x + y) ** 2)
+    with pytest.raises(UncoveredError, match="the robot's expressions hold the"):
+        certify_program(nlp, np.array([2.9, -1.0]))
+    with pytest.raises(UncoveredError):
+        check_proof(Proof("", "none", Statement(), fingerprint(nlp), 0.0, bytes([Node.BOUNDED])), nlp)
+
+
+@pytest.mark.parametrize("place", ["examine", "branch"])
+def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    legs = Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
+    turns = Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))
+    box = pose_box(Workspace((Free(-1.0, 1.0), Free(-1.0, 1.0), Free(3.0, 4.0)), turns))
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    target, name = (search._Search, "_branch") if place == "branch" else (NumpyRankEngine, "examine")
+    monkeypatch.setattr(target, name, interrupt)
+    found = prove_regular(legs, box, engine="numpy")
+    assert found.outcome is Outcome.OPEN
+    assert found.reason == "interrupted"
