@@ -25,6 +25,7 @@ from .enclosure import Enclosures, Midpoints, enclose, midpoints
 from .examination import COLLAPSED, UNMOVED, Examination, Verdict
 from .instructions import compile_tape
 from .intervals import ULP
+from .kinks import refuse_jumps
 from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .standardform import StandardForm
 from .tape import Tape
@@ -47,9 +48,10 @@ def search_tape(form: StandardForm) -> Tape:
     """Compile a form's R expressions, then their derivatives, row by row.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression holds an operation without a rule, or its value jumps.
     """
     try:
+        refuse_jumps(form.expressions, form.x)
         return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
@@ -62,6 +64,7 @@ def _uncovered_limit(form: StandardForm) -> str | None:
     for k, key in enumerate(whose):
         row = form.expressions[k]
         try:
+            refuse_jumps(row, form.x)
             compile_tape(ca.Function("row", [form.x], [row, ca.densify(ca.jacobian(row, form.x)).T]))
         except UncoveredError:
             return None if key is None else f"limits.{key}"

@@ -10,7 +10,7 @@ from ...models import FloatArray
 from .engines import Engine
 from .examination import Examination, Verdict
 from .incumbent import PointKeeper
-from .openboxes import Boxes, OpenBoxes
+from .openboxes import BoundedSearch, Boxes
 from .proofwriter import ProofWriter
 from .standardform import StandardForm
 
@@ -20,7 +20,7 @@ _SINGULAR_WIDTH = 2.0**-16
 _LEAST_WIDTH = 2.0**-40
 
 
-class BoxSearch:
+class BoxSearch(BoundedSearch[Boxes]):
     """A search of the box of one form.
 
     Args:
@@ -40,34 +40,9 @@ class BoxSearch:
     ) -> None:
         self.form, self.incumbent = form, incumbent
         self._engine, self._recorder = engine, recorder
-        self._opened: OpenBoxes[Boxes] = OpenBoxes()
+        self._nodes = 1
         root = np.zeros(1, dtype=np.int64)
-        self._opened.push(Boxes(form.lower[:, None], form.upper[:, None], np.array([np.inf]), root))
-        # Boxes under examination, and open ones that are too small to bisect.
-        self._current: Boxes | None = None
-        self._undivided: list[Boxes] = []
-        # Largest bound of all boxes that were closed because of their bounds.
-        self._closed_bound = -math.inf
-        self.boxes, self._nodes, self._turn = 0, 1, 0
-
-    @property
-    def is_open(self) -> bool:
-        """Whether boxes are left to be examined."""
-        return self._opened.count > 0
-
-    @property
-    def left(self) -> int:
-        """Number of open boxes."""
-        current = 0 if self._current is None else self._current.count
-        return self._opened.count + sum(boxes.count for boxes in self._undivided) + current
-
-    @property
-    def bound(self) -> float:
-        """Upper bound of the maximum over the boxes, without that of the incumbent; -inf where no point is feasible."""
-        others = [float(boxes.bound.max()) for boxes in self._undivided]
-        if self._current is not None:
-            others.append(float(self._current.bound.max()))
-        return max(self._closed_bound, self._opened.bound, *others, -math.inf)
+        super().__init__(Boxes(form.lower[:, None], form.upper[:, None], np.array([np.inf]), root))
 
     def close(self) -> None:
         """Stop the engine."""

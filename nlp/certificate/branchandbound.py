@@ -39,6 +39,8 @@ GAP = 1e-4
 _FOLDED = 1e-12
 #: Part of the objective's scale below which an incumbent counts as 0: a gap relative to it would have no meaning.
 _NEAR_ZERO = 1e-6
+#: Part of a gap by which a bound may exceed it and still count as met: rounding of sums.
+_GAP_ROUNDING = 1e-9
 #: Number of variables up to which the whole box is searched although limbs share variables: it takes fewer boxes then.
 _WHOLE_BOX = 12
 #: Seconds between two reports of progress, and the largest number of entries in a history.
@@ -93,13 +95,19 @@ def certify_program(
         search.incumbent.start(x, claimed)
     except IncumbentError as error:
         return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    reason = ""
+    reason, search.first_value = "", incumbent.value
     try:
         reason = search.run(time_limit, progress)
+        while not reason and search.is_short():
+            search.method.close()
+            if recorder is not None:
+                recorder.clear()
+            search.restart(_method(form, incumbent, engine, jobs, recorder))
+            reason = search.run(time_limit, progress)
     except KeyboardInterrupt:
         reason = "interrupted"
     finally:
-        method.close()
+        search.method.close()
     return search.certificate(reason)
 
 
@@ -184,6 +192,8 @@ class _Search:
         above: as for :func:`certify_program`.
         began: time at the start.
         history: (seconds, bound, incumbent) in the program's own sense.
+        first_value: value of the incumbent when the method began.
+        boxes_before: number of boxes that methods before this one examined.
     """
 
     form: StandardForm
@@ -194,6 +204,8 @@ class _Search:
     above: float | None
     began: float
     history: list[tuple[float, float, float]] = field(default_factory=list)
+    first_value: float = -math.inf
+    boxes_before: int = 0
 
     @property
     def threshold(self) -> float:
@@ -224,6 +236,26 @@ class _Search:
         known = max(self.method.bound, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
+    def is_short(self) -> bool:
+        """Return whether every box is closed with a bound that is too wide, and a better point is known by now.
+
+        Limbs that were closed before it was known may leave too little of the gap for the others.
+        """
+        if self.method.left or self._has_counterexample() or self.method.bound == -math.inf:
+            return False
+        return not self._is_met() and self.incumbent.value > self.first_value
+
+    def restart(self, method: SearchMethod) -> None:
+        """Begin again with a new search of the whole box, and the best point known by now."""
+        self.boxes_before += self.method.boxes
+        self.method, self.first_value = method, self.incumbent.value
+
+    def _is_met(self) -> bool:
+        """Return whether the bound is as good as asked for, once no box is open."""
+        if self.above is not None:
+            return self.bound < -self.above
+        return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
+
     def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
@@ -252,7 +284,7 @@ class _Search:
                 del self.history[1::2]
             self.history.append((seconds, bound, incumbent))
         if progress is not None:
-            progress(seconds, bound, incumbent, self.method.boxes, self.method.left)
+            progress(seconds, bound, incumbent, self.boxes_before + self.method.boxes, self.method.left)
 
     def certificate(self, reason: str) -> Certificate:
         """Return the certificate at this state of the search."""
@@ -270,8 +302,13 @@ class _Search:
             reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
         elif left:
             status = CertificateStatus.INCOMPLETE
+        elif not known and self.method.bound == -math.inf:
+            status = CertificateStatus.INFEASIBLE
         else:
-            status = CertificateStatus.PROVED if known else CertificateStatus.INFEASIBLE
+            status = CertificateStatus.PROVED if self._is_met() else CertificateStatus.INCOMPLETE
+            reason = (
+                reason if self._is_met() else reason or "the bounds of the limbs do not add up to the one asked for"
+            )
         allowed, is_relative = self._allowed_gap()
         own = self.incumbent.x
         in_other_mode = not nlp.in_home_mode and own is not None and is_in_home_mode(nlp, own) is False
@@ -286,7 +323,7 @@ class _Search:
             above=self.above,
             was_beaten=self.incumbent.was_beaten,
             engine=self.engine,
-            boxes=self.method.boxes,
+            boxes=self.boxes_before + self.method.boxes,
             open=left,
             seconds=seconds,
             reason=reason,

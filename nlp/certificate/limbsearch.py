@@ -147,7 +147,9 @@ class IndependentSearch:
         """Examine a block of boxes of the limb that is furthest from its part of the threshold."""
         values = [each.incumbent.value for each in self._searches]
         room = threshold - math.fsum([*values, self._constant]) if all(map(math.isfinite, values)) else -math.inf
-        part = (room - _SUM * math.fsum(map(abs, values))) / len(values) if math.isfinite(room) else -math.inf
+        # Twice, since the sum of the bounds is rounded up too.
+        rounding = 2 * _SUM * math.fsum(map(abs, [*values, room, self._constant]))
+        part = (room - rounding) / len(values) if math.isfinite(room) else -math.inf
         openest = max(
             (k for k, each in enumerate(self._searches) if each.is_open),
             key=lambda k: self._searches[k].bound - values[k] if math.isfinite(values[k]) else math.inf,

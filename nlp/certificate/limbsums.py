@@ -99,8 +99,9 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         bounds = np.where(models.defined, rest.bound(), np.inf)
         # The bound of the limb itself, and that of minus its tilt.
         apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
-        other = models.high + apart[own.of]
-        bounds = np.fmin(bounds, other + np.abs(other) * (64 * ULP) + TINY)
+        # The two may cancel: their rounding is in parts of their sizes.
+        other = models.high + apart[own.of] + (np.abs(models.high) + apart[own.of]) * (64 * ULP) + TINY
+        bounds = np.fmin(bounds, other)
         is_possible = models.is_possible & ~(bounds < reached[own.of])
         bounds = np.where(is_possible, np.where(np.isnan(bounds), np.inf, bounds), -np.inf)
     return LimbBound(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
 
@@ -124,3 +125,43 @@ class OpenBoxes(Generic[Chunk]):
     def bound(self) -> float:
         """Largest bound of all boxes; -inf without a box."""
         return -self._heap[0][0] if self._heap else -np.inf
+
+
+class BoundedSearch(Generic[Chunk]):
+    """What every search by bisection keeps: its open boxes, and a bound over all boxes.
+
+    Args:
+        root: the whole box.
+
+    Attributes:
+        boxes: number of boxes examined.
+    """
+
+    def __init__(self, root: Chunk) -> None:
+        self._opened: OpenBoxes[Chunk] = OpenBoxes()
+        self._opened.push(root)
+        # Boxes under examination, and open ones that are too small to bisect.
+        self._current: Chunk | None = None
+        self._undivided: list[Chunk] = []
+        # Largest bound of all boxes that were closed because of their bounds.
+        self._closed_bound = -math.inf
+        self.boxes, self._turn = 0, 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether boxes are left to be examined."""
+        return self._opened.count > 0
+
+    @property
+    def left(self) -> int:
+        """Number of open boxes."""
+        current = 0 if self._current is None else self._current.count
+        return self._opened.count + sum(boxes.count for boxes in self._undivided) + current
+
+    @property
+    def bound(self) -> float:
+        """Upper bound of the maximum over the boxes, without that of the incumbent; -inf where no point is feasible."""
+        others = [float(boxes.bound.max()) for boxes in self._undivided]
+        if self._current is not None:
+            others.append(float(self._current.bound.max()))
+        return max(self._closed_bound, self._opened.bound, *others, -math.inf)

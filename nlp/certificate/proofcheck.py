@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...models import FloatArray
 from ..program.nlp import Nlp
+from .kinks import refuse_jumps
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
 from .slopebounds import sum_model
@@ -127,6 +128,7 @@ class _Checker:
         self._form, self._bound = form, bound
         self._functions, self._count = len(form.functions), len(form.functions) + len(form.conditions)
         self._equation = form.is_equation
+        refuse_jumps(form.expressions, form.x)
         outputs = ca.cse([form.expressions, form.jacobian.T])
         self._arithmetic = SlopeArithmetic(ca.Function("claims", [form.x], outputs))
 

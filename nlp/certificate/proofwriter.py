@@ -48,6 +48,11 @@ class ProofWriter:
         self._nodes: dict[int, _NodeRecord] = {}
         self._limbs: list[_LimbRecord] = []
 
+    def clear(self) -> None:
+        """Forget everything recorded: the search begins again."""
+        self._nodes.clear()
+        self._limbs.clear()
+
     def limb(self, bound: Callable[[], float]) -> ProofWriter:
         """Return the record of the next limb's tree; the tree of the whole is that of its limbs then.
 

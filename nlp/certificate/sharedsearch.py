@@ -8,7 +8,6 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from .boxsearch import reason_without_bound
 from .enclosure import midpoints
 from .engines import limb_engine_for
 from .limbsums import bound_limb, first_largest, with_tilts
-from .openboxes import OpenBoxes
+from .openboxes import BoundedSearch
 from .ownboxes import OwnBoxes, SharedBoxes
 from .quadratic import GradientModel
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
@@ -43,7 +42,7 @@ _PATIENCE = 1.0
 _SINGULAR_WIDTH, _LEAST_WIDTH = 2.0**-16, 2.0**-40
 
 
-class SharedSearch:
+class SharedSearch(BoundedSearch[SharedBoxes]):
     """A search of limbs with shared variables.
 
     Args:
@@ -72,31 +71,7 @@ class SharedSearch:
         root = SharedBoxes(
             self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
         )
-        self._opened: OpenBoxes[SharedBoxes] = OpenBoxes()
-        self._opened.push(root)
-        self._current: SharedBoxes | None = None
-        self._undivided: list[SharedBoxes] = []
-        self._closed_bound = -math.inf
-        self.boxes, self._turn = 0, 0
-
-    @property
-    def is_open(self) -> bool:
-        """Whether boxes are left to be examined."""
-        return self._opened.count > 0
-
-    @property
-    def left(self) -> int:
-        """Number of open shared boxes."""
-        current = 0 if self._current is None else self._current.count
-        return self._opened.count + sum(boxes.count for boxes in self._undivided) + current
-
-    @property
-    def bound(self) -> float:
-        """Upper bound of the maximum over the boxes; -inf where no point is feasible."""
-        others = [float(boxes.bound.max()) for boxes in self._undivided]
-        if self._current is not None:
-            others.append(float(self._current.bound.max()))
-        return max(self._closed_bound, self._opened.bound, *others, -math.inf)
+        super().__init__(root)
 
     @property
     def fault(self) -> str:

@@ -57,7 +57,8 @@ def inverse_over(legs: Legs, box: PoseBox, lower: FloatArray, upper: FloatArray)
         size_of_C = np.abs(C)
         slopes = np.einsum("bij,bjkl->bkil", C, terms[:, :, 1:7]) * half[:, :, None, None]
         second = size_of_C @ (rest + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:])))
-        second += _ROUNDING * (size_of_C @ np.abs(terms[:, :, 0]))
+        # How far C is from an inverse is computed: LAPACK bounds the other residual, of the rows times C.
+        second += np.abs(C @ terms[:, :, 0] - np.eye(LEGS)) + _ROUNDING * (size_of_C @ np.abs(terms[:, :, 0]))
         first = np.abs(slopes).sum(axis=1)
         B = first + second
         # |(I + C (J - J0))^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.

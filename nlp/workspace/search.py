@@ -102,16 +102,16 @@ class _Search:
             if progress is not None and seconds - reported >= _REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            lower, upper = self._stack.pop()
+            lower, upper = self._stack[-1]
             block = self._engine.block
             if len(lower) > block:
-                self._stack.append((lower[block:], upper[block:]))
-            # The boxes stay where they are until they are examined: an interrupt between leaves them open.
-            self._stack.append((lower[:block], upper[:block]))
+                self._stack[-1:] = [(lower[block:], upper[block:]), (lower[:block], upper[:block])]
+            # The boxes stay where they are until their parts are there too: an interrupt between leaves them open.
+            place = len(self._stack) - 1
             found = self._engine.examine(lower[:block], upper[:block])
-            self._stack.pop()
             self._boxes += len(found.verdict)
             self._branch(found)
+            del self._stack[place]
             if self._is_refuted(found):
                 return ""
         return "boxes are left that are too small to bisect" if self._small else ""

@@ -6,9 +6,23 @@ import numpy as np
 from screwsynth.nlp.certificate.enclosure import Enclosures
 from screwsynth.nlp.certificate.tape import Op, Tape
 
+BINARY = (Op.ADD, Op.SUB, Op.MUL, Op.DIV)
 
-def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901, PLR0912 - one branch for each operation
+
+def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:
     """Results of a tape at a point (n,) of doubles; a ball without an end is undefined."""
+    return decided_balls(tape, point)[0]
+
+
+def decided_balls(  # noqa: C901, PLR0912 - one branch for each operation
+    tape: Tape, point: np.ndarray
+) -> tuple[list[flint.arb], list[bool]]:
+    """Results of a tape, and whether each is sharp.
+
+    It is not where it depends on a ramp or a step at a number that may be 0: the ball holds both sides then, so that a
+    root or a quotient of it may be undefined here and nowhere else.
+    """
+    sharp, sharp_out = [True] * tape.registers, [True] * tape.outputs
     work: list[flint.arb] = [flint.arb(0)] * tape.registers
     out: list[flint.arb] = [flint.arb(0)] * tape.outputs
     unary = {Op.SQRT: "sqrt", Op.SIN: "sin", Op.COS: "cos", Op.EXP: "exp", Op.LOG: "log", Op.ATAN: "atan"}
@@ -16,8 +30,13 @@ def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901, P
     for op, to, a, b, k in zip(
         *(column.tolist() for column in (tape.op, tape.to, tape.a, tape.b, tape.k)), strict=True
     ):
+        if op not in (Op.OUTPUT, Op.INPUT, Op.CONSTANT):
+            is_split = op in (Op.RAMP, Op.STEP) and work[a].is_finite() and not (work[a] < 0 or work[a] >= 0)
+            sharp[to] = sharp[a] and (op not in BINARY or sharp[b]) and not is_split
+        elif op != Op.OUTPUT:
+            sharp[to] = True
         if op == Op.OUTPUT:
-            out[to] = work[a]
+            out[to], sharp_out[to] = work[a], sharp[a]
         elif op == Op.INPUT:
             work[to] = flint.arb(float(point[a]))
         elif op == Op.CONSTANT:
@@ -44,7 +63,7 @@ def in_balls(tape: Tape, point: np.ndarray) -> list[flint.arb]:  # noqa: C901, P
             work[to] = flint.arb(0) if work[a] < 0 else flint.arb(1) if work[a] >= 0 else flint.arb(0.5, 0.5)
         else:
             work[to] = getattr(work[a], unary[Op(op)])()
-    return out
+    return out, sharp_out
 
 
 def violations(
@@ -62,8 +81,10 @@ def violations(
     ]
     t = max((abs(each) for each in e), key=lambda ball: float(ball.mid()), default=flint.arb(0))
     bad = checks = 0
-    for k, ball in enumerate(in_balls(tape, point)):
+    for k, (ball, is_sharp) in enumerate(zip(*decided_balls(tape, point), strict=True)):
         checks += 2
+        if not is_sharp:
+            continue
         if not ball.is_finite():
             bad += 2 * int(np.isfinite(forms.s[k, box]))
             continue
