@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from types import ModuleType
@@ -150,6 +151,24 @@ def engine_name(name: str | None) -> str:
     return name or ("numpy" if kernel() is None else "c")
 
 
+def chosen_kernel(name: str | None, built: Callable[[], ModuleType | None]) -> ModuleType | None:
+    """Return the C kernel that an engine's name asks for; None for NumPy.
+
+    Args:
+        name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
+        built: gives the kernel, or None where it was not built.
+
+    Raises:
+        ValueError: there is no engine of that name here.
+    """
+    if name not in (None, "c", "numpy"):
+        raise ValueError(f"there is no engine {name!r}: c or numpy")
+    module = None if name == "numpy" else built()
+    if module is None and name == "c":
+        raise ValueError("the C kernel was not built: numpy is there")
+    return module
+
+
 def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
     """Return an engine for a form.
 
@@ -162,14 +181,8 @@ def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = N
         UncoveredError: an expression holds an operation without a rule.
         ValueError: there is no engine of that name here.
     """
-    if name not in (None, "c", "numpy"):
-        raise ValueError(f"there is no engine {name!r}: c or numpy")
-    module = None if name == "numpy" else kernel()
-    if module is None:
-        if name == "c":
-            raise ValueError("the C kernel was not built: numpy is there")
-        return NumpyEngine(form)
-    return KernelEngine(form, module, jobs)
+    module = chosen_kernel(name, kernel)
+    return NumpyEngine(form) if module is None else KernelEngine(form, module, jobs)
 
 
 def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jobs: int | None = None) -> LimbEngine:
@@ -179,10 +192,7 @@ def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jo
         UncoveredError: an expression holds an operation without a rule.
         ValueError: there is no engine of that name here.
     """
-    module = kernel()
-    if engine_name(name) == "c" and module is not None:
-        return KernelEngine(form, module, jobs, shared)
-    engine = engine_for(form, name, jobs)
-    if not isinstance(engine, NumpyEngine):
-        raise ValueError(f"there is no engine {name!r} for limbs")
-    return NumpyLimbEngine(engine, shared)
+    module = chosen_kernel(name, kernel)
+    if module is None:
+        return NumpyLimbEngine(NumpyEngine(form), shared)
+    return KernelEngine(form, module, jobs, shared)

@@ -1,7 +1,7 @@
 """Motions and wrenches as data: a screw's six coordinates, with its axis, point and pitch."""
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
 
@@ -46,23 +46,25 @@ class WrenchData(JsonObject):
 
 def motion_data(twist: "ArrayLike") -> MotionData:
     """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
-    screw = axis_from_screw(twist)
-    translation = math.isinf(screw.pitch)
-    return MotionData(
-        twist=vector(np.asarray(twist, dtype=np.float64)),
-        axis=vector(screw.axis),
-        point=None if translation else vector(screw.point),
-        pitch="inf" if translation else screw.pitch,
-    )
+    return MotionData(twist=vector(np.asarray(twist, dtype=np.float64)), **_axis_of(twist))
 
 
 def wrench_data(wrench: "ArrayLike") -> WrenchData:
     """Return a wrench (6,) with its axis, point and pitch; a pure couple has no point."""
-    screw = axis_from_screw(wrench)
-    couple = math.isinf(screw.pitch)
-    return WrenchData(
-        wrench=vector(np.asarray(wrench, dtype=np.float64)),
-        axis=vector(screw.axis),
-        point=None if couple else vector(screw.point),
-        pitch="inf" if couple else screw.pitch,
-    )
+    return WrenchData(wrench=vector(np.asarray(wrench, dtype=np.float64)), **_axis_of(wrench))
+
+
+class _Axis(TypedDict):
+    """Axis, point and pitch of a screw, as the data have them."""
+
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+def _axis_of(coordinates: "ArrayLike") -> _Axis:
+    """Return axis, point and pitch of a screw (6,); one of infinite pitch has no point."""
+    screw = axis_from_screw(coordinates)
+    infinite = math.isinf(screw.pitch)
+    point = None if infinite else vector(screw.point)
+    return {"axis": vector(screw.axis), "point": point, "pitch": "inf" if infinite else screw.pitch}

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ...models import FloatArray
+from ..certificate.engines import chosen_kernel
 from .machine import Legs
 from .posebox import CODES, PoseBox
 from .regularity import NumpyRankEngine, RankExamination
@@ -69,11 +70,5 @@ def rank_engine(legs: Legs, box: PoseBox, name: str | None = None) -> RankEngine
     Raises:
         ValueError: there is no engine of that name here.
     """
-    if name not in (None, "c", "numpy"):
-        raise ValueError(f"there is no engine {name!r}: c or numpy")
-    module = None if name == "numpy" else kernel()
-    if module is None:
-        if name == "c":
-            raise ValueError("the C kernel was not built: numpy is there")
-        return NumpyRankEngine(legs, box)
-    return KernelRankEngine(legs, box, module)
+    module = chosen_kernel(name, kernel)
+    return NumpyRankEngine(legs, box) if module is None else KernelRankEngine(legs, box, module)
