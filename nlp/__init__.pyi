@@ -44,6 +44,10 @@ from .case.workspace import Workspace as Workspace
 from .certificate.branchandbound import certify_program as certify_program
 from .certificate.certificate import Certificate as Certificate
 from .certificate.certificate import CertificateStatus as CertificateStatus
+from .comparison.compare import Comparison as Comparison
+from .comparison.compare import compare as compare
+from .comparison.data import comparison_result as comparison_result
+from .comparison.entry import Entry as Entry
 from .embedding.codegen import generate_c as generate_c
 from .embedding.folder import CompiledLimit as CompiledLimit
 from .embedding.folder import CompiledNumber as CompiledNumber

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from ...models import Model
 from ..case.case import Case
@@ -29,6 +30,10 @@ RANGE = 0.25
 TIME_LIMIT = 20.0
 #: Measures of actuators and of legs whose strokes over a workspace are told.
 _MEASURES = ("actuator_length", "actuator_angle", "leg_length")
+
+#: Parts of a table, in order: robots whose F can be compared, those that cannot make a motion, those without an answer.
+Part: TypeAlias = Literal["ranked", "no freedom", "no answer"]
+_PARTS: tuple[Part, ...] = ("ranked", "no freedom", "no answer")
 
 #: Called before each robot with its label, the number of robots done, and of all.
 CompareProgress = Callable[[str, int, int], None]
@@ -57,7 +62,7 @@ class Comparison:
     @property
     def ranked(self) -> tuple[Entry, ...]:
         """The robots whose F can be compared: with an answer, and not without the freedom for a task."""
-        return tuple(each for each in self.entries if _rank(each) == 0)
+        return tuple(each for each in self.entries if part_of(each) == "ranked")
 
 
 def compare(
@@ -207,6 +212,9 @@ def _with_certificate(entry: Entry, time_limit: float, jobs: int | None) -> Entr
         found = certify(entry.solution, time_limit=time_limit, jobs=jobs)
     except (UncoveredError, InputError) as error:
         return replace(entry, certificate_fault=str(error))
+    if found.solution is not entry.solution:
+        # The search of the whole box found a better design.
+        entry = _with_fits(replace(entry, solution=found.solution), entry.contender)
     return replace(entry, certified=found, seconds=entry.seconds + time.perf_counter() - began)
 
 
@@ -228,11 +236,11 @@ def _with_judgement(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
     return replace(entry, judgement=judged, strokes=strokes, seconds=entry.seconds + time.perf_counter() - began)
 
 
-def _rank(entry: Entry) -> int:
-    """Return the part of the table that a robot stands in: ranked, without the freedom, or without an answer."""
+def part_of(entry: Entry) -> Part:
+    """Return the part of the table that a robot stands in."""
     if not entry.has_answer:
-        return 2
-    return 1 if entry.can_move is False else 0
+        return "no answer"
+    return "no freedom" if entry.can_move is False else "ranked"
 
 
 def _in_order(entries: Sequence[Entry]) -> tuple[Entry, ...]:
@@ -241,8 +249,7 @@ def _in_order(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     def key(entry: Entry) -> tuple[int, float]:
         value = entry.value
         if value is None:
-            return _rank(entry), 0.0
-        return _rank(entry), -value if entry.sense is Sense.MAX else value
+            return _PARTS.index(part_of(entry)), 0.0
+        return _PARTS.index(part_of(entry)), -value if entry.sense is Sense.MAX else value
 
     return tuple(sorted(entries, key=key))
-

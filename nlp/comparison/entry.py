@@ -177,9 +177,7 @@ def task_fit(contender: Contender, outcome: TaskOutcome) -> tuple[TaskFit, Mobil
     if not _is_legs(contender):
         return TaskFit(outcome.task.name, outcome.F, None, None, ()), None
     names = [row.limb for row in contender.model.rows]
-    rates = tuple(
-        Rate(name, Dimension.LENGTH, float(value)) for name, value in zip(names, state.rates, strict=True)
-    )
+    rates = tuple(Rate(name, Dimension.LENGTH, float(value)) for name, value in zip(names, state.rates, strict=True))
     return TaskFit(outcome.task.name, outcome.F, True, 0.0, rates), None
 
 

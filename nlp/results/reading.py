@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 from ..errors import InputError, listing
 from .certified import CertifiedResult
 from .checks import ChecksResult
+from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import JsonObject, Mark, Size
@@ -21,7 +22,14 @@ from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
 Result: TypeAlias = (
-    SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult | TradeoffResult | WorkspaceResult
+    SolveResult
+    | CombinedResult
+    | EvaluationResult
+    | CertifiedResult
+    | ChecksResult
+    | TradeoffResult
+    | WorkspaceResult
+    | ComparisonResult
 )
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.

@@ -11,6 +11,7 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias, Union, get_args, g
 
 from .certified import CertifiedResult
 from .checks import ChecksResult
+from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import JsonObject, JsonValue, Mark, Size
@@ -26,6 +27,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     ChecksResult,
     TradeoffResult,
     WorkspaceResult,
+    ComparisonResult,
 )
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
