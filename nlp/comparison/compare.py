@@ -19,7 +19,8 @@ from ..solver.certified import certify
 from ..solver.exchange import design_of
 from ..solver.solve import solve
 from ..workspace.judge import judge_workspace
-from .entry import Entry, generic_freedoms, proven_strokes, task_fit
+from ..workspace.verdict import Outcome
+from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, task_fit
 from .placed import placed
 from .robots import Contender, read_robots
 from .size import size_at, size_at_start, size_of_home
@@ -223,17 +224,22 @@ def _with_judgement(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
     if entry.placed is None or entry.solution is None or entry.placed.case.workspace is None or not entry.has_answer:
         return entry
     began = time.perf_counter()
-    outcome = entry.solution.outcomes[0]
+    outcome, proof = entry.solution.outcomes[0], entry.solution.workspace
     names = tuple(each.name for each in entry.contender.model.quantities if each.name in _MEASURES)
     # Lengths of straight legs are among the claims already.
     asked = [name for name in names if name != "leg_length" or not entry.contender.model.legs]
+    if proof is not None:
+        verdict = Outcome.PROVED if proof.is_proved else outcome_of(proof.judgement)
+        strokes = proven_strokes(proof.judgement, names)
+        return replace(entry, judgement=proof.judgement, outcome=verdict, strokes=strokes)
     try:
         design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
         judged = judge_workspace(design, quantities=asked, time_limit=time_limit, jobs=jobs, with_objective=False)
     except ScrewsynthError as error:
         return replace(entry, workspace_fault=str(error))
     strokes = proven_strokes(judged, names)
-    return replace(entry, judgement=judged, strokes=strokes, seconds=entry.seconds + time.perf_counter() - began)
+    seconds = entry.seconds + time.perf_counter() - began
+    return replace(entry, judgement=judged, outcome=outcome_of(judged), strokes=strokes, seconds=seconds)
 
 
 def part_of(entry: Entry) -> Part:

@@ -25,8 +25,6 @@ from ..results.jsondata import finite_or_none
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions
 from ..units import Units, objective_unit
-from ..workspace.judge import Judgement
-from ..workspace.verdict import Outcome
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit
 from .sentences import comparison_sentences, entry_sentences
@@ -75,7 +73,7 @@ def _robot(case: Case, entry: Entry) -> ComparedRobotData:
         limits_left_out=tuple(ComparedLimitData(key=each.key, reason=each.reason) for each in left_out),
         certificate=certificate_data(entry.certificate),
         certificate_fault=entry.certificate_fault or None,
-        workspace=None if entry.judgement is None else outcome_of(entry.judgement),
+        workspace=entry.outcome,
         strokes=MappingProxyType(
             {
                 name: ComparedStrokeData(
@@ -88,13 +86,6 @@ def _robot(case: Case, entry: Entry) -> ComparedRobotData:
         case=_text(entry),
         seconds=entry.seconds,
     )
-
-
-def outcome_of(judgement: Judgement) -> Outcome:
-    """Return the verdict on a design over its workspace: proved, refuted by a pose, or open."""
-    if judgement.is_refuted:
-        return Outcome.REFUTED
-    return Outcome.PROVED if judgement.is_proved else Outcome.OPEN
 
 
 def _task(case: Case, index: int, fit: TaskFit) -> ComparedTaskData:

@@ -17,6 +17,7 @@ from ..evidence.mobility import Mobility, mobility_of
 from ..solver.certified import Certified
 from ..solver.solution import Solution, TaskOutcome
 from ..workspace.judge import Judgement
+from ..workspace.verdict import Outcome
 from .placed import Placed
 from .robots import Contender
 
@@ -85,6 +86,7 @@ class Entry:
         certified: certificates; None where none were asked for, or they are refused.
         certificate_fault: sentence of the reason why there is no certificate; else empty.
         judgement: of the design over the workspace; None where the case has none, or it is not judged.
+        outcome: verdict on the workspace: regular poses and limits; None where it is not judged.
         workspace_fault: sentence of the reason why it is not judged; else empty.
         seconds: wall time.
         strokes: largest stroke over the workspace by measure, from proven bounds.
@@ -103,6 +105,7 @@ class Entry:
     certified: Certified | None = None
     certificate_fault: str = ""
     judgement: Judgement | None = None
+    outcome: Outcome | None = None
     workspace_fault: str = ""
     seconds: float = 0.0
     strokes: Mapping[str, Stroke] = field(default_factory=lambda: MappingProxyType({}))
@@ -179,6 +182,23 @@ def task_fit(contender: Contender, outcome: TaskOutcome) -> tuple[TaskFit, Mobil
     names = [row.limb for row in contender.model.rows]
     rates = tuple(Rate(name, Dimension.LENGTH, float(value)) for name, value in zip(names, state.rates, strict=True))
     return TaskFit(outcome.task.name, outcome.F, True, 0.0, rates), None
+
+
+def driven_wrenches(contender: Contender) -> int:
+    """Return the number of terms of F in a motion that a robot can make: wrenches that its actuators work in."""
+    model = contender.model
+    if not model.structure:
+        return len(model.rows)
+    return sum(path.wrenches - path.constraints for path in model.structure)
+
+
+def outcome_of(judgement: Judgement) -> Outcome:
+    """Return the verdict on a design over its workspace, which is open where regular poses are not proved."""
+    if judgement.is_refuted:
+        return Outcome.REFUTED
+    is_regular = judgement.regularity is not None and judgement.regularity.outcome is Outcome.PROVED
+    held = all(each.outcome is Outcome.PROVED for each in judgement.extremes if each.limit is not None)
+    return Outcome.PROVED if is_regular and held else Outcome.OPEN
 
 
 def proven_strokes(judgement: Judgement, quantities: tuple[str, ...]) -> Mapping[str, Stroke]:

@@ -7,7 +7,7 @@ import math
 from ...models import Dimension
 from ..results.point import violations
 from .compare import Comparison, part_of
-from .entry import Entry, TaskFit
+from .entry import Entry, TaskFit, driven_wrenches
 
 #: A part as a percentage.
 _PERCENT = 100
@@ -25,10 +25,7 @@ def entry_sentences(entry: Entry) -> list[str]:
     if entry.placed is not None and entry.placed.left_out:
         keys = ", ".join(each.key for each in entry.placed.left_out)
         one = len(entry.placed.left_out) == 1
-        words = "means nothing for this robot: it is solved without it"
-        found.append(
-            f"{keys} {words if one else words.replace('means', 'mean').replace('without it', 'without them')}."
-        )
+        found.append(f"{keys} cannot hold for this robot: it is solved without {'it' if one else 'them'}.")
     found += [f"Singular: {each}." for each in entry.singularities]
     found += _proof_sentences(entry)
     return found
@@ -101,6 +98,12 @@ def comparison_sentences(found: Comparison) -> list[str]:
     kept = {len(each.placed.case.limits) for each in ranked if each.placed is not None}
     if len(kept) > 1:
         lines.append("The ranked robots keep different numbers of the limits: fewer limits let F be better.")
+    terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
+    if len(set(terms.values())) > 1:
+        counts = ", ".join(f"{label} {count}" for label, count in terms.items())
+        lines.append(
+            f"F adds a term for each wrench that actuators work in, and robots have different numbers: {counts}."
+        )
     kinds = {rate.dimension for each in ranked for fit in each.tasks for rate in fit.rates}
     if len(kinds) > 1:
         lines.append("Rates of actuators that turn and of those that slide have different units, and do not compare.")

@@ -61,9 +61,10 @@ def comparison_table(result: ComparisonResult) -> TextTable:
 
 
 def dimension_words(robot: ComparedRobotData) -> str:
-    """Return the dimensions of a design in one line; those at an end of their range are marked."""
+    """Return the free dimensions of a design in one line, all where none is free; an end of a range is marked."""
     parts = []
-    for each in robot.dimensions:
+    free = [each for each in robot.dimensions if each.range is not None]
+    for each in free or robot.dimensions:
         ends = each.range or ()
         mark = next((word for end, word in zip(ends, ("least", "most"), strict=False) if _is_at(each.value, end)), "")
         parts.append(f"{each.name} = {each.value:.5g} {each.unit}".rstrip() + (f" ({mark})" if mark else ""))
