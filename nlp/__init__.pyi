@@ -74,6 +74,11 @@ from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
 from .exchange.export import export_robot as export_robot
+from .front.data import front_result as front_result
+from .front.front import Front as Front
+from .front.front import FrontPoint as FrontPoint
+from .front.goals import Goal as Goal
+from .front.pareto import pareto as pareto
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of

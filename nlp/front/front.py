@@ -1,6 +1,7 @@
 """The front of two or more goals, spread evenly by an adaptive rule.
 
-The ends are the optima of each goal alone; goals are measured in parts of the distance of the ends.
+The ends are the optima of each goal alone; where such an optimum is not one point, the other goals are optimised within
+it. Goals are measured in parts of the distance of the ends.
 
 Two goals: the widest gap between neighbours is divided: the goal that differs more in the gap gets a bound in the
 middle, and the other one is optimised. Where this leads back to an end of the gap with either goal as the bounded one,
@@ -14,7 +15,7 @@ Where this gives no new point, the other goals are optimised in turn; a box wher
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,19 +25,17 @@ from ..case.case import Case
 from ..case.settings import Search
 from ..certificate.branchandbound import certify_program
 from ..certificate.certificate import Certificate
-from ..errors import EvaluationError, InputError
+from ..errors import EvaluationError
 from ..interruption import is_requested
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
-from .goals import Goal, read_goals
+from .goals import Goal
 from .programs import GoalProgram, loosest_numbers, program_of
 
 #: Points whose goals differ by less than this part of the distance of the ends are one point of the front.
 _SAME = 1e-6
 #: A point is dominated where no goal is better than that of another by more than this part: rounding of a bound.
 _ROUNDING = 1e-8
-#: Points of a front where no number is asked for.
-POINTS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,43 +78,6 @@ class Front:
     seconds: float
 
 
-def pareto(
-    case: Case,
-    goals: Sequence[str],
-    *,
-    points: int = POINTS,
-    starts: int | None = None,
-    seed: int | None = None,
-    jobs: int | None = None,
-    certified: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Front:
-    """Find the front of two or more goals of a case.
-
-    Args:
-        case: the case, all of whose limits hold at each point.
-        goals: as on the command line, such as ``["max F:drive", "min limits.leg_length.max"]``.
-        points: number of points, at least 2; fewer where the front has gaps or is one point.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
-        jobs: number of threads; the result does not depend on it.
-        certified: whether the optimum of each point is proved too.
-        progress: called after each solve with the numbers of points found and wanted.
-
-    Raises:
-        CaseError: the case contradicts itself.
-        InputError: a goal is none of the case, is given twice, or is a limit that cannot move; or there is one only.
-        EvaluationError: a goal alone has no optimum.
-        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
-    """
-    if points < 2:
-        raise InputError(f"pareto: points = {points}: must be at least 2")
-    search = case.search.but(starts, seed)
-    return find_front(
-        case, read_goals(goals, case), points, search=search, jobs=jobs, certify=certified, progress=progress
-    )
-
-
 def find_front(
     case: Case,
     goals: tuple[Goal, ...],
@@ -126,7 +88,7 @@ def find_front(
     certify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Front:
-    """Return the front of two or more goals; arguments and errors are those of :func:`pareto`.
+    """Return the front of two or more goals; the errors are those of :func:`.pareto.pareto`.
 
     Args:
         case: the case.
@@ -150,6 +112,7 @@ def find_front(
         ends.append(end)
     size = np.ptp([end.values for end in ends], axis=0)
     size = np.where(size > 0, size, 1.0)
+    ends = [builder.polished(end, size) for end in ends]
     say = progress if progress is not None else _say_nothing
     if len(goals) == 2:
         found, gaps = _spread_between(builder, ends, size, count, say)
@@ -271,6 +234,23 @@ class _Builder:
             self.failed += 1
             return None
         return FrontPoint(program.measure(solution.x), replace(program, nlp=solution.nlp), bounds, solution)
+
+    def polished(self, end: FrontPoint, size: FloatArray) -> FrontPoint:
+        """Return an end at which no other goal can be better, where the optimum of its goal alone is not one point."""
+        k = end.program.optimised
+        for j in range(len(self.goals)):
+            if j == k:
+                continue
+            # As tight as rounding allows: with the optimum itself as the bound, a program may have no inner point.
+            bounds = [
+                None if i == j else float(value) for i, value in enumerate(end.values + self.signs * _ROUNDING * size)
+            ]
+            if end.bounds == (None,) * len(self.goals):
+                bounds = [bound if i == k else None for i, bound in enumerate(bounds)]
+            found = self.solve(j, tuple(bounds), [end])
+            if found is not None and (self.signs * (end.values - found.values))[j] > _SAME * size[j]:
+                end = found
+        return end
 
     def between(self, one: FrontPoint, other: FrontPoint, size: FloatArray) -> FrontPoint | None:
         """Return a point between two neighbours; None where the front has none."""

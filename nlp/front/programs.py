@@ -109,7 +109,8 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
         dimension = readings[optimised][0].dimension
         level = layout.table.add(best.label, dimension, Free(least, most)).symbols
         layout = replace(
-            layout, constraints=tuple(each for item in layout.constraints for each in _below(item, best, level))
+            layout,
+            constraints=tuple(each for item in layout.constraints for each in _below(item, best, level, (least, most))),
         )
         objective, size = level, most - least
     nlp = replace(assemble(layout, objective, best.sense, added), size=size)
@@ -169,12 +170,14 @@ def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstrai
     return replace(item, upper=value) if goal.sense is Sense.MIN else replace(item, lower=value)
 
 
-def _below(item: BoundedConstraint, goal: Goal, level: SX) -> tuple[BoundedConstraint, ...]:
+def _below(item: BoundedConstraint, goal: Goal, level: SX, ends: tuple[float, float]) -> tuple[BoundedConstraint, ...]:
     """Return a constraint of a goal's limit against a level that is a variable, and its other side."""
     if not _is_of(item, goal):
         return (item,)
     constraint, is_upper = item.constraint, goal.sense is Sense.MIN
-    expression = constraint.expression - constraint.reading.to_value(level)
+    least, most = (float(constraint.reading.to_value(SX(end))) for end in ends)
+    # Of order 1, as a bound of 0 says nothing about the size of an expression such as a squared length.
+    expression = (constraint.expression - constraint.reading.to_value(level)) / (most - least)
     plain = Constraint(constraint.name, expression, Reading(Dimension.NUMBER), pose=constraint.pose)
     moved = BoundedConstraint(plain, -math.inf, 0.0) if is_upper else BoundedConstraint(plain, 0.0, math.inf)
     rest = replace(item, upper=math.inf) if is_upper else replace(item, lower=-math.inf)

@@ -15,6 +15,7 @@ from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
+from .front import FrontResult
 from .jsondata import JsonObject, Mark, Size
 from .parts import SCHEMA
 from .schema import RESULTS
@@ -30,6 +31,7 @@ Result: TypeAlias = (
     | TradeoffResult
     | WorkspaceResult
     | ComparisonResult
+    | FrontResult
 )
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.

@@ -14,6 +14,7 @@ from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
+from .front import FrontResult
 from .jsondata import JsonObject, JsonValue, Mark, Size
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
@@ -28,6 +29,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     TradeoffResult,
     WorkspaceResult,
     ComparisonResult,
+    FrontResult,
 )
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
