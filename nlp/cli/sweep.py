@@ -11,8 +11,8 @@ from .numbers import WholeNumber
 from .options import CaseName, Jobs, Seed, SettingTexts, check_picture, read_settings
 
 if TYPE_CHECKING:
-    from ..sweep.points import Points
-    from ..sweep.sweep import Sweep
+    from ..sweeps.points import Points
+    from ..sweeps.sweep import Sweep
 
 #: Leaves the cursor at the beginning of an empty line.
 _CLEAR_LINE = "\r\033[K"
@@ -55,9 +55,9 @@ def sweep(
     from ..interruption import say_on_leaving
     from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
-    from ..sweep.engines import EngineKind
-    from ..sweep.source import CaseSource
-    from ..sweep.sweep import Sweep, run_sweep
+    from ..sweeps.engines import EngineKind
+    from ..sweeps.source import CaseSource
+    from ..sweeps.sweep import Sweep, run_sweep
 
     kinds = {kind.value: kind for kind in EngineKind}
     if engine is not None and engine not in kinds:
@@ -115,7 +115,7 @@ def _read_points(over: list[str] | None, file: str | None) -> Points:
     """
     from ..errors import InputError
     from ..output.files import read_text
-    from ..sweep.points import grid, points_of_csv
+    from ..sweeps.points import grid, points_of_csv
 
     if bool(over) == (file is not None):
         raise InputError("a sweep needs points: either --over NAME=FIRST:LAST:COUNT, once or more, or --points FILE")

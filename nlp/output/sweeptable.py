@@ -12,8 +12,8 @@ from sys import intern
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..sweep.rows import Row
-from ..sweep.sweep import Sweep
+from ..sweeps.rows import Row
+from ..sweeps.sweep import Sweep
 from .files import check_target, write_whole
 
 #: Endings of a table's file.

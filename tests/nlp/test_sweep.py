@@ -19,13 +19,13 @@ from screwsynth.nlp.evidence.many import Numbers, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.sweep.engines import EngineKind, Job
-from screwsynth.nlp.sweep.journal import Journal
-from screwsynth.nlp.sweep.points import Points, grid
-from screwsynth.nlp.sweep.rows import Row, line_of
-from screwsynth.nlp.sweep.source import CaseSource
-from screwsynth.nlp.sweep.sweep import Sweep, run_sweep
-from screwsynth.nlp.sweep.workers import PointBlock, answer_in_processes
+from screwsynth.nlp.sweeps.engines import EngineKind, Job
+from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.sweeps.points import Points, grid
+from screwsynth.nlp.sweeps.rows import Row, line_of
+from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
+from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 
 Run = Callable[..., tuple[int, str, str]]
 
