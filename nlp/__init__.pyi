@@ -85,6 +85,7 @@ from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
 from .output.report.html import report as report
+from .output.sweepfunction import sweep as sweep
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
@@ -112,6 +113,8 @@ from .solver.status import Status as Status
 from .solver.tradeoff import Tradeoff as Tradeoff
 from .solver.tradeoff import TradeoffPoint as TradeoffPoint
 from .solver.tradeoff import tradeoff as tradeoff
+from .sweeps.columns import SweepColumns as SweepColumns
+from .sweeps.data import sweep_result as sweep_result
 from .units import Units as Units
 from .workspace.extremes import Extreme as Extreme
 from .workspace.judge import Judgement as Judgement

@@ -19,6 +19,7 @@ from .front import FrontResult
 from .jsondata import JsonObject, Mark, Size
 from .parts import SCHEMA
 from .schema import RESULTS
+from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
@@ -32,6 +33,7 @@ Result: TypeAlias = (
     | WorkspaceResult
     | ComparisonResult
     | FrontResult
+    | SweepResult
 )
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.

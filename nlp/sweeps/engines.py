@@ -72,7 +72,7 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
     if wanted is EngineKind.IPOPT or job.proof_seconds is not None:
         for values in job.chosen:
             job.source.case_at(dict(zip(job.names, values, strict=True)))
-        return Choice(EngineKind.IPOPT, "")
+        return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
     try:
         compiled_engine(job, threads)
     except CaseError:
