@@ -213,7 +213,7 @@ def _with_certificate(entry: Entry, time_limit: float, jobs: int | None) -> Entr
         found = certify(entry.solution, time_limit=time_limit, jobs=jobs)
     except (UncoveredError, InputError) as error:
         return replace(entry, certificate_fault=str(error))
-    if found.solution is not entry.solution:
+    if found.certificate is not None and found.certificate.was_beaten:
         # The search of the whole box found a better design.
         entry = _with_fits(replace(entry, solution=found.solution), entry.contender)
     return replace(entry, certified=found, seconds=entry.seconds + time.perf_counter() - began)

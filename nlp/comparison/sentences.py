@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...models import Dimension
 from ..results.point import violations
 from .compare import Comparison, part_of
@@ -11,6 +13,8 @@ from .entry import Entry, TaskFit, driven_wrenches
 
 #: A part as a percentage.
 _PERCENT = 100
+#: Sizes that differ by more than this part are worth a sentence: F of a rotation then differs by twice as much.
+_SAME_SIZE = 0.02
 
 
 def entry_sentences(entry: Entry) -> list[str]:
@@ -79,9 +83,12 @@ def _no_answer(entry: Entry) -> str:
 
 def comparison_sentences(found: Comparison) -> list[str]:
     """Return sentences about a whole comparison."""
-    case, entries = found.case, found.entries
-    ranked = [each for each in entries if part_of(each) == "ranked"]
-    lines = []
+    return [*_rules(found), *_cautions(found), *_conventions(found)]
+
+
+def _rules(found: Comparison) -> list[str]:
+    """Return sentences about sizes and dimensions."""
+    case, lines = found.case, []
     if found.size is not None:
         size = case.units.text(found.size, Dimension.LENGTH)
         lines.append(f"Size: the largest distance between two points of a robot at home is {size}.")
@@ -93,11 +100,24 @@ def comparison_sentences(found: Comparison) -> list[str]:
         )
     else:
         lines.append("Dimensions are fixed at the typical ones.")
-    if any(each.contender.is_own for each in entries):
+    if any(each.contender.is_own for each in found.entries):
         lines.append("The robot of the case takes part as the case states it, with its own dimensions and ranges.")
+    return lines
+
+
+def _cautions(found: Comparison) -> list[str]:
+    """Return sentences about what makes F of ranked robots differ beside the robots themselves."""
+    case, ranked, lines = found.case, found.ranked, []
     kept = {len(each.placed.case.limits) for each in ranked if each.placed is not None}
     if len(kept) > 1:
         lines.append("The ranked robots keep different numbers of the limits: fewer limits let F be better.")
+    sizes = [each.final_size for each in ranked if each.final_size is not None]
+    turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
+    if turns and sizes and max(sizes) > (1 + _SAME_SIZE) * min(sizes):
+        lines.append(
+            "The designs have different sizes, and F of a rotation grows with the square of the size: see the column "
+            "size, and --range 0 for one size."
+        )
     terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
     if len(set(terms.values())) > 1:
         counts = ", ".join(f"{label} {count}" for label, count in terms.items())
@@ -107,6 +127,12 @@ def comparison_sentences(found: Comparison) -> list[str]:
     kinds = {rate.dimension for each in ranked for fit in each.tasks for rate in fit.rates}
     if len(kinds) > 1:
         lines.append("Rates of actuators that turn and of those that slide have different units, and do not compare.")
+    return lines
+
+
+def _conventions(found: Comparison) -> list[str]:
+    """Return sentences about units, and about robots that are not ranked."""
+    case, entries, lines = found.case, found.entries, []
     if any(each.contender.model.has_couples for each in entries):
         length = case.units.text(found.characteristic_length, Dimension.LENGTH)
         lines.append(f"Couples count beside forces by the characteristic length {length}.")

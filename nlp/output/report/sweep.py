@@ -43,7 +43,7 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
         parts.append(paragraphs(["A picture needs a grid over one or two numbers."]))
     if len(found) > _ROWS:
         parts.append(paragraphs([f"The first {_ROWS} points; the table's file has all {len(found):,}."]))
-    parts.append(html_table(_table(case, found), "points"))
+    parts.append(html_table(_table(case, found), "points", id="swept"))
     return plain_page(
         f"{title} - sweep",
         f"{case.name}, robot {case.model.name}, over {', '.join(points.names)}",
