@@ -4,13 +4,29 @@ import csv
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from screwsynth.nlp import Case, Free, InputError, LegLength, Limits, Rotation, Task, build_model, compare, load_result
+from screwsynth.nlp import (
+    Case,
+    Free,
+    InputError,
+    LegLength,
+    Limits,
+    Rotation,
+    Task,
+    Workspace,
+    along_screw,
+    build_model,
+    compare,
+    load_result,
+)
+from screwsynth.nlp.comparison.placed import placed
+from screwsynth.nlp.comparison.robots import read_robots
 from screwsynth.nlp.results.schema import result_schema
 
 Run = Callable[..., tuple[int, str, str]]
@@ -123,6 +139,25 @@ def test_dimensions_ranges_and_certificates() -> None:
         assert each.certificate is not None
         assert each.value is not None
         assert each.certificate.bound >= each.value * (1 - 1e-9)
+
+
+def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
+    robot = read_robots(["6-sps", "delta"], case())[0]
+    moves = along_screw((0.2, 0.1, 1, 5, -3, 2), [-0.3, 0.0, 0.4])
+    workspace = Workspace((Free(20, 40), -20, Free(140, 170)), has_limits=True)
+    found = placed(replace(case(), displacements=moves, workspace=workspace), robot, 300.0, 0.1, 1.0)
+    offset, own = found.offset, found.case
+    start = np.array([30, -20, 150])
+    for world, moved in zip(moves, own.displacements, strict=True):
+        expected = world.rotation @ start + world.translation
+        assert moved.rotation @ (start - offset) + moved.translation + offset == pytest.approx(expected, abs=1e-10)
+        assert np.array_equal(moved.rotation, world.rotation)
+    assert own.workspace is not None
+    ends = [value.lower if isinstance(value, Free) else value for value in own.workspace.position]
+    assert np.array(ends) + offset == pytest.approx([20, -20, 140])
+    # A proof over the workspace is for straight legs: the limits hold at the stated pose alone, and this is said.
+    assert not own.workspace.has_limits
+    assert [each.key for each in found.left_out] == ["limits.over", "limits.leg_length"]
 
 
 def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
