@@ -60,6 +60,10 @@ class Comparison:
     entries: tuple[Entry, ...]
     seconds: float
 
+    def __repr__(self) -> str:
+        names = ", ".join(each.contender.label for each in self.entries)
+        return f"<Comparison on {self.case.name!r}: {names}>"
+
     @property
     def ranked(self) -> tuple[Entry, ...]:
         """The robots whose F can be compared: with an answer, and not without the freedom for a task."""

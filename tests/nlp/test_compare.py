@@ -175,7 +175,7 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         (("6-ups", "delta", "--time", "0"), "--time 0: must be positive"),
         (("6-ups", "delta", "--json", str(taken)), "is no folder"),
         (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
-        (("delta", "delta-parallelogram", "--range", "0"), "task tilt: no robot of the comparison has the freedom"),
+        (("delta", "3-puu", "--range", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
     ):
         code, out, err = cli("compare", path, *arguments)
         assert (code, out, len(err.splitlines())) == (2, "", 1), err
