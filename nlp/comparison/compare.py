@@ -20,7 +20,7 @@ from ..solver.exchange import design_of
 from ..solver.solve import solve
 from ..workspace.judge import judge_workspace
 from ..workspace.verdict import Outcome
-from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, task_fit
+from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, strokes_over_poses, task_fit
 from .placed import placed
 from .robots import Contender, read_robots
 from .size import size_at, size_at_start, size_of_home
@@ -29,7 +29,7 @@ from .size import size_at, size_at_start, size_of_home
 RANGE = 0.25
 #: Seconds for each search of a proof, of a certificate or over a workspace.
 TIME_LIMIT = 20.0
-#: Measures of actuators and of legs whose strokes over a workspace are told.
+#: Measures of actuators and of legs whose strokes are told.
 _MEASURES = ("actuator_length", "actuator_angle", "leg_length")
 
 #: Parts of a table, in order: robots whose F can be compared, those that cannot make a motion, those without an answer.
@@ -205,7 +205,13 @@ def _with_fits(entry: Entry, contender: Contender) -> Entry:
         freedoms=freedoms,
         singularities=tuple(dict.fromkeys(singularities)),
         final_size=size_at(nlp, solution.outcomes[0].x),
+        strokes=strokes_over_poses(contender, solution.outcomes[0], _measures(contender)),
     )
+
+
+def _measures(contender: Contender) -> tuple[str, ...]:
+    """Return the names of a robot's measures whose strokes are told."""
+    return tuple(each.name for each in contender.model.quantities if each.name in _MEASURES)
 
 
 def _with_certificate(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
@@ -229,7 +235,7 @@ def _with_judgement(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
         return entry
     began = time.perf_counter()
     outcome, proof = entry.solution.outcomes[0], entry.solution.workspace
-    names = tuple(each.name for each in entry.contender.model.quantities if each.name in _MEASURES)
+    names = _measures(entry.contender)
     # Lengths of straight legs are among the claims already.
     asked = [name for name in names if name != "leg_length" or not entry.contender.model.legs]
     if proof is not None:

@@ -14,6 +14,7 @@ from ...models import Dimension
 from ..case.task import Sense
 from ..certificate.certificate import Certificate
 from ..evidence.mobility import Mobility, mobility_of
+from ..evidence.state import evaluate
 from ..solver.certified import Certified
 from ..solver.solution import Solution, TaskOutcome
 from ..workspace.judge import Judgement
@@ -89,7 +90,7 @@ class Entry:
         outcome: verdict on the workspace: regular poses and limits; None where it is not judged.
         workspace_fault: sentence of the reason why it is not judged; else empty.
         seconds: wall time.
-        strokes: largest stroke over the workspace by measure, from proven bounds.
+        strokes: largest stroke by measure: over the workspace from proven bounds, else over several poses.
     """
 
     contender: Contender
@@ -199,6 +200,26 @@ def outcome_of(judgement: Judgement) -> Outcome:
     is_regular = judgement.regularity is not None and judgement.regularity.outcome is Outcome.PROVED
     held = all(each.outcome is Outcome.PROVED for each in judgement.extremes if each.limit is not None)
     return Outcome.PROVED if is_regular and held else Outcome.OPEN
+
+
+def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: tuple[str, ...]) -> dict[str, Stroke]:
+    """Return the largest stroke of each measure over the poses of a case; none for a single pose.
+
+    Args:
+        contender: the robot.
+        outcome: of a task, whose robot exists at the design.
+        quantities: names of the measures.
+    """
+    nlp = outcome.own.nlp
+    count = len(nlp.program.robots)
+    if count == 1:
+        return {}
+    states = [evaluate(nlp, outcome.x, pose) for pose in range(count)]
+    dimensions = {each.name: each.dimension for each in contender.model.quantities}
+    return {
+        name: Stroke(float(np.ptp([state.quantities[name] for state in states], axis=0).max()), dimensions[name])
+        for name in quantities
+    }
 
 
 def proven_strokes(judgement: Judgement, quantities: tuple[str, ...]) -> Mapping[str, Stroke]:

@@ -26,9 +26,7 @@ def size_of_home(model: Model) -> float:
     unknowns = np.zeros(len(model.unknowns))
     size = _size(model, parameters, unknowns, np.eye(3), np.array(model.home))
     if not (np.isfinite(size) and size > 0):
-        raise InputError(
-            f"compare: {model.name}: has no points apart from each other, so it has no size; use --no-scale"
-        )
+        raise InputError(f"compare: {model.name}: has no points apart from each other, and so no size")
     return size
 
 

@@ -74,10 +74,10 @@ class ComparedLimitData(JsonObject):
 
 
 class ComparedStrokeData(JsonObject):
-    """The largest stroke of a measure over the workspace.
+    """The largest stroke of a measure over the workspace, or over the poses of a case with several.
 
     Attributes:
-        stroke: from proven bounds: no limb needs more.
+        stroke: of the limb that needs the largest; over a workspace from proven bounds.
         unit: of the stroke.
     """
 
@@ -109,7 +109,7 @@ class ComparedRobotData(JsonObject):
         certificate: the proven bound; null without one.
         certificate_fault: reason why there is no certificate; absent where none was asked for, or there is one.
         workspace: verdict on the design over the workspace; null where it is not judged.
-        strokes: largest strokes over the workspace, by measure.
+        strokes: largest strokes, by measure: over the workspace, else over the poses of a case with several.
         sentences: about what is missing or cannot be compared.
         case: the case with this robot as the text of a case file; null where no file can state it.
         seconds: wall time.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -43,8 +44,10 @@ def comparison_table(result: ComparisonResult) -> TextTable:
     headers += ["constraints\n% of F", "largest rate", _headed("size", unit)]
     with_limits, with_proof = result.limits > 0, any(each.certificate or each.certificate_fault for each in robots)
     with_workspace = any(each.workspace is not None for each in robots)
+    with_strokes = any(each.strokes for each in robots)
     headers += ["limits kept"] if with_limits else []
-    headers += ["workspace", "stroke"] if with_workspace else []
+    headers += ["workspace"] if with_workspace else []
+    headers += ["stroke"] if with_strokes else []
     headers += ["certificate"] if with_proof else []
     rows = []
     for rank, robot in enumerate(robots, start=1):
@@ -54,7 +57,8 @@ def comparison_table(result: ComparisonResult) -> TextTable:
             row += [_text(each.F, _DIGITS) for each in robot.tasks] or [""] * len(tasks)
         row += [_constraints(robot), _largest_rate(robot), _text(robot.final_size, _FEW)]
         row += [f"{robot.limits_kept} of {result.limits}"] if with_limits else []
-        row += ["" if robot.workspace is None else robot.workspace.value, _strokes(robot)] if with_workspace else []
+        row += ["" if robot.workspace is None else robot.workspace.value] if with_workspace else []
+        row += [_strokes(robot)] if with_strokes else []
         row += [_proof(robot)] if with_proof else []
         rows.append(tuple(row))
     return TextTable(tuple(headers), tuple(rows), "comparison")
@@ -128,7 +132,9 @@ def _largest_rate(robot: ComparedRobotData) -> str:
     if any(rate.rate is None for rate in rates):
         return "none drives"
     largest = max(rates, key=lambda each: abs(each.rate or 0.0))
-    return f"{abs(largest.rate or 0.0):.{_FEW}g} {largest.unit}"
+    # A motion that no actuator drives leaves rounding errors of a size that F tells.
+    size = max(math.sqrt(each.F) for each in robot.tasks if each.F is not None)
+    return f"{number(abs(largest.rate or 0.0), size, digits=_FEW)} {largest.unit}"
 
 
 def _strokes(robot: ComparedRobotData) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
+from screwsynth.models import Displacement
 from screwsynth.nlp import (
     Case,
     Free,
@@ -23,6 +24,7 @@ from screwsynth.nlp import (
     along_screw,
     build_model,
     compare,
+    evaluate,
     load_result,
 )
 from screwsynth.nlp.comparison.placed import placed
@@ -139,6 +141,22 @@ def test_dimensions_ranges_and_certificates() -> None:
         assert each.certificate is not None
         assert each.value is not None
         assert each.certificate.bound >= each.value * (1 - 1e-9)
+
+
+def test_strokes_over_several_poses() -> None:
+    moved = replace(
+        case(), displacements=(Displacement.by(np.eye(3), np.zeros(3)), Displacement.by(np.eye(3), (0, 0, 9)))
+    )
+    found = compare(moved, ["6-sps", "case"], part=0, starts=1)
+    for entry in found.entries:
+        assert entry.solution is not None
+        (stroke,) = entry.strokes.values()
+        nlp, x = entry.solution.nlp, entry.solution.x
+        first, last = (evaluate(nlp, x, pose) for pose in (0, 1))
+        lengths = [state.quantities[next(iter(entry.strokes))] for state in (first, last)]
+        assert stroke.value == pytest.approx(np.abs(lengths[1] - lengths[0]).max())
+        # Each leg becomes longer by less than the platform moves.
+        assert 0 < stroke.value < 9
 
 
 def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
