@@ -133,7 +133,7 @@ def _largest_rate(robot: ComparedRobotData) -> str:
         return "none drives"
     largest = max(rates, key=lambda each: abs(each.rate or 0.0))
     # A motion that no actuator drives leaves rounding errors of a size that F tells.
-    size = max(math.sqrt(each.F) for each in robot.tasks if each.F is not None)
+    size = max((math.sqrt(each.F) for each in robot.tasks if each.F is not None), default=0.0)
     return f"{number(abs(largest.rate or 0.0), size, digits=_FEW)} {largest.unit}"
 
 
