@@ -16,10 +16,10 @@ import numpy as np
 
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.output.sweeptable import table_points, write_table
-from screwsynth.nlp.sweep.points import grid
-from screwsynth.nlp.sweep.rows import Row
-from screwsynth.nlp.sweep.source import CaseSource
-from screwsynth.nlp.sweep.sweep import Sweep
+from screwsynth.nlp.sweeps.points import grid
+from screwsynth.nlp.sweeps.rows import Row
+from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.sweep import Sweep
 
 CASE = "paper-4.1-helical"
 NAMES = [f"task.{part}" for part in ("axis_x", "axis_y", "axis_z", "point_x", "point_y", "point_z", "pitch")]

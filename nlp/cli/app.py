@@ -9,6 +9,7 @@ import typer
 from .certify import certify
 from .check import check
 from .codegen import codegen
+from .compare import compare
 from .evaluate import evaluate
 from .export import export
 from .importing import SeveralValues, import_
@@ -40,6 +41,7 @@ for command in (
     tradeoff,
     sweep,
     pareto,
+    compare,
     certify,
     verify_proof,
     workspace,

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .numbers import WholeNumber
-from .options import CaseName, CurveFile, Jobs, Seed, SettingTexts, Starts, check_picture, console, read_settings
+from .options import (
+    CaseName,
+    CurveFile,
+    Jobs,
+    JsonFile,
+    Seed,
+    SettingTexts,
+    Starts,
+    check_picture,
+    console,
+    read_settings,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from ..front.front import Front
 
 #: Leaves the cursor at the beginning of an empty line.
 _CLEAR_LINE = "\r\033[K"
@@ -18,7 +33,7 @@ def pareto(
     case: CaseName,
     goals: Annotated[
         list[str],
-        typer.Option(metavar="GOAL", help="Twice: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
+        typer.Option(metavar="GOAL", help="Twice or more: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
     ],
     points: Annotated[
         int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front; 16.")
@@ -29,21 +44,27 @@ def pareto(
     jobs: Jobs = None,
     certify: Annotated[bool, typer.Option("--certify", help="Prove each point's optimum too.")] = False,
     csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the front as CSV.")] = None,
+    json_file: JsonFile = None,
+    html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
     plot: CurveFile = None,
 ) -> None:
-    """Find the front of two goals of a case."""
+    """Find the front of two or more goals of a case."""
     from ..case.reader import read_case
     from ..errors import InputError, UncoveredError
     from ..front.front import find_front
     from ..front.goals import read_goals
-    from ..output.files import check_outputs, write_bytes, write_text
-    from ..output.fronttable import front_csv, front_table, front_words
-    from ..output.terminal import show as show_items
+    from ..output.files import check_outputs
 
+    if [json_file, csv_file, html].count("-") > 1:
+        raise InputError("standard output can take one of --json -, --csv - and --html - only")
     check_picture(plot)
+    if html is not None:
+        from ..output.pictures.requirements import check_library
+
+        check_library("matplotlib", "pages")
     read = read_case(case, read_settings(settings))
     wanted = read_goals(goals, read.case)
-    check_outputs(read.inputs, {"--csv": csv_file, "--plot": plot})
+    check_outputs(read.inputs, {"--json": json_file, "--csv": csv_file, "--html": html, "--plot": plot})
     show = sys.stderr.isatty()
 
     def show_progress(done: int, total: int) -> None:
@@ -65,16 +86,32 @@ def pareto(
     finally:
         if show:
             sys.stderr.write(_CLEAR_LINE)
+    _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
+    is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
+    raise typer.Exit(0 if is_proved else 1)
+
+
+def _write(found: Front, *, json_file: str | None, csv_file: str | None, html: str | None, plot: str | None) -> None:
+    """Write a front into its files, and onto the terminal where standard output takes no file."""
+    from ..front.data import front_result
+    from ..output.files import write_bytes, write_text
+    from ..output.fronttable import front_csv, front_table, front_words
+    from ..output.terminal import show
+
+    if json_file is not None:
+        write_json(json_file, front_result(found))
     if csv_file is not None:
         write_text(csv_file, front_csv(found))
+    if html is not None:
+        from ..output.report.front import front_page
+
+        write_text(html, front_page(found))
     if plot is not None:
         from ..output.pictures.fronts import front_picture
         from ..output.pictures.requirements import ending_of
 
         write_bytes(plot, front_picture(found, ending_of(plot)))
-    if csv_file != "-":
+    if "-" not in (json_file, csv_file, html):
         for line in front_words(found):
             typer.echo(line)
-        show_items(console(), [front_table(found)])
-    is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    raise typer.Exit(0 if is_proved else 1)
+        show(console(), [front_table(found)])

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import WholeNumber
-from .options import CaseName, Jobs, Seed, SettingTexts, check_picture, read_settings
+from .numbers import Number, WholeNumber
+from .options import CaseName, Jobs, JsonFile, Seed, SettingTexts, check_picture, read_settings, write_json
 
 if TYPE_CHECKING:
-    from ..sweep.points import Points
-    from ..sweep.sweep import Sweep
+    from ..sweeps.points import Points
+    from ..sweeps.sweep import Sweep
 
 #: Leaves the cursor at the beginning of an empty line.
 _CLEAR_LINE = "\r\033[K"
@@ -45,6 +45,15 @@ def sweep(
         str | None,
         typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
     ] = None,
+    certified: Annotated[bool, typer.Option("--certify", help="Prove the optimum at each point too.")] = False,
+    time: Annotated[
+        float,
+        typer.Option(
+            "--time", parser=Number("--time"), metavar="SECONDS", help="Stop each proof then, with its bound."
+        ),
+    ] = 60.0,
+    json_file: JsonFile = None,
+    html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="FILE", help="Draw F over one or two numbers: .png, .svg or .pdf.")
     ] = None,
@@ -54,10 +63,11 @@ def sweep(
     from ..errors import InputError
     from ..interruption import say_on_leaving
     from ..output.files import check_outputs
+    from ..output.sweepfunction import check_seconds
     from ..output.sweeptable import check_table, is_written, write_table
-    from ..sweep.engines import EngineKind
-    from ..sweep.source import CaseSource
-    from ..sweep.sweep import Sweep, run_sweep
+    from ..sweeps.engines import EngineKind
+    from ..sweeps.source import CaseSource
+    from ..sweeps.sweep import Sweep, run_sweep
 
     kinds = {kind.value: kind for kind in EngineKind}
     if engine is not None and engine not in kinds:
@@ -68,6 +78,13 @@ def sweep(
         from ..output.pictures.sweeps import check_axes
 
         check_axes(chosen)
+    if html is not None:
+        from ..output.pictures.requirements import check_library
+
+        check_library("matplotlib", "pages")
+    if json_file == html == "-":
+        raise InputError("standard output can take one of --json - and --html - only")
+    check_seconds(time)
     check_table(out)
     read = read_case(case, read_settings(settings))
     inputs = dict(read.inputs)
@@ -75,8 +92,8 @@ def sweep(
         from pathlib import Path
 
         inputs[Path(points)] = "the file of the points"
-    check_outputs(inputs, {"--out": out, "--plot": plot})
-    found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed)
+    check_outputs(inputs, {"--out": out, "--json": json_file, "--html": html, "--plot": plot})
+    found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, time if certified else None)
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
@@ -104,7 +121,25 @@ def sweep(
                 sys.stderr.write(_CLEAR_LINE)
             write_table(out, found, journal.rows())
             journal.remove()
-    raise typer.Exit(_show(found, out, plot))
+    if json_file is not None or html is not None:
+        _write(found, out, json_file, html)
+    raise typer.Exit(_show(found, out, plot, is_silent="-" in (json_file, html)))
+
+
+def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> None:
+    """Write a sweep as JSON and as a page."""
+    from ..output.files import write_text
+    from ..output.sweeptable import table_rows
+    from ..sweeps.columns import columns_of
+    from ..sweeps.data import sweep_result
+
+    case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
+    if json_file is not None:
+        write_json(json_file, sweep_result(case, columns))
+    if html is not None:
+        from ..output.report.sweep import sweep_page
+
+        write_text(html, sweep_page(case, found.points, columns))
 
 
 def _read_points(over: list[str] | None, file: str | None) -> Points:
@@ -115,14 +150,14 @@ def _read_points(over: list[str] | None, file: str | None) -> Points:
     """
     from ..errors import InputError
     from ..output.files import read_text
-    from ..sweep.points import grid, points_of_csv
+    from ..sweeps.points import grid, points_of_csv
 
     if bool(over) == (file is not None):
         raise InputError("a sweep needs points: either --over NAME=FIRST:LAST:COUNT, once or more, or --points FILE")
     return points_of_csv(read_text(file), file) if file is not None else grid(over or [])
 
 
-def _show(found: Sweep, out: str, plot: str | None) -> int:
+def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
     """Draw the picture, print a line about the table, and return the exit status."""
     import math
 
@@ -139,7 +174,13 @@ def _show(found: Sweep, out: str, plot: str | None) -> int:
     values = [row.F for row in rows if not math.isnan(row.F)]
     regions = len({row.active for row in rows if not math.isnan(row.F)})
     ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
-    typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
+    if found.proof_seconds is not None:
+        from ..output.sweeptable import table_rows
+
+        proved = sum(row.certificate == "proved" for row in table_rows(out, found))
+        ends += f", {proved:,} are proved"
+    if not is_silent:
+        typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
     return 0 if values else 1
 
 

@@ -1,4 +1,4 @@
-"""Fronts of two goals: the best of one for each bound of the other.
+"""Fronts of several goals: the best of one for bounds of the others.
 
-The modules import each other in this order: ``goals``, ``programs``, ``front``.
+The modules import each other in this order: ``goals``, ``programs``, ``boxes``, ``front``, ``pareto``, ``data``.
 """

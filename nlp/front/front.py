@@ -1,8 +1,15 @@
-"""The front of two goals, spread evenly by an adaptive rule.
+"""The front of two or more goals, spread evenly by an adaptive rule.
 
-The ends are the optima of each goal alone. Then the widest gap between neighbours is divided, in goals divided by the
-distance of the ends: the goal that differs more in the gap gets a bound in the middle, and the other one is optimised.
-Where this leads back to an end of the gap with either goal as the bounded one, the front has no point in the gap.
+The ends are the optima of each goal alone; where such an optimum is not one point, the other goals are optimised within
+it. Goals are measured in parts of the distance of the ends.
+
+Two goals: the widest gap between neighbours is divided: the goal that differs more in the gap gets a bound in the
+middle, and the other one is optimised. Where this leads back to an end of the gap with either goal as the bounded one,
+the front has no point in the gap.
+
+More goals: of the boxes that can still hold points (:mod:`.boxes`), the one that can hold the largest piece of the
+front is taken. The goal along its shortest side is optimised, and all others get bounds in the middle of their sides.
+Where this gives no new point, the other goals are optimised in turn; a box where none gives one is closed.
 """
 
 from __future__ import annotations
@@ -21,8 +28,9 @@ from ..certificate.certificate import Certificate
 from ..errors import EvaluationError
 from ..interruption import is_requested
 from ..solver.multistart import ProgramSolution, solve_program
+from .boxes import GoalBox, Region
 from .goals import Goal
-from .programs import GoalProgram, check_goals, program_of
+from .programs import GoalProgram, loosest_numbers, program_of
 
 #: Points whose goals differ by less than this part of the distance of the ends are one point of the front.
 _SAME = 1e-6
@@ -32,38 +40,38 @@ _ROUNDING = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class FrontPoint:
-    """A point of a front: the optimum of one goal within a bound of the other.
+    """A point of a front: the optimum of one goal within bounds of the others.
 
     Attributes:
-        values: (2,) the goals, angles in radians.
+        values: (k,) the goals, angles in radians.
         program: whose optimum it is.
-        bound: of the other goal; None at an end.
+        bounds: of each goal; None for the one that is optimised, and for all at an end.
         solution: of the program, with its evidence.
         certificate: proven bound of the optimised goal; None where none was asked for.
     """
 
     values: FloatArray
     program: GoalProgram
-    bound: float | None
+    bounds: tuple[float | None, ...]
     solution: ProgramSolution
     certificate: Certificate | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """A front of two goals.
+    """A front of two or more goals.
 
     Attributes:
         case: the case.
-        goals: both goals.
+        goals: the k goals.
         points: none of which dominates another, in the order of the first goal, its best value last.
-        gaps: pairs of neighbours (index of the first) between which the front has no point.
+        gaps: of two goals, pairs of neighbours (index of the first) between which the front has no point.
         failed: number of searches that found no optimum.
         seconds: wall time.
     """
 
     case: Case
-    goals: tuple[Goal, Goal]
+    goals: tuple[Goal, ...]
     points: tuple[FrontPoint, ...]
     gaps: tuple[int, ...]
     failed: int
@@ -72,7 +80,7 @@ class Front:
 
 def find_front(
     case: Case,
-    goals: tuple[Goal, Goal],
+    goals: tuple[Goal, ...],
     count: int,
     *,
     search: Search,
@@ -80,39 +88,52 @@ def find_front(
     certify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Front:
-    """Return the front of two goals.
+    """Return the front of two or more goals; the errors are those of :func:`.pareto.pareto`.
 
     Args:
         case: the case.
-        goals: both goals.
-        count: number of points, at least 2; fewer where the front has gaps or is one point.
+        goals: the goals.
+        count: number of points.
         search: number of starts, seed and the solver's settings.
-        jobs: number of threads; the result does not depend on it.
+        jobs: number of threads.
         certify: whether the optimum of each point is proved too.
-        progress: called after each solve with the numbers of points found and wanted.
-
-    Raises:
-        CaseError: the case contradicts itself.
-        InputError: a limit is not in the case or cannot move.
-        EvaluationError: a goal alone has no optimum.
-        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
+        progress: called after each solve.
     """
     began = time.perf_counter()
-    check_goals(case, goals)
+    loosest = loosest_numbers(case, goals)
     builder = _Builder(case, goals, search, jobs)
-    ends = [builder.solve(k, None, []) for k in (1, 0)]
-    found = [end for end in ends if end is not None]
-    if len(found) < 2:
-        which = goals[1 if ends[0] is None else 0]
-        raise EvaluationError(
-            f"{case.source or case.name}: the goal {which.label} alone has no optimum within the limits"
-        )
-    size = np.abs(found[0].values - found[1].values)
+    nothing = (None,) * len(goals)
+    ends: list[FrontPoint] = []
+    for k in (1, 0, *range(2, len(goals))):
+        end = builder.solve(k, nothing, [])
+        if end is None:
+            fault = f"the goal {goals[k].label} alone has no optimum within the limits"
+            raise EvaluationError(f"{case.source or case.name}: {fault}")
+        ends.append(end)
+    size = np.ptp([end.values for end in ends], axis=0)
     size = np.where(size > 0, size, 1.0)
-    closed: set[tuple[int, int]] = set()
+    ends = [builder.polished(end, size) for end in ends]
+    say = progress if progress is not None else _say_nothing
+    if len(goals) == 2:
+        found, gaps = _spread_between(builder, ends, size, count, say)
+    else:
+        found, gaps = _spread_in_boxes(builder, ends, size, loosest, count, say), []
+    if certify:
+        found = [replace(point, certificate=_certificate(point, jobs)) for point in found]
+    return Front(case, goals, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
+
+
+def _say_nothing(_done: int, _total: int) -> None:
+    pass
+
+
+def _spread_between(
+    builder: _Builder, ends: list[FrontPoint], size: FloatArray, count: int, progress: Callable[[int, int], None]
+) -> tuple[list[FrontPoint], list[int]]:
+    """Return the points of a front of two goals, and the pairs of neighbours without a point between them."""
+    found, closed = list(ends), set[tuple[int, int]]()
     while len(found) < count and not is_requested():
-        if progress is not None:
-            progress(len(found), count)
+        progress(len(found), count)
         pair = _widest(found, closed, size)
         if pair is None:
             break
@@ -120,12 +141,68 @@ def find_front(
         if middle is None:
             closed.add((id(found[pair]), id(found[pair + 1])))
             continue
-        found = _undominated([*found, middle], goals, size)
-    found = _undominated(found, goals, size)
-    gaps = [k for k in range(len(found) - 1) if (id(found[k]), id(found[k + 1])) in closed]
-    if certify:
-        found = [replace(point, certificate=_certificate(point, jobs)) for point in found]
-    return Front(case, goals, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
+        found = _undominated([*found, middle], builder.goals, size)
+    found = _undominated(found, builder.goals, size)
+    return found, [k for k in range(len(found) - 1) if (id(found[k]), id(found[k + 1])) in closed]
+
+
+def _spread_in_boxes(
+    builder: _Builder,
+    ends: list[FrontPoint],
+    size: FloatArray,
+    loosest: FloatArray,
+    count: int,
+    progress: Callable[[int, int], None],
+) -> list[FrontPoint]:
+    """Return the points of a front of more than two goals.
+
+    Boxes reach to the worst number of each goal that the ends have or the case allows, and farther where a point is
+    found beyond.
+    """
+    signs, found = builder.signs, _undominated(ends, builder.goals, size)
+    closed = set[tuple[float, ...]]()
+
+    def cost(values: FloatArray) -> FloatArray:
+        return np.asarray(signs * values / size)
+
+    costs = np.array([cost(end.values) for end in ends])
+    best, worst = costs.min(axis=0), np.fmax(costs.max(axis=0), cost(loosest))
+    region = Region(best, worst, [cost(point.values) for point in found])
+    while len(found) < count and not is_requested():
+        progress(len(found), count)
+        box = region.widest(closed)
+        if box is None:
+            break
+        point = _point_in(builder, box, found, size)
+        if point is None:
+            closed.add(tuple(box.upper))
+            continue
+        kept = _undominated([*found, point], builder.goals, size)
+        if len(kept) == len(found) + 1 and (cost(point.values) <= worst).all():
+            region.add(cost(point.values))
+        else:
+            worst = np.maximum(worst, cost(point.values))
+            region = Region(best, worst, [cost(each.values) for each in kept])
+        found = kept
+    return found
+
+
+def _point_in(builder: _Builder, box: GoalBox, known: list[FrontPoint], size: FloatArray) -> FrontPoint | None:
+    """Return a new point of a front from bounds in the middle of a box; None where no goal as the optimum gives one."""
+    middle = (box.lower + box.upper) / 2 * size * builder.signs
+    for k in np.argsort(box.sides, kind="stable").tolist():
+        bounds = tuple(None if j == k else float(value) for j, value in enumerate(middle))
+        point = builder.solve(k, bounds, _nearest(known, middle, size))
+        if point is None or any(np.max(np.abs(point.values - each.values) / size) <= _SAME for each in known):
+            continue
+        if any(each is point for each in _undominated([*known, point], builder.goals, size)):
+            return point
+    return None
+
+
+def _nearest(points: list[FrontPoint], middle: FloatArray, size: FloatArray) -> list[FrontPoint]:
+    """Return the points of a front that are nearest to goals (k,), from which a search may begin."""
+    return sorted(points, key=lambda point: float(np.linalg.norm((point.values - middle) / size)))[:2]
 
 
 class _Builder:
@@ -133,25 +210,47 @@ class _Builder:
 
     Args:
         case: the case.
-        goals: both goals.
+        goals: all goals.
         search: number of starts, seed and the solver's settings.
         jobs: number of threads.
     """
 
-    def __init__(self, case: Case, goals: tuple[Goal, Goal], search: Search, jobs: int | None) -> None:
+    def __init__(self, case: Case, goals: tuple[Goal, ...], search: Search, jobs: int | None) -> None:
         self.case, self.goals, self.search, self.jobs = case, goals, search, jobs
         self.failed = 0
 
-    def solve(self, optimised: int, bound: float | None, near: list[FrontPoint]) -> FrontPoint | None:
-        """Return the optimum of one goal within a bound of the other; None where none is found."""
-        program = program_of(self.case, self.goals, optimised, bound)
+    @property
+    def signs(self) -> FloatArray:
+        """(k,) factors that turn the goals into costs."""
+        return np.array([goal.sign for goal in self.goals])
+
+    def solve(self, optimised: int, bounds: tuple[float | None, ...], near: list[FrontPoint]) -> FrontPoint | None:
+        """Return the optimum of one goal within bounds of the others; None where none is found."""
+        program = program_of(self.case, self.goals, optimised, bounds)
         nlp = program.nlp
         first = [_start(program, point) for point in near]
         solution = solve_program(nlp, self.search, first=first, jobs=self.jobs)
         if not solution.status.is_answer:
             self.failed += 1
             return None
-        return FrontPoint(program.measure(solution.x), replace(program, nlp=solution.nlp), bound, solution)
+        return FrontPoint(program.measure(solution.x), replace(program, nlp=solution.nlp), bounds, solution)
+
+    def polished(self, end: FrontPoint, size: FloatArray) -> FrontPoint:
+        """Return an end at which no other goal can be better, where the optimum of its goal alone is not one point."""
+        k = end.program.optimised
+        for j in range(len(self.goals)):
+            if j == k:
+                continue
+            # As tight as rounding allows: with the optimum itself as the bound, a program may have no inner point.
+            bounds = [
+                None if i == j else float(value) for i, value in enumerate(end.values + self.signs * _ROUNDING * size)
+            ]
+            if end.bounds == (None,) * len(self.goals):
+                bounds = [bound if i == k else None for i, bound in enumerate(bounds)]
+            found = self.solve(j, tuple(bounds), [end])
+            if found is not None and (self.signs * (end.values - found.values))[j] > _SAME * size[j]:
+                end = found
+        return end
 
     def between(self, one: FrontPoint, other: FrontPoint, size: FloatArray) -> FrontPoint | None:
         """Return a point between two neighbours; None where the front has none."""
@@ -160,7 +259,8 @@ class _Builder:
             if apart[bounded] <= _SAME:
                 continue
             bound = float((one.values[bounded] + other.values[bounded]) / 2)
-            found = self.solve(1 - bounded, bound, [one, other])
+            bounds = (bound, None) if bounded == 0 else (None, bound)
+            found = self.solve(1 - bounded, bounds, [one, other])
             if found is not None and all(
                 np.max(np.abs(found.values - each.values) / size) > _SAME for each in (one, other)
             ):
@@ -191,7 +291,7 @@ def _widest(points: list[FrontPoint], closed: set[tuple[int, int]], size: FloatA
     return best
 
 
-def _undominated(points: list[FrontPoint], goals: tuple[Goal, Goal], size: FloatArray) -> list[FrontPoint]:
+def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatArray) -> list[FrontPoint]:
     """Return the points that no other one dominates, in the order of the first goal, its best value last."""
     signs = np.array([goal.sign for goal in goals])
     costs = [signs * point.values / size for point in points]

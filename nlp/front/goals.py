@@ -10,6 +10,8 @@ from ..case.task import Sense
 from ..errors import InputError, listing, nearest
 
 _TASK, _LIMIT = "F:", "limits."
+#: Largest number of goals: the boxes of the space of goals become too many, and nobody reads such a front.
+MOST = 6
 
 
 @dataclass(frozen=True)
@@ -34,21 +36,21 @@ class Goal:
         return -1.0 if self.sense is Sense.MAX else 1.0
 
 
-def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, Goal]:
-    """Return the two goals of a case; F alone stands for that of the only task.
+def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:
+    """Return the goals of a case; F alone stands for that of the only task.
 
     Raises:
-        InputError: a text is no goal of the case, or there are not two different ones of which one is F of a task.
+        InputError: a text is no goal of the case, or there are fewer than two different ones or more than ``MOST``.
     """
-    goals = [_read_goal(text, case) for text in texts]
-    if len(goals) != 2:
-        raise InputError(f"--goals: a front has two goals, and {len(goals)} are given")
-    one, two = goals
-    if one.label == two.label:
-        raise InputError(f"--goals: {one.label} is given twice")
-    if one.task is None and two.task is None:
-        raise InputError("--goals: one of them must be F of a task, such as 'max F:drive'")
-    return one, two
+    goals = tuple(_read_goal(text, case) for text in texts)
+    if not 2 <= len(goals) <= MOST:
+        verb = "is" if len(goals) == 1 else "are"
+        raise InputError(f"--goals: a front has 2 to {MOST} goals, and {len(goals)} {verb} given")
+    labels = [goal.label for goal in goals]
+    twice = next((label for k, label in enumerate(labels) if label in labels[:k]), None)
+    if twice is not None:
+        raise InputError(f"--goals: {twice} is given twice")
+    return goals
 
 
 def _read_goal(text: str, case: Case) -> Goal:

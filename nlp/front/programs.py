@@ -1,4 +1,4 @@
-"""Programs of a front: one goal is optimised while the other keeps a bound (epsilon-constraint method).
+"""Programs of a front: one goal is optimised while the others keep bounds (epsilon-constraint method).
 
 Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
 integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.
@@ -37,17 +37,17 @@ class GoalProgram:
         optimised: index of the goal that is optimised.
         values: ``(x, p)`` to the expressions of each goal, (k, 1); for a limit those of its constraints.
         readings: how these expressions read, for each goal.
-        goals: both goals.
+        goals: all goals.
     """
 
     nlp: Nlp
     optimised: int
     values: ca.Function
     readings: tuple[tuple[Reading, ...], ...]
-    goals: tuple[Goal, Goal]
+    goals: tuple[Goal, ...]
 
     def measure(self, x: FloatArray) -> FloatArray:
-        """Return the goals (2,) at a point (n,), lengths in the case's unit and angles in radians."""
+        """Return the goals (k,) at a point (n,), lengths in the case's unit and angles in radians."""
         found = self.values(x, self.nlp.arguments)
         values = []
         for goal, raw, readings in zip(self.goals, found, self.readings, strict=True):
@@ -57,8 +57,10 @@ class GoalProgram:
         return np.array(values)
 
 
-def check_goals(case: Case, goals: Sequence[Goal]) -> None:
-    """Refuse goals that a front of the case cannot have.
+def loosest_numbers(case: Case, goals: Sequence[Goal]) -> FloatArray:
+    """Return the worst number (k,) that the case allows of each goal: that of a limit; NaN for F.
+
+    Goals that a front of the case cannot have are refused.
 
     Raises:
         InputError: a limit is not in the case or cannot move, or the case combines poses by their worst.
@@ -66,43 +68,49 @@ def check_goals(case: Case, goals: Sequence[Goal]) -> None:
     if case.over_poses is OverPoses.WORST and case.pose_count > 1:
         raise InputError("pareto: a case with the worst of several poses has no front here; use sum or mean")
     layout = lay_out(case, [case.tasks[0]])
+    found = []
     for goal in goals:
-        if goal.task is None:
-            _range(layout, goal)
+        least, most = (math.nan, math.nan) if goal.task is not None else _range(layout, goal)
+        found.append(most if goal.sense is Sense.MIN else least)
+    return np.array(found)
 
 
-def program_of(case: Case, goals: tuple[Goal, Goal], optimised: int, bound: float | None) -> GoalProgram:
+def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequence[float | None]) -> GoalProgram:
     """Return the program that optimises one goal.
 
     Args:
         case: the case, whose own limits hold too.
-        goals: both goals.
+        goals: all goals.
         optimised: index of the goal to optimise.
-        bound: number that the other goal must reach; None for none.
+        bounds: number that each goal must reach; None for none, and for the goal that is optimised.
 
     Raises:
         CaseError: the case contradicts itself.
         InputError: a limit is not in the case or cannot move.
     """
-    best, other = goals[optimised], goals[1 - optimised]
-    tasks = [each.task for each in (best, other) if each.task is not None]
+    best = goals[optimised]
+    # A case without a goal of F still has a task: a layout has the rates of one.
+    tasks = [goal.task for goal in (best, *goals) if goal.task is not None] or [0]
+    tasks = list(dict.fromkeys(tasks))
     layout = lay_out(case, [case.tasks[task] for task in tasks])
     added: list[BoundedConstraint] = []
-    if bound is not None and other.task is not None:
-        F = _total(layout, tasks.index(other.task))
-        sides = (bound, math.inf) if other.sense is Sense.MAX else (-math.inf, bound)
-        added.append(BoundedConstraint(Constraint(f"F of {other.label[2:]}", F, Reading(Dimension.NUMBER)), *sides))
-    if bound is not None and other.task is None:
-        layout = replace(layout, constraints=tuple(_moved(item, other, bound) for item in layout.constraints))
+    for goal, bound in zip(goals, bounds, strict=True):
+        if bound is not None and goal.task is not None:
+            F = _total(layout, tasks.index(goal.task))
+            sides = (bound, math.inf) if goal.sense is Sense.MAX else (-math.inf, bound)
+            added.append(BoundedConstraint(Constraint(f"F of {goal.label[2:]}", F, Reading(Dimension.NUMBER)), *sides))
+        if bound is not None and goal.task is None:
+            layout = replace(layout, constraints=tuple(_moved(item, goal, bound) for item in layout.constraints))
     raw, readings = zip(*[_raw(layout, goal, tasks) for goal in goals], strict=True)
     if best.task is not None:
-        objective, size = _total(layout, 0), formulate(case, best.task).objective_scale
+        objective, size = _total(layout, tasks.index(best.task)), formulate(case, best.task).objective_scale
     else:
         least, most = _range(layout, best)
         dimension = readings[optimised][0].dimension
         level = layout.table.add(best.label, dimension, Free(least, most)).symbols
         layout = replace(
-            layout, constraints=tuple(each for item in layout.constraints for each in _below(item, best, level))
+            layout,
+            constraints=tuple(each for item in layout.constraints for each in _below(item, best, level, (least, most))),
         )
         objective, size = level, most - least
     nlp = replace(assemble(layout, objective, best.sense, added), size=size)
@@ -162,12 +170,14 @@ def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstrai
     return replace(item, upper=value) if goal.sense is Sense.MIN else replace(item, lower=value)
 
 
-def _below(item: BoundedConstraint, goal: Goal, level: SX) -> tuple[BoundedConstraint, ...]:
+def _below(item: BoundedConstraint, goal: Goal, level: SX, ends: tuple[float, float]) -> tuple[BoundedConstraint, ...]:
     """Return a constraint of a goal's limit against a level that is a variable, and its other side."""
     if not _is_of(item, goal):
         return (item,)
     constraint, is_upper = item.constraint, goal.sense is Sense.MIN
-    expression = constraint.expression - constraint.reading.to_value(level)
+    least, most = (float(constraint.reading.to_value(SX(end))) for end in ends)
+    # Of order 1, as a bound of 0 says nothing about the size of an expression such as a squared length.
+    expression = (constraint.expression - constraint.reading.to_value(level)) / (most - least)
     plain = Constraint(constraint.name, expression, Reading(Dimension.NUMBER), pose=constraint.pose)
     moved = BoundedConstraint(plain, -math.inf, 0.0) if is_upper else BoundedConstraint(plain, 0.0, math.inf)
     rest = replace(item, upper=math.inf) if is_upper else replace(item, lower=-math.inf)

@@ -1,4 +1,4 @@
-"""The front of two goals as CSV, in words, and as a table of text."""
+"""The front of several goals as CSV, in words, and as a table of text."""
 
 from __future__ import annotations
 
@@ -7,32 +7,39 @@ import io
 from collections import Counter
 
 from ..certificate.certificate import CertificateStatus
+from ..front.data import design_places, goal_bounds, goal_units, goal_values
 from ..front.front import Front, FrontPoint
 from ..front.goals import Goal
-from ..program.places import Scalar
+from ..program.designnumbers import design_names
 from ..results.text import TextTable
-from ..results.tradeoffwording import unit_of_objective
 
 _SEPARATOR = "; "
+#: Begins the name of the constraint that bounds F of a task.
+_GOAL = "F of "
 
 
 def front_csv(front: Front) -> str:
     """Return a row for each point of a front: goals, design, active limits, evidence, and the certificate."""
-    units, variables = front.case.units, _variables(front)
+    units, places = front.case.units, design_places(front)
+    # With two goals, one alone has a bound.
+    bounds = ["bound"] if len(front.goals) == 2 else [f"bound of {goal.label}" for goal in front.goals]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([
         *(goal.label for goal in front.goals),
-        *("optimised", "bound", "status", *(each.name for each in variables), "active", "multipliers", "verdict"),
+        *("optimised", *bounds, "status", *(each.name for _, each in places), "active", "multipliers", "verdict"),
         *("stationarity", "feasibility", "curvature", "certificate", "proven_bound", "starts", "seconds"),
     ])  # fmt: skip
     for point in front.points:
         evidence, certificate = point.solution.evidence, point.certificate
-        design = [units.shown(float(v), each.dimension) for v, each in zip(point.solution.x, variables, strict=False)]
+        design = [units.shown(float(point.solution.x[place]), each.dimension) for place, each in places]
+        given = goal_bounds(front, point)
+        if len(given) == 2:
+            given = [given[1 - point.program.optimised]]
         writer.writerow([
             *map(repr, goal_values(front, point)),
             front.goals[point.program.optimised].label,
-            "" if point.bound is None else _shown(front, 1 - point.program.optimised, point.bound),
+            *("" if bound is None else bound for bound in given),
             point.solution.status.value,
             *design,
             "" if evidence is None else _SEPARATOR.join(_active(point)),
@@ -49,17 +56,17 @@ def front_csv(front: Front) -> str:
     return text.getvalue()
 
 
-def goal_values(front: Front, point: FrontPoint) -> list[float]:
-    """Return the goals of a point in the case's units."""
-    return [_shown(front, k, float(value)) for k, value in enumerate(point.values)]
-
-
 def front_words(front: Front) -> list[str]:
     """Return a front in a few lines."""
-    ends = [goal_values(front, point) for point in (front.points[0], front.points[-1])]
+    values = [goal_values(front, point) for point in front.points]
     count = len(front.points)
-    lines = [f"{count} point{'s' * (count > 1)} on the front of {_words(front.goals[0])} and {_words(front.goals[1])}"]
-    lines += [f"{goal.label}: {ends[0][k]:.7g} to {ends[1][k]:.7g}" for k, goal in enumerate(front.goals)]
+    *first, last = map(_words, front.goals)
+    lines = [f"{count} point{'s' * (count > 1)} on the front of {', '.join(first)} and {last}"]
+    # A front of two goals runs from one end to the other.
+    ends = [(values[0][k], values[-1][k]) for k in range(len(front.goals))]
+    if len(front.goals) > 2:
+        ends = [(min(column), max(column)) for column in zip(*values, strict=True)]
+    lines += [f"{goal.label}: {low:.7g} to {high:.7g}" for goal, (low, high) in zip(front.goals, ends, strict=True)]
     if front.gaps:
         lines.append(f"pairs of neighbours with a gap between them, in which no point was found: {len(front.gaps)}")
     if front.failed:
@@ -94,37 +101,23 @@ def goal_names(front: Front) -> list[str]:
     return [_words(goal) for goal in front.goals]
 
 
-def goal_units(front: Front) -> list[str]:
-    """Return the unit of each goal; an empty text for a plain number."""
-    readings = [each[0].dimension for each in front.points[0].program.readings]
-    return [
-        front.case.units.label(dimension) if goal.task is None else unit_of_objective(front.case, goal.task)
-        for goal, dimension in zip(front.goals, readings, strict=True)
-    ]
-
-
 def _active(point: FrontPoint) -> list[str]:
     evidence = point.solution.evidence
     return [] if evidence is None else [f"{side.name} {side.bound}" for side in evidence.active]
 
 
 def _counted(point: FrontPoint) -> list[str]:
-    """Return the active sides without the limbs and joints that they are about, and how many each stands for."""
-    evidence = point.solution.evidence
-    sides = [] if evidence is None else [f"{side.name.split()[0]} {side.bound}" for side in evidence.active]
-    return [name if count == 1 else f"{name} ({count})" for name, count in Counter(sides).items()]
+    """Return the active sides without the limbs and joints that they are about, and how many each stands for.
+
+    Closed loops and joints of a robot say nothing about its design.
+    """
+    evidence, names = point.solution.evidence, design_names(point.solution.nlp.program)
+    sides = [] if evidence is None else [side for side in evidence.active if side.name in names]
+    # The bound of a goal has the name of its task.
+    shown = (side.name if side.name.startswith(_GOAL) else side.name.split()[0] for side in sides)
+    counts = Counter(f"{name} {side.bound}" for name, side in zip(shown, sides, strict=True))
+    return [name if count == 1 else f"{name} ({count})" for name, count in counts.items()]
 
 
 def _words(goal: Goal) -> str:
     return f"{goal.sense.value} {goal.label}"
-
-
-def _shown(front: Front, k: int, value: float) -> float:
-    """Return the value of a goal in the case's unit."""
-    readings = front.points[0].program.readings[k]
-    return front.case.units.shown(value, readings[0].dimension)
-
-
-def _variables(front: Front) -> tuple[Scalar, ...]:
-    """Return the free numbers of the case: those that the programs of both goals have."""
-    return min((point.solution.nlp.program.variables for point in front.points), key=len)

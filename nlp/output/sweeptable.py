@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from itertools import islice
@@ -12,8 +12,8 @@ from sys import intern
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..sweep.rows import Row
-from ..sweep.sweep import Sweep
+from ..sweeps.rows import Row
+from ..sweeps.sweep import Sweep
 from .files import check_target, write_whole
 
 #: Endings of a table's file.
@@ -23,7 +23,7 @@ _GROUP = 20_000
 #: Key of the sweep's fingerprint in a Parquet file, and name of its column in a CSV file.
 _KEY = "screwsynth_sweep"
 _SEPARATOR = "; "
-_TEXTS = ("status", "active", "multipliers", "verdict", "engine", "note")
+_TEXTS = ("status", "active", "multipliers", "verdict", "engine", "note", "certificate")
 _WHOLE = ("index", "starts", "converged")
 
 
@@ -116,7 +116,9 @@ def table_points(target: str) -> list[TablePoint]:
 def column_names(sweep: Sweep) -> list[str]:
     """Return the columns of a sweep's table: the numbers that change, the answer, its evidence."""
     middle = ["status", "F", *sweep.variables, "active", "multipliers", "verdict", "stationarity", "feasibility"]
-    return ["index", *sweep.points.names, *middle, "curvature", "starts", "converged", "engine", "seconds", "note"]
+    last = ["curvature", "starts", "converged", "engine", "seconds", "note"]
+    proof = [] if sweep.proof_seconds is None else ["certificate", "bound", "gap"]
+    return ["index", *sweep.points.names, *middle, *last, *proof]
 
 
 def _cells(sweep: Sweep, row: Row) -> list[Any]:
@@ -125,7 +127,61 @@ def _cells(sweep: Sweep, row: Row) -> list[Any]:
     sides = [_SEPARATOR.join(row.active), _SEPARATOR.join(map(repr, row.multipliers))]
     evidence = [row.verdict, row.stationarity, row.feasibility, row.curvature]
     run = [row.starts, row.converged, row.engine, row.seconds, row.note]
-    return [row.point, *sweep.points.values[row.point].tolist(), row.status, row.F, *x, *sides, *evidence, *run]
+    proof = [] if sweep.proof_seconds is None else [row.certificate, row.bound, row.gap]
+    return [row.point, *sweep.points.values[row.point].tolist(), row.status, row.F, *x, *sides, *evidence, *run, *proof]
+
+
+def table_rows(target: str, sweep: Sweep) -> list[Row]:
+    """Return the rows of the whole table of a sweep, in the order of its points."""
+    if PurePath(target).suffix.lower() == _CSV:
+        with Path(target).open(encoding="utf-8", newline="") as file:
+            # Columns by their place: a number that changes and a free number may have one name.
+            return [_row(sweep, [cell or None for cell in cells]) for cells in islice(csv.reader(file), 1, None)]
+    import pyarrow.parquet as pq  # noqa: PLC0415 - only tables in this format need it
+
+    found: list[Row] = []
+    with pq.ParquetFile(target) as file:
+        for batch in file.iter_batches(_GROUP):
+            columns = [column.to_pylist() for column in batch.columns]
+            found += [_row(sweep, cells) for cells in zip(*columns, strict=True)]
+    return found
+
+
+def _row(sweep: Sweep, cells: Sequence[Any]) -> Row:
+    """Return the row of cells that :func:`_cells` made, as they are read from a file; None for an empty one."""
+    first = 1 + len(sweep.points.names)
+    status, F, *rest = cells[first:]
+    x, (active, multipliers, verdict, *evidence), run = (
+        rest[: len(sweep.variables)],
+        rest[len(sweep.variables) : len(sweep.variables) + 6],
+        rest[len(sweep.variables) + 6 :],
+    )
+    starts, converged, engine, seconds, note = run[:5]
+    certificate, bound, gap = run[5:8] if sweep.proof_seconds is not None else (None, None, None)
+    return Row(
+        int(cells[0]),
+        status,
+        _number(F),
+        x=() if None in x else tuple(map(float, x)),
+        active=tuple((active or "").split(_SEPARATOR)) if active else (),
+        multipliers=tuple(float(each) for each in multipliers.split(_SEPARATOR)) if multipliers else (),
+        verdict=verdict or "",
+        stationarity=_number(evidence[0]),
+        feasibility=_number(evidence[1]),
+        curvature=_number(evidence[2]),
+        starts=int(starts),
+        converged=int(converged),
+        engine=engine or "",
+        seconds=float(seconds),
+        note=note or "",
+        certificate=certificate or "",
+        bound=_number(bound),
+        gap=_number(gap),
+    )
+
+
+def _number(cell: Any) -> float | None:  # noqa: ANN401 - a text or a number
+    return None if cell is None else float(cell)
 
 
 def _write_parquet(path: Path, sweep: Sweep, columns: list[str], cells: Iterator[list[Any]]) -> None:

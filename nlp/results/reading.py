@@ -12,16 +12,28 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 from ..errors import InputError, listing
 from .certified import CertifiedResult
 from .checks import ChecksResult
+from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
+from .front import FrontResult
 from .jsondata import JsonObject, Mark, Size
 from .parts import SCHEMA
 from .schema import RESULTS
+from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
 Result: TypeAlias = (
-    SolveResult | CombinedResult | EvaluationResult | CertifiedResult | ChecksResult | TradeoffResult | WorkspaceResult
+    SolveResult
+    | CombinedResult
+    | EvaluationResult
+    | CertifiedResult
+    | ChecksResult
+    | TradeoffResult
+    | WorkspaceResult
+    | ComparisonResult
+    | FrontResult
+    | SweepResult
 )
 
 #: Largest file of a result, bytes: a case with hundreds of poses writes a few million.

@@ -11,9 +11,12 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias, Union, get_args, g
 
 from .certified import CertifiedResult
 from .checks import ChecksResult
+from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
+from .front import FrontResult
 from .jsondata import JsonObject, JsonValue, Mark, Size
+from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
@@ -26,6 +29,9 @@ RESULTS: tuple[type[JsonObject], ...] = (
     ChecksResult,
     TradeoffResult,
     WorkspaceResult,
+    ComparisonResult,
+    FrontResult,
+    SweepResult,
 )
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -41,7 +47,7 @@ def result_schema() -> Schema:
     return {
         "$schema": _DIALECT,
         "title": "Result of screwsynth",
-        "description": "What --json writes of a solve, evaluate, certify, check, tradeoff and workspace.",
+        "description": "What --json writes of a solve or another command with this option.",
         "anyOf": kinds,
         "$defs": definitions,
     }

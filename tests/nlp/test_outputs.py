@@ -23,6 +23,7 @@ COMMANDS = [
     ("check", "CASE", "--junit", "OUT"),
     ("report", "CASE", "--starts", "1", "--out", "OUT"),
     ("pareto", "CASE", "--goals", "max F", "--goals", "min limits.x", "--csv", "OUT"),
+    ("compare", "CASE", "6-ups", "delta", "--csv", "OUT"),
 ]
 
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +14,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from screwsynth.nlp import InputError, load_case, solve
+from screwsynth.nlp import InputError, build_model, case_from_tables, load_case, load_result, solve
+from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.many import Numbers, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.sweep.engines import EngineKind, Job
-from screwsynth.nlp.sweep.journal import Journal
-from screwsynth.nlp.sweep.points import Points, grid
-from screwsynth.nlp.sweep.rows import Row, line_of
-from screwsynth.nlp.sweep.source import CaseSource
-from screwsynth.nlp.sweep.sweep import Sweep, run_sweep
-from screwsynth.nlp.sweep.workers import PointBlock, answer_in_processes
+from screwsynth.nlp.results.sweep import SweepResult
+from screwsynth.nlp.sweeps.engines import EngineKind, Job
+from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.sweeps.points import Points, grid
+from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
+from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
+from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -132,6 +136,70 @@ def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     assert found["F"][3] is None
     assert said.startswith("4 of 5 points have an answer")
     assert [each.active for each in table_points(str(out))] == found["active"]
+
+
+def test_a_sweep_in_python_is_that_of_the_command(tmp_path: Path, cli: Run) -> None:
+    out, files = tmp_path / "sweep.csv", {name: tmp_path / f"out.{name}" for name in ("json", "html")}
+    options = [word for name, file in files.items() for word in (f"--{name}", str(file))]
+    over = ("--over", "task.pitch=0.2,1", "--over", "x1=10,12", "--starts", "2", "--engine", "ipopt", "--jobs", "1")
+    code, said, err = cli("sweep", CASE, *over, "--out", str(out), *options)
+    assert (code, err, said[:33]) == (0, "", "4 of 4 points have an answer, F f"), err
+    values = {"task.pitch": (0.2, 1), "x1": (10, 12)}
+    columns = run_in_python(load_case(CASE), values, starts=2, engine="ipopt", jobs=1)
+    rows = table(out)
+    assert columns.F.tolist() == [float(row["F"]) for row in rows]
+    assert columns.design["p_z"].tolist() == [float(row["p_z"]) for row in rows]
+    assert columns.numbers["x1"].tolist() == [10, 12, 10, 12]
+    assert [";".join(each) for each in columns.active] == [row["active"].replace("; ", ";") for row in rows]
+    result = load_result(files["json"])
+    assert isinstance(result, SweepResult)
+    assert tuple(columns.F.tolist()) == result.F
+    assert files["html"].read_text().count("<tr>") == 5
+
+
+def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
+    case = load_case(CASE, {"p_x.max": 1, "p_x.min": -1, "p_y.min": -1, "p_y.max": 1, "p_z.min": 39})
+    file = tmp_path / "sweep.csv"
+    values = {"task.pitch": (0.2, 1.0, 2.0)}
+
+    def stop(_before: int, done: int, _total: int, _seconds: float) -> None:
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20, progress=stop)
+    kept = [row_of(line) for line in file.with_name("sweep.csv.journal").read_text().splitlines()[1:]]
+    assert [row.point for row in kept] == [0]
+    found = run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20)
+    # The first row, its time too, is that of the first run.
+    assert (found.seconds[0], found.gap[0]) == (kept[0].seconds, kept[0].gap)
+    assert found.certificate == ("proved",) * 3
+    assert (found.bound >= found.F * (1 - 1e-9)).all()
+    assert found.gap == pytest.approx(found.bound - found.F, abs=1e-9)
+    assert not file.with_name("sweep.csv.journal").exists()
+    again = run_in_python(case, values, out=file, starts=2, certified=True, time_limit=20)
+    assert again.seconds.tolist() == found.seconds.tolist()
+    with pytest.raises(InputError, match="is not the table of this sweep"):
+        run_in_python(case, values, out=file, starts=2)
+
+
+def test_joints_are_no_design() -> None:
+    case = case_from_tables(tomllib.loads(starter_case(build_model("3-rps"))), name="mine", source="mine")
+    found = run_in_python(case, {"task.pitch": (2,)}, starts=1)
+    assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
+    assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
+    for arguments, words in (
+        ({}, "a sweep needs points"),
+        ({"over": {"rb": (1, 1)}}, "has a value twice"),
+        ({"over": {"rb": (1, "a")}}, "rb = a: must be a finite number"),
+        ({"over": {"rb": ()}}, "rb: has no values"),
+        ({"points": {"rb": (1, 2), "rp": (1,)}}, "the counts are rb 2, rp 1"),
+        ({"over": {"rb": (1, 2)}, "engine": "fast"}, "must be compiled or ipopt"),
+        ({"over": {"rp": (1, 0.9)}, "engine": "compiled", "certified": True}, "has no certificates"),
+        ({"over": {"rb": (1, 2)}, "time_limit": 0}, "must be positive"),
+    ):
+        with pytest.raises(InputError, match=words):
+            run_in_python(case, **arguments)
 
 
 @pytest.mark.parametrize(

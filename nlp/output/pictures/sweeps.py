@@ -14,7 +14,7 @@ from ....models import FloatArray
 from ...case.case import Case
 from ...errors import InputError
 from ...results.tradeoffwording import objective_label
-from ...sweep.points import Points
+from ...sweeps.points import Points
 from ..sweeptable import TablePoint
 from .canvas import INK, MUTED
 from .figures import picture_of

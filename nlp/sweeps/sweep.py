@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..program.designnumbers import design_indices
 from ..program.formulation import formulate
 from .cluster import answer_on_cluster
 from .engines import EngineKind, Job, choose_engine, compiled_engine
@@ -40,9 +41,10 @@ class Sweep:
     Attributes:
         source: the case.
         points: its points.
-        variables: names of the free variables of the case.
+        variables: names of the free numbers of a design.
         starts: number of searches at each point.
         seed: seed instead of the case's.
+        proof_seconds: seconds for the certificate of each point; None for no certificates.
     """
 
     source: CaseSource
@@ -50,22 +52,31 @@ class Sweep:
     variables: tuple[str, ...]
     starts: int = STARTS
     seed: int | None = None
+    proof_seconds: float | None = None
 
     @classmethod
-    def of(cls, source: CaseSource, points: Points, starts: int | None = None, seed: int | None = None) -> Sweep:
+    def of(
+        cls,
+        source: CaseSource,
+        points: Points,
+        starts: int | None = None,
+        seed: int | None = None,
+        proof_seconds: float | None = None,
+    ) -> Sweep:
         """Return the sweep of a case.
 
         Raises:
             CaseError: the case has no number of a name, or does not allow the first point's.
         """
         program = formulate(source.case_at(points.settings(0))).program
-        names = tuple(each.name for each in program.variables)
-        return cls(source, points, names, STARTS if starts is None else starts, seed)
+        names = tuple(program.variables[k].name for k in design_indices(program))
+        return cls(source, points, names, STARTS if starts is None else starts, seed, proof_seconds)
 
     @property
     def fingerprint(self) -> str:
-        """Hash of what the rows depend on: case, points, starts, seed and version."""
-        hashed = hashlib.sha256(repr((__version__, *self.source, self.points.names, self.starts, self.seed)).encode())
+        """Hash of what the rows depend on: case, points, starts, seed, certificates and version."""
+        parts = (__version__, *self.source, self.points.names, self.starts, self.seed, self.proof_seconds)
+        hashed = hashlib.sha256(repr(parts).encode())
         hashed.update(np.ascontiguousarray(self.points.values).tobytes())
         return hashed.hexdigest()[:32]
 
@@ -107,7 +118,9 @@ def run_sweep(
     if not len(missing):
         return
     chosen = tuple(map(tuple, sweep.points.chosen().values.tolist()))
-    job = Job(sweep.source, sweep.points.names, chosen, sweep.starts, sweep.seed, EngineKind.COMPILED)
+    job = Job(
+        sweep.source, sweep.points.names, chosen, sweep.starts, sweep.seed, EngineKind.COMPILED, sweep.proof_seconds
+    )
     choice = choose_engine(job, engine, jobs)
     if choice.reason and notice is not None:
         notice(f"Ipopt solves each point by itself: {choice.reason}")
@@ -141,7 +154,7 @@ def _solve(job: Job, block: PointBlock) -> Row:
     """Return the row of a block of one point."""
     (index,) = block.indices
     settings = dict(zip(job.names, block.values[0].tolist(), strict=True))
-    return solve_point(job.source, settings, index, job.starts, job.seed)
+    return solve_point(job.source, settings, index, job.starts, job.seed, job.proof_seconds)
 
 
 def _answer_in_threads(job: Job, blocks: Iterator[PointBlock], threads: int | None) -> Iterator[list[Row]]:

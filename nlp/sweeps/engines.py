@@ -36,6 +36,7 @@ class Job(NamedTuple):
         starts: number of searches at each point.
         seed: seed instead of the case's.
         kind: of the engine.
+        proof_seconds: seconds for the certificate of each point; None for no certificates.
     """
 
     source: CaseSource
@@ -44,6 +45,7 @@ class Job(NamedTuple):
     starts: int
     seed: int | None
     kind: EngineKind
+    proof_seconds: float | None = None
 
 
 class Choice(NamedTuple):
@@ -65,10 +67,12 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
         CaseError: the case has no number of a name, or does not allow a value.
         InputError: the compiled engine is asked for and cannot be had.
     """
-    if wanted is EngineKind.IPOPT:
+    if job.proof_seconds is not None and wanted is EngineKind.COMPILED:
+        raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
+    if wanted is EngineKind.IPOPT or job.proof_seconds is not None:
         for values in job.chosen:
             job.source.case_at(dict(zip(job.names, values, strict=True)))
-        return Choice(EngineKind.IPOPT, "")
+        return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
     try:
         compiled_engine(job, threads)
     except CaseError:
@@ -94,7 +98,9 @@ def answer(job: Job, indices: Sequence[int], values: FloatArray) -> list[Row]:
         engine = compiled_engine(job, 1)
         return engine.rows(engine.solve(indices, values))
     return [
-        solve_point(job.source, dict(zip(job.names, row.tolist(), strict=True)), index, job.starts, job.seed)
+        solve_point(
+            job.source, dict(zip(job.names, row.tolist(), strict=True)), index, job.starts, job.seed, job.proof_seconds
+        )
         for index, row in zip(indices, values, strict=True)
     ]
 

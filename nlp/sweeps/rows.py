@@ -19,7 +19,7 @@ class Row(NamedTuple):
         point: index of the point.
         status: that of the solve, or ``refused`` where the case is none at this point.
         F: objective; for several tasks the value of their combination. None where there is no answer.
-        x: the free variables in the case's units; empty for a point that is refused.
+        x: the free numbers of the design in the case's units; empty for a point that is refused.
         active: sides of bounds and limits on which the point lies, such as ``p_z max``.
         multipliers: of the active sides, in F per unit of the limit, per radian for angles.
         verdict: on the point, in words.
@@ -30,7 +30,10 @@ class Row(NamedTuple):
         converged: number of searches that ended at an optimum.
         engine: ``compiled`` or ``ipopt``: whose point it is.
         seconds: wall time; of points solved together, an equal share.
-        note: a sentence where the point is refused; empty otherwise.
+        note: a sentence where the point is refused, or where its certificate is; empty otherwise.
+        certificate: status of the proof; empty where none was asked for, or it is refused.
+        bound: no feasible design has a better F; None where nothing is proved.
+        gap: distance of the bound from F; None likewise.
     """
 
     point: int
@@ -48,6 +51,9 @@ class Row(NamedTuple):
     engine: str = ""
     seconds: float = 0.0
     note: str = ""
+    certificate: str = ""
+    bound: float | None = None
+    gap: float | None = None
 
 
 def with_evidence(row: Row, evidence: Evidence) -> Row:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from ..errors import CaseError
+from ..errors import CaseError, InputError, UncoveredError
 from ..evidence.optimality import Evidence
+from ..program.designnumbers import design_indices
+from ..solver.certified import Certified, certify
 from ..solver.solution import Solution
 from ..solver.solve import solve
 from .rows import REFUSED, Row, finite, with_evidence
@@ -14,7 +16,12 @@ from .source import CaseSource
 
 
 def solve_point(
-    source: CaseSource, settings: Mapping[str, float | list[float]], index: int, starts: int, seed: int | None
+    source: CaseSource,
+    settings: Mapping[str, float | list[float]],
+    index: int,
+    starts: int,
+    seed: int | None,
+    proof_seconds: float | None = None,
 ) -> Row:
     """Return the row of one point.
 
@@ -24,24 +31,43 @@ def solve_point(
         index: of the point.
         starts: number of starting points.
         seed: seed instead of the case's.
+        proof_seconds: seconds for the certificate of the point; None for no certificate.
     """
     began = time.perf_counter()
     try:
         solution = solve(source.case_at(settings), starts=starts, seed=seed, jobs=1)
     except CaseError as error:
         return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
-    return row_of_solution(solution, index, time.perf_counter() - began)
+    if proof_seconds is None:
+        return row_of_solution(solution, index, time.perf_counter() - began)
+    try:
+        found = certify(solution, time_limit=proof_seconds, jobs=1)
+    except (UncoveredError, InputError) as error:
+        return row_of_solution(solution, index, time.perf_counter() - began)._replace(note=str(error))
+    row = row_of_solution(found.solution, index, time.perf_counter() - began)
+    return _with_certificate(row, found)
+
+
+def _with_certificate(row: Row, found: Certified) -> Row:
+    """Return a row with the certificate of the program that decides."""
+    certificate = found.certificate
+    if certificate is None:
+        note = "tasks that are averaged have no one program: no one bound"
+        return row._replace(note=note)
+    return row._replace(
+        certificate=certificate.status.value, bound=finite(certificate.bound), gap=finite(certificate.gap)
+    )
 
 
 def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     """Return the row of a solution."""
     units, own = solution.case.units, solution.outcomes[0].own
-    variables = own.nlp.program.variables
+    program = own.nlp.program
     decided = solution.decided_by
     evidence: Evidence | None = solution.evidence
     row = Row(index, solution.status.value, None, engine="ipopt", seconds=seconds)
     row = row._replace(
-        x=tuple(units.shown(value, each.dimension) for value, each in zip(solution.x, variables, strict=False))
+        x=tuple(units.shown(float(solution.x[k]), program.variables[k].dimension) for k in design_indices(program))
     )
     if solution.status.is_answer:
         value = solution.F if solution.combination is None else solution.combination.value

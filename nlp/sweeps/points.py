@@ -61,9 +61,16 @@ def grid(texts: Sequence[str]) -> Points:
         InputError: a text is neither, a number is named twice, or there are too many points.
     """
     read = [_read_axis(text) for text in texts]
-    names = tuple(name for name, _ in read)
+    return grid_of(tuple(name for name, _ in read), [values for _, values in read])
+
+
+def grid_of(names: tuple[str, ...], axes: Sequence[FloatArray]) -> Points:
+    """Return the grid of values (k,) of each number; the last number changes fastest.
+
+    Raises:
+        InputError: a number is named twice, or there are too many points.
+    """
     _check_names(names, "--over")
-    axes = [values for _, values in read]
     count = math.prod(map(len, axes))
     if count > MOST_POINTS:
         raise InputError(f"--over: makes {count:,} points, and at most {MOST_POINTS:,} are allowed")

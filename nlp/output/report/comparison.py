@@ -1,0 +1,66 @@
+"""A comparison of robots as a page of HTML."""
+
+from __future__ import annotations
+
+from ...comparison.compare import Comparison
+from ...results.comparison import ComparisonResult
+from ...results.comparisonwording import comparison_table
+from ...results.text import TextTable
+from ..pictures.comparisons import comparison_drawings, comparison_picture
+from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .plainpage import picture_figure, plain_page
+
+
+def comparison_page(found: Comparison, result: ComparisonResult) -> str:
+    """Return a whole page about a comparison, which opens without a network.
+
+    Args:
+        found: the comparison, whose designs are drawn.
+        result: the same as data.
+    """
+    title = result.title or result.case
+    ranked = [each for each in result.robots if each.part == "ranked"]
+    words = f"{len(ranked)} of {len(result.robots)} robots can be compared"
+    if ranked and ranked[0].value is not None:
+        words = f"{ranked[0].name} has the best value, {ranked[0].value:.7g}; {words}"
+    names = ", ".join(each.name for each in result.robots)
+    return plain_page(
+        f"{title} - comparison",
+        f"{result.case}, robots {names}",
+        tag("div", paragraphs([f"{words}."]), class_="answer" if ranked else "answer none", id="answer"),
+        tag("section", _body(found, result)),
+    )
+
+
+def _body(found: Comparison, result: ComparisonResult) -> Markup:
+    parts = [
+        tag("h2", "Robots in one table"),
+        paragraphs(result.sentences),
+        html_table(comparison_table(result), "robots, the best first"),
+    ]
+    if comparison_drawings(found):
+        picture = picture_figure(
+            comparison_picture(found, ".svg"),
+            "Each robot at its design, all in one scale; colours are rates of the limbs.",
+        )
+        parts += [tag("h2", "Designs"), picture]
+    for robot in result.robots:
+        parts += [tag("h3", robot.name), paragraphs([f"{robot.description}.", *robot.sentences])]
+        if robot.dimensions:
+            parts.append(html_table(_dimension_table(result, robot.name), f"dimensions of {robot.name}"))
+    return join_markup(parts)
+
+
+def _dimension_table(result: ComparisonResult, name: str) -> TextTable:
+    """Return the dimensions of a robot's design, with their ranges."""
+    robot = next(each for each in result.robots if each.name == name)
+    rows = tuple(
+        (
+            each.name,
+            f"{each.value:.6g}",
+            each.unit,
+            "fixed" if each.range is None else f"{each.range[0]:.5g} to {each.range[1]:.5g}",
+        )
+        for each in robot.dimensions
+    )
+    return TextTable(("dimension", "value", "unit", "range"), rows)

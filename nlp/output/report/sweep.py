@@ -1,0 +1,71 @@
+"""A sweep as a page of HTML."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...case.case import Case
+from ...results.rounding import number
+from ...results.text import TextTable
+from ...results.tradeoffwording import unit_of_objective
+from ...sweeps.columns import SweepColumns
+from ...sweeps.points import Points
+from ..pictures.sweeps import sweep_picture
+from ..sweeptable import TablePoint
+from .markup import html_table, join_markup, paragraphs, tag
+from .plainpage import picture_figure, plain_page
+
+#: Rows of the table on a page; a browser is slow with many more, and the table's file has all.
+_ROWS = 500
+
+
+def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
+    """Return a whole page about a sweep, which opens without a network.
+
+    Args:
+        case: the case at one of the points.
+        points: of the sweep.
+        found: the answers.
+    """
+    title = case.title or case.name
+    answers = int(np.isfinite(found.F).sum())
+    words = f"{answers:,} of {len(found):,} points have an answer"
+    proved = found.certificate.count("proved")
+    if any(found.certificate):
+        words += f", {proved:,} of them with a proof"
+    parts = [tag("h2", "F over the points")]
+    changing = [axis for axis in points.axes if len(axis) > 1]
+    if 1 <= len(changing) <= 2 and answers:
+        sides = [TablePoint(float(F), "; ".join(active)) for F, active in zip(found.F, found.active, strict=True)]
+        picture = sweep_picture(case, points, sides, ".svg")
+        parts.append(picture_figure(picture, "F at each point; a line where the active limits change."))
+    else:
+        parts.append(paragraphs(["A picture needs a grid over one or two numbers."]))
+    if len(found) > _ROWS:
+        parts.append(paragraphs([f"The first {_ROWS} points; the table's file has all {len(found):,}."]))
+    parts.append(html_table(_table(case, found), "points", id="swept"))
+    return plain_page(
+        f"{title} - sweep",
+        f"{case.name}, robot {case.model.name}, over {', '.join(points.names)}",
+        tag("div", paragraphs([f"{words}."]), class_="answer" if answers else "answer none", id="answer"),
+        tag("section", join_markup(parts)),
+    )
+
+
+def _table(case: Case, found: SweepColumns) -> TextTable:
+    """Return the first points as a table: numbers, status, F, its proof, the design and its active limits."""
+    unit, is_proved = unit_of_objective(case), any(found.certificate)
+    headers = ["point", *found.numbers, "status", f"F\n{unit}" if unit else "F"]
+    headers += ["certificate", "gap"] if is_proved else []
+    headers += [*found.design, "active"]
+    rows = []
+    for k in range(min(len(found), _ROWS)):
+        row = [str(k), *(number(values[k]) for values in found.numbers.values()), found.status[k], _text(found.F[k])]
+        row += [found.certificate[k], _text(found.gap[k])] if is_proved else []
+        row += [_text(values[k]) for values in found.design.values()]
+        rows.append((*row, ", ".join(found.active[k]) or found.note[k]))
+    return TextTable(tuple(headers), tuple(rows))
+
+
+def _text(value: float) -> str:
+    return number(value) if np.isfinite(value) else ""

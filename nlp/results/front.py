@@ -1,0 +1,76 @@
+"""Fronts of several goals as data."""
+
+from collections.abc import Mapping
+
+from ..case.task import Sense
+from ..evidence.optimality import PointKind
+from ..solver.status import Status
+from .data import CertificateData
+from .jsondata import Inline, JsonObject
+from .parts import HeadData, VersionsData
+
+
+class FrontGoalData(JsonObject):
+    """A goal of a front.
+
+    Attributes:
+        name: ``F:TASK`` or ``limits.KEY``.
+        sense: whether it is maximised or minimised.
+        unit: of its numbers; empty for a plain number.
+    """
+
+    name: str
+    sense: Sense
+    unit: str
+
+
+class FrontPointData(JsonObject):
+    """A point of a front: the optimum of one goal within bounds of the others.
+
+    Attributes:
+        goals: number of each goal, by name.
+        optimised: name of the goal whose optimum the point is.
+        bounds: that the other goals keep, by name; empty for the optimum of one goal alone.
+        status: of the solve.
+        design: the free numbers of the case, by name.
+        active: sides of bounds and limits that the design lies on.
+        multipliers: of the active sides, in the optimised goal per unit.
+        kind: of point, by the evidence; null where nothing is free.
+        stationarity: largest scaled derivative of the Lagrangian; null without evidence.
+        feasibility: largest distance outside a limit, in half ranges; null without evidence.
+        certificate: the proven bound; null where none was asked for.
+    """
+
+    goals: Mapping[str, float]
+    optimised: str
+    bounds: Mapping[str, float]
+    status: Status
+    design: Mapping[str, float]
+    active: tuple[str, ...]
+    multipliers: tuple[float, ...]
+    kind: PointKind | None
+    stationarity: float | None
+    feasibility: float | None
+    certificate: CertificateData | None
+
+
+class FrontResult(JsonObject):
+    """Result of a search of a front.
+
+    Attributes:
+        head: the case.
+        front: the goals.
+        points: none of which is better than another in all goals, in the order of the first goal, its best value last.
+        gaps: of two goals, indices of the points that no point was found between it and the next.
+        failed: number of searches that found no optimum.
+        versions: of the programs.
+        seconds: wall time.
+    """
+
+    head: Inline[HeadData]
+    front: tuple[FrontGoalData, ...]
+    points: tuple[FrontPointData, ...]
+    gaps: tuple[int, ...]
+    failed: int
+    versions: VersionsData
+    seconds: float

@@ -1,0 +1,97 @@
+"""The rows of a sweep as typed columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models import FloatArray, frozen_array
+from .rows import Row
+from .sweep import Sweep
+
+
+@dataclass(frozen=True, eq=False)
+class SweepColumns:
+    """The answers of a sweep, column by column, in the order of its N points; NaN where there is no number.
+
+    Attributes:
+        numbers: (N,) values of each number that changes, by name.
+        status: that of a solve; ``refused`` where the case contradicts itself.
+        F: (N,) objective; for several tasks the value of their combination.
+        design: (N,) each free number of the case by name, in the case's units.
+        active: sides of bounds and limits that each design lies on.
+        multipliers: of the active sides.
+        verdict: on each point.
+        stationarity, feasibility, curvature: (N,) evidence.
+        starts, converged: (N,) number of searches, and of those that converged.
+        engine: whose point it is.
+        seconds: (N,) wall time.
+        note: reason of a refusal.
+        certificate: status of each proof; empty texts without ``certified``.
+        bound, gap: (N,) proven bound, and its distance from F.
+    """
+
+    numbers: Mapping[str, FloatArray]
+    status: tuple[str, ...]
+    F: FloatArray
+    design: Mapping[str, FloatArray]
+    active: tuple[tuple[str, ...], ...]
+    multipliers: tuple[tuple[float, ...], ...]
+    verdict: tuple[str, ...]
+    stationarity: FloatArray
+    feasibility: FloatArray
+    curvature: FloatArray
+    starts: NDArray[np.int64]
+    converged: NDArray[np.int64]
+    engine: tuple[str, ...]
+    seconds: FloatArray
+    note: tuple[str, ...]
+    certificate: tuple[str, ...]
+    bound: FloatArray
+    gap: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        answers = int(np.isfinite(self.F).sum())
+        return f"<SweepColumns of {len(self):,} points over {', '.join(self.numbers)}: {answers:,} have an answer>"
+
+
+def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
+    """Return the rows of a whole sweep, in the order of its points, as columns."""
+
+    def numbers(values: Sequence[float | None]) -> FloatArray:
+        return frozen_array(np.array(values, dtype=np.float64), (len(rows),))
+
+    points = sweep.points
+    values = {
+        name: frozen_array(column, (len(points),)) for name, column in zip(points.names, points.values.T, strict=True)
+    }
+    design = {
+        name: numbers([row.x[k] if k < len(row.x) else None for row in rows]) for k, name in enumerate(sweep.variables)
+    }
+    return SweepColumns(
+        numbers=MappingProxyType(values),
+        status=tuple(row.status for row in rows),
+        F=numbers([row.F for row in rows]),
+        design=MappingProxyType(design),
+        active=tuple(row.active for row in rows),
+        multipliers=tuple(row.multipliers for row in rows),
+        verdict=tuple(row.verdict for row in rows),
+        stationarity=numbers([row.stationarity for row in rows]),
+        feasibility=numbers([row.feasibility for row in rows]),
+        curvature=numbers([row.curvature for row in rows]),
+        starts=np.array([row.starts for row in rows], dtype=np.int64),
+        converged=np.array([row.converged for row in rows], dtype=np.int64),
+        engine=tuple(row.engine for row in rows),
+        seconds=numbers([row.seconds for row in rows]),
+        note=tuple(row.note for row in rows),
+        certificate=tuple(row.certificate for row in rows),
+        bound=numbers([row.bound for row in rows]),
+        gap=numbers([row.gap for row in rows]),
+    )

@@ -1,0 +1,202 @@
+"""Robots compared on one case: placed, scaled, solved, and told what they lack."""
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from screwsynth.models import Displacement
+from screwsynth.nlp import (
+    Case,
+    Free,
+    InputError,
+    LegLength,
+    Limits,
+    Rotation,
+    Task,
+    Workspace,
+    along_screw,
+    build_model,
+    compare,
+    evaluate,
+    load_result,
+)
+from screwsynth.nlp.comparison.placed import placed
+from screwsynth.nlp.comparison.robots import read_robots
+from screwsynth.nlp.results.schema import result_schema
+
+Run = Callable[..., tuple[int, str, str]]
+
+# The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
+CASE = """
+[units]
+length = "mm"
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = 120
+x2 = 60
+x3 = 10
+x4 = 10
+[pose]
+position = [30, -20, 150]
+[[task]]
+name = "tilt"
+sense = "max"
+axis = [1, 2, 0]
+point = [200, 10, 90]
+pitch = 3
+[limits]
+leg_length = { min = 20, max = 900 }
+"""
+#: A sum of six squares, beside one by other operations in another order.
+ROUNDING = 1e-9
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> str:
+    found = tmp_path / "case.toml"
+    found.write_text(CASE, encoding="utf-8")
+    return str(found)
+
+
+def case() -> Case:
+    return Case(
+        model=build_model("stewart-gough"),
+        parameters={"x1": 120, "x2": 60, "x3": 0.2, "x4": 0.2},
+        position=(30, -20, Free(140, 170, 150)),
+        rotation=Rotation(),
+        tasks=[Task.screw("max", axis=(1, 2, 0), point=(200, 10, 90), pitch=3, name="tilt")],
+        limits=Limits(LegLength(min=20, max=900)),
+    )
+
+
+def summed_by_hand(base: np.ndarray, platform: np.ndarray) -> float:
+    """F of six legs between points (6, 3) of the world, from the velocities of the upper ends along the legs."""
+    omega = np.array([1, 2, 0]) / np.sqrt(5)
+    velocity = np.cross(omega, platform - np.array([200, 10, 90])) + 3 * omega
+    legs = platform - base
+    return float(np.sum((np.sum(velocity * legs, axis=1) / np.linalg.norm(legs, axis=1)) ** 2))
+
+
+def circle(radius: float, half: float) -> np.ndarray:
+    """Six points (6, 3) in pairs on a circle, at half angles in degrees."""
+    angles = np.radians([120 * i + sign * half for sign in (-1, 1) for i in range(3)])
+    return radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+
+
+def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) -> None:
+    files = {name: tmp_path / f"out.{name}" for name in ("json", "csv", "html")}
+    options = [word for name, file in files.items() for word in (f"--{name}", str(file))]
+    code, out, err = cli("compare", path, "delta", "6-sps", "case", "--range", "0", "--starts", "1", *options)
+    assert (code, err) == (0, "")
+    result = json.loads(files["json"].read_text())
+    Draft202012Validator(result_schema()).validate(result)
+    assert type(load_result(files["json"])).__name__ == "ComparisonResult"
+    robots = {each["name"]: each for each in result["robots"]}
+    assert [each["part"] for each in result["robots"]] == ["ranked", "ranked", "no freedom"]
+    # The 6-SPS by hand, at home where the case's pose is.
+    k, home = robots["6-sps"]["factor"], np.array([30, -20, 150])
+    base, platform = (k * circle(*each) for each in ((0.325, 12), (0.125, 48)))
+    base += home - [0, 0, 0.5 * k]
+    platform += home
+    assert robots["6-sps"]["value"] == pytest.approx(summed_by_hand(base, platform), rel=ROUNDING)
+    points = np.vstack([base, platform])
+    largest = np.max(np.linalg.norm(points[:, np.newaxis] - points, axis=2))
+    assert (robots["6-sps"]["size"], result["size"]) == pytest.approx((largest, largest), rel=ROUNDING)
+    # A Delta translates alone: all of F is constraint, in words and not as an error.
+    assert (robots["delta"]["freedoms"], robots["delta"]["tasks"][0]["can_move"]) == (3, False)
+    assert any("which has 3 freedoms, cannot make the motion of tilt" in each for each in robots["delta"]["sentences"])
+    assert [each["key"] for each in robots["6-sps"]["limits_left_out"]] == ["limits.leg_length"]
+    rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
+    assert [float(row["value"]) for row in rows] == [each["value"] for each in result["robots"]]
+    assert "no freedom" in out
+    assert files["html"].read_text().count("<h3>") == 3
+
+
+def test_dimensions_ranges_and_certificates() -> None:
+    found = compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
+    sps, own = sorted(found.entries, key=lambda each: each.contender.is_own)
+    assert sps.placed is not None
+    assert own.solution is not None
+    assert sps.solution is not None
+    # Each number but the pose is free by a tenth, around the typical ones that are scaled.
+    free = sps.placed.case.components("rb")[0]
+    assert isinstance(free, Free)
+    assert (free.lower, free.upper) == pytest.approx((0.9 * 0.325 * sps.factor, 1.1 * 0.325 * sps.factor))
+    position = sps.placed.case.position[2]
+    assert isinstance(position, Free)
+    assert position.start == pytest.approx(0.5 * sps.factor)
+    assert position.upper - position.lower == pytest.approx(30)
+    # The better one is first, and each proof is of its own program.
+    values = [each.value for each in found.entries]
+    assert values == sorted(values, key=lambda value: -(value or 0.0))
+    for each in found.entries:
+        assert each.certificate is not None
+        assert each.value is not None
+        assert each.certificate.bound >= each.value * (1 - 1e-9)
+
+
+def test_strokes_over_several_poses() -> None:
+    moved = replace(
+        case(), displacements=(Displacement.by(np.eye(3), np.zeros(3)), Displacement.by(np.eye(3), (0, 0, 9)))
+    )
+    found = compare(moved, ["6-sps", "case"], part=0, starts=1)
+    for entry in found.entries:
+        assert entry.solution is not None
+        (stroke,) = entry.strokes.values()
+        nlp, x = entry.solution.nlp, entry.solution.x
+        first, last = (evaluate(nlp, x, pose) for pose in (0, 1))
+        lengths = [state.quantities[next(iter(entry.strokes))] for state in (first, last)]
+        assert stroke.value == pytest.approx(np.abs(lengths[1] - lengths[0]).max())
+        # Each leg becomes longer by less than the platform moves.
+        assert 0 < stroke.value < 9
+
+
+def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
+    robot = read_robots(["6-sps", "delta"], case())[0]
+    moves = along_screw((0.2, 0.1, 1, 5, -3, 2), [-0.3, 0.0, 0.4])
+    workspace = Workspace((Free(20, 40), -20, Free(140, 170)), has_limits=True)
+    found = placed(replace(case(), displacements=moves, workspace=workspace), robot, 300.0, 0.1, 1.0)
+    offset, own = found.offset, found.case
+    start = np.array([30, -20, 150])
+    for world, moved in zip(moves, own.displacements, strict=True):
+        expected = world.rotation @ start + world.translation
+        assert moved.rotation @ (start - offset) + moved.translation + offset == pytest.approx(expected, abs=1e-10)
+        assert np.array_equal(moved.rotation, world.rotation)
+    assert own.workspace is not None
+    ends = [value.lower if isinstance(value, Free) else value for value in own.workspace.position]
+    assert np.array(ends) + offset == pytest.approx([20, -20, 140])
+    # A proof over the workspace is for straight legs: the limits hold at the stated pose alone, and this is said.
+    assert not own.workspace.has_limits
+    assert [each.key for each in found.left_out] == ["limits.over", "limits.leg_length"]
+
+
+def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
+    robot = tmp_path / "mine.toml"
+    robot.write_text("name = 1\n")
+    taken = tmp_path / "no" / "out.json"
+    for arguments, words in (
+        (("6-ups",), "needs at least two robots, and 1 is given"),
+        (("6-ups", "delt"), "compare: delt: no such robot, and no such robot file; did you mean 'delta'?"),
+        (("6-ups", "6-ups"), "compare: 6-ups is given twice"),
+        (("6-ups", str(robot)), "mine.toml: name"),
+        (("6-ups", "delta", "--size", "-1"), "--size -1: must be positive and finite"),
+        (("6-ups", "delta", "--size", "100", "--no-scale"), "--size: cannot stand beside --no-scale"),
+        (("6-ups", "delta", "--range", "1"), "--range 1: must be at least 0 and below 1"),
+        (("6-ups", "delta", "--time", "0"), "--time 0: must be positive"),
+        (("6-ups", "delta", "--json", str(taken)), "is no folder"),
+        (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
+        (("delta", "3-puu", "--range", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
+    ):
+        code, out, err = cli("compare", path, *arguments)
+        assert (code, out, len(err.splitlines())) == (2, "", 1), err
+        assert words in err
+    with pytest.raises(InputError, match="is given twice"):
+        compare(case(), ["case", build_model("6-ups"), "case"])
