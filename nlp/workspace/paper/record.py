@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -113,7 +114,7 @@ class ProgramRecord:
     Attributes:
         nlp: its program.
         bound: upper bound of the value that is maximised.
-        tree: its nodes; None where the search did not close every box.
+        tree: its nodes, open boxes being leaves; None without a bound.
     """
 
     nlp: Nlp
@@ -149,7 +150,7 @@ class PaperRecord:
 
     def program(self, claim: Claim, found: Certificate, writer: ProofWriter) -> None:
         """Record a search of a number."""
-        complete = found.status is CertificateStatus.PROVED
-        tree = writer.tree() if complete else None
+        has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(found.bound)
+        tree = writer.tree(with_open=True) if has_bound else None
         bound = -found.nlp.sign * found.bound
         self.programs[claim.name, claim.sense.value] = ProgramRecord(found.nlp, bound, tree)
