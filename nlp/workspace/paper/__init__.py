@@ -2,7 +2,7 @@
 
 The modules import each other in this order, and who checks a proof imports nothing of who made it:
 
-* both sides: ``document`` (a proof as JSON) and ``tree`` (boxes as bytes), ``expected`` (claims that a proof must name);
+* both sides: ``document`` (a proof as JSON), ``tree`` (boxes as bytes) and ``expected`` (claims that it must name);
 * the search: ``record`` (trees of searches) and ``written`` (the document of a judgement);
 * the check: ``exactly`` (fractions), ``poseroot`` (the box of coordinates), ``ballslopes`` (arithmetic), ``ballrows``
   (rows of legs), ``pieces`` (bisection), ``positive`` (positive definite matrices), ``rankclaim``, ``clearanceclaim``,

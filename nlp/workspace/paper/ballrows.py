@@ -1,9 +1,9 @@
 """Rows of six legs over boxes of poses, in the arithmetic of the check.
 
-With ``R`` the rotation, ``s`` the square of its quaternion's size, and ``u = s R a``, the row of a leg from b on the base
-to a on the platform is ``(s (p - b) + u, u x (p - b))``: the leg's vector and its moment about the platform's origin,
-times s. Both ``s R`` and ``s`` are sums of few monomials: products of components of the quaternion, or of ``1 - t^2``,
-``2 t`` and ``1 + t^2`` of each of three tangents.
+With ``R`` the rotation, ``s`` the square of its quaternion's size, and ``u = s R a``, the row of a leg from b on the
+base to a on the platform is ``(s (p - b) + u, u x (p - b))``: the leg's vector and its moment about the platform's
+origin, times s. Both ``s R`` and ``s`` are sums of few monomials: products of components of the quaternion, or of
+``1 - t^2``, ``2 t`` and ``1 + t^2`` of each of three tangents.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class BallRows(NamedTuple):
 def ball_rows(root: PoseRoot, joints: Joints, lower: FloatArray, upper: FloatArray) -> BallRows:
     """Return the rows over boxes (B, 6)."""
     y = coordinates(lower, upper)
-    monomials, weights = (_of_tangents if root.kind is TurnKind.ROLL_PITCH_YAW else _of_quaternion)(root, y)
+    monomials, weights = _of_tangents(y) if root.kind is TurnKind.ROLL_PITCH_YAW else _of_quaternion(root, y)
     # Weights are 0, 1 or 2 with a sign, one of each entry of the rotation's rows: their products with a are exact.
     arms = np.einsum("ijt,lj->lit", weights[:9].reshape(3, 3, -1), joints.platform).reshape(18, -1)
     found = monomials.combined(np.concatenate([arms, weights[9:]]))
@@ -93,8 +93,8 @@ def _of_quaternion(root: PoseRoot, y: BallSlopes) -> tuple[BallSlopes, FloatArra
     return monomials, weights
 
 
-def _of_tangents(root: PoseRoot, y: BallSlopes) -> tuple[BallSlopes, FloatArray]:
-    """Return 27 products of ``1 - t^2``, ``2 t`` and ``1 + t^2``, and the weights (10, 27) of Rz Ry Rx times s, and of s."""
+def _of_tangents(y: BallSlopes) -> tuple[BallSlopes, FloatArray]:
+    """Return 27 products of ``1 - t^2``, ``2 t`` and ``1 + t^2``, and their weights (10, 27) in s Rz Ry Rx and in s."""
     t = y[:, 3:6]
     square, one = t * t, _ones(y)
     turns = []

@@ -23,7 +23,7 @@ from ....models import FloatArray
 Key = Any
 #: Rounding of one operation, in parts of its result.
 UNIT = 2.0**-53
-#: Factor of a radius: a sum of products of numbers that are not negative, with fewer than 60 roundings one after another.
+#: Factor of a radius: a sum of products of numbers that are not negative, with fewer than 60 roundings in a row.
 UP = 1 + 64 * UNIT
 #: Largest error of an operation whose result is near the smallest doubles.
 TINY = 1e-300
@@ -147,7 +147,9 @@ class BallSlopes:
 
 def concatenated(parts: Sequence[BallSlopes], axis: int) -> BallSlopes:
     """Return numbers side by side, along an axis counted from the front."""
-    c, ce, s, se = (np.concatenate([getattr(each, name) for each in parts], axis=axis) for name in ("c", "ce", "s", "se"))
+    c, ce, s, se = (
+        np.concatenate([getattr(each, name) for each in parts], axis=axis) for name in ("c", "ce", "s", "se")
+    )
     return BallSlopes(c, ce, s, se, parts[0].h)
 
 

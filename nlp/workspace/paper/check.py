@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....models import Dimension
 from ...case.case import Case
 from ...case.task import Sense
 from ...certificate.proof import Proof, ProofError, Statement
@@ -39,7 +40,12 @@ _SAME = 1e-9
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
 #: Reason that each kind of claim must have.
-_REASONS = {"regular": ("regular", "singular"), "number": ("program",), "stroke": ("lengths",), "dead length": ("lengths",)}
+_REASONS = {
+    "regular": ("regular", "singular"),
+    "number": ("program",),
+    "stroke": ("lengths",),
+    "dead length": ("lengths",),
+}
 #: Callback with the name of a claim, the number of claims checked, and of all.
 PaperProgress = Callable[[str, int, int], None]
 
@@ -53,10 +59,12 @@ class CheckedClaim:
         bound: proven bound of the number as it reads in results, radians for angles; None without a number.
         limit: limit of the case that it keeps, read in the same way; None without one.
         is_refuted: whether the opposite is shown: a singular pose.
+        dimension: of the number.
     """
 
     name: str
     sense: str
+    dimension: Dimension = Dimension.NUMBER
     bound: float | None = None
     limit: float | None = None
     is_refuted: bool = False
@@ -171,7 +179,8 @@ class _Checker:
             is_condition = each.kind == "condition"
             claim = SingularClaim(self._root, self._joints, each.length, bound, is_condition=is_condition)
         self._show(claim, given.tree)
-        return CheckedClaim(each.name, each.sense, bound, each.limit)
+        dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
+        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
 
     @property
     def _joints(self) -> Joints:
@@ -215,7 +224,8 @@ class _Checker:
         _keep_limit(each, bound)
         self._bounds[each.key] = bound
         read = claim.reading.from_value
-        return CheckedClaim(each.name, each.sense, read(bound), None if claim.limit is None else read(claim.limit))
+        limit = None if claim.limit is None else read(claim.limit)
+        return CheckedClaim(each.name, each.sense, claim.reading.dimension, read(bound), limit)
 
     def _length(self, leg: str, sense: str) -> float:
         """Return the proven shortest or longest length of a leg.
@@ -233,12 +243,10 @@ class _Checker:
         """Check a limit on a telescoping leg from the lengths of the leg."""
         leg = self._case.model.legs[each.legs[0]].name
         short, long = self._length(leg, "min"), self._length(leg, "max")
-        if each.kind == "stroke":
-            bound = long - short + _ROUNDING * long
-        else:
-            bound = 2 * short - long - _ROUNDING * long
+        off = _ROUNDING * long
+        bound = long - short + off if each.kind == "stroke" else 2 * short - long - off
         _keep_limit(each, bound)
-        return CheckedClaim(each.name, each.sense, bound, each.limit)
+        return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
 
     def _check_error(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
         """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
@@ -254,7 +262,7 @@ class _Checker:
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):
             raise ProofError("the errors are too large for a bound of their part of second order")
-        return CheckedClaim(each.name, each.sense, whole)
+        return CheckedClaim(each.name, each.sense, Dimension.ANGLE if is_rotation else Dimension.LENGTH, whole)
 
 
 def _compare_legs(legs: Legs | None, proof: PaperProof) -> None:

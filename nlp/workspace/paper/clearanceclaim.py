@@ -1,7 +1,7 @@
 """The claim that two legs, as segments between their joints, are at least a distance apart at every pose of a box.
 
-For any vector n the segments are at least ``n.(x - y) / |n|`` apart, for the least of it over their ends x and y. An end
-on the platform is ``p + u / s``, so that times s every one of the four conditions is a sum without a division.
+For any vector n the segments are at least ``n.(x - y) / |n|`` apart, for the least of it over their ends x and y. An
+end on the platform is ``p + u / s``, so that times s every one of the four conditions is a sum without a division.
 """
 
 from __future__ import annotations
@@ -76,4 +76,3 @@ class ClearanceClaim:
                 t = np.clip(np.nan_to_num((de * s + e @ gap) / ee), 0.0, 1.0)
                 s = np.clip(np.nan_to_num((de * t - d @ gap) / dd), 0.0, 1.0)
         return np.asarray(gap + s[:, None] * d - t[:, None] * e)
-

@@ -81,7 +81,7 @@ class PaperProof:
 
     case: str
     name: str
-    workspace: tuple[Any, ...]
+    workspace: object
     legs: tuple[tuple[float, ...], ...]
     quantities: tuple[str, ...]
     leg_error: float
@@ -117,7 +117,7 @@ class PaperProof:
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def workspace_numbers(workspace: Workspace) -> tuple[Any, ...]:
+def workspace_numbers(workspace: Workspace) -> object:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (
         tuple((each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in values)
@@ -183,6 +183,6 @@ def _claim(content: dict[str, Any], source: str) -> PaperClaim:
     return PaperClaim(name, str(content["sense"]), content["reason"], bound, str(content["graph"]), tree, sides)
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> object:
     """Return lists within lists as tuples."""
     return tuple(_tuples(each) for each in value) if isinstance(value, list) else value

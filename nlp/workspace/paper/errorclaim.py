@@ -1,12 +1,12 @@
-"""The claim that errors of legs of at most 1 move the platform, to first order, by at most a number on a box.
+"""The claim that errors of legs of at most 1 move the platform, to first order, by at most a number.
 
-With A the rows and F the diagonal matrix of the sizes of their forces, the platform moves by ``P d``, ``P = A^-1 F``, for
-errors d. With C near the inverse of A at the centre and ``P0 = C F(c)``,
+With A the rows and F the diagonal matrix of the sizes of their forces, the platform moves by ``P d``, ``P = A^-1 F``,
+for errors d. With C near the inverse of A at the centre and ``P0 = C F(c)``,
 
     P - P0 = A^-1 (F - A P0) = C (F - A P0) + (C A)^-1 (I - C A) C (F - A P0).
 
-The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B Q`` with ``B >= |I - C A|``
-and ``Q >= |C (F - A P0)|``. Sizes of the affine part are largest at corners, for errors of 1 or -1.
+The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B Q`` with
+``B >= |I - C A|`` and ``Q >= |C (F - A P0)|``. Sizes of the affine part are largest at corners, for errors of 1 or -1.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ....models import FloatArray
 from .ballrows import CORNERS, Joints, ball_rows
 from .ballslopes import UNIT, UP
 from .pieces import Attempt
-from .positive import contraction
 from .poseroot import PoseRoot
+from .positive import contraction
 from .rankclaim import PRODUCT, preconditioned
 
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
@@ -90,9 +90,11 @@ class ErrorClaim:
             rounding = 64 * UNIT * (np.abs(P[:, self._part]) + Q[:, self._part]).sum(axis=(1, 2))
             worst = (worst + np.sqrt((sums * sums).sum(axis=1)) + rounding) * UP
             shares = h * np.abs(T[:, self._part]).sum(axis=(1, 2))
-            shares += h * (np.abs(found.T) * v[:, None, :, None] / v[:, :, None, None]).sum(axis=(1, 2)) * X[
-                :, self._part
-            ].sum(axis=(1, 2))[:, None]
+            shares += (
+                h
+                * (np.abs(found.T) * v[:, None, :, None] / v[:, :, None, None]).sum(axis=(1, 2))
+                * X[:, self._part].sum(axis=(1, 2))[:, None]
+            )
         return Attempt(np.asarray(holds & (worst <= self._most)), shares)
 
 

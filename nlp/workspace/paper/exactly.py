@@ -39,14 +39,19 @@ def _partial_sums(first: Fraction, x: Fraction, order: int) -> tuple[Fraction, F
 
 
 def determinant_sign(
-    kind: TurnKind, axis: Sequence[float], base: Sequence[Sequence[float]], platform: Sequence[Sequence[float]], y: Sequence[float]
+    kind: TurnKind,
+    axis: Sequence[float],
+    base: Sequence[Sequence[float]],
+    platform: Sequence[Sequence[float]],
+    y: Sequence[float],
 ) -> int:
     """Return the sign of the determinant of the rows at a pose.
 
     Args:
         kind: coordinates of rotations.
         axis: (3,) of rotations about one axis.
-        base, platform: (6, 3) joint centres.
+        base: (6, 3) joint centres on the base.
+        platform: (6, 3) those on the platform.
         y: (6,) coordinates of the pose.
     """
     position = [Fraction(each) for each in y[:3]]

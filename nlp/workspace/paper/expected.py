@@ -101,4 +101,6 @@ def _of_strokes(case: Case) -> Iterator[ExpectedClaim]:
         if limit.stroke_max is not None:
             yield ExpectedClaim(f"actuator.stroke_max limb {leg.name}", "max", "stroke", limit.stroke_max, legs=(k,))
         if limit.dead_length is not None:
-            yield ExpectedClaim(f"actuator.dead_length limb {leg.name}", "min", "dead length", limit.dead_length, legs=(k,))
+            yield ExpectedClaim(
+                f"actuator.dead_length limb {leg.name}", "min", "dead length", limit.dead_length, legs=(k,)
+            )

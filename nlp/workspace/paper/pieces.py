@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from ....models import FloatArray
 from ...certificate.proof import ProofError
 from .poseroot import PoseRoot
 from .tree import Leaves
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Number of boxes that are examined at once.
 _BLOCK = 256
@@ -20,7 +23,7 @@ _MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
 class Attempt(NamedTuple):
     """Whether a claim is shown on each of B boxes, and the share (B, 6) of each coordinate in what is missing."""
 
-    holds: FloatArray
+    holds: NDArray[np.bool_]
     shares: FloatArray
 
 
@@ -53,7 +56,7 @@ def show(claim: BoxClaim, root: PoseRoot, leaves: Leaves) -> int:
     while owner.size:
         part = slice(max(0, owner.size - _BLOCK), owner.size)
         low, high, of, deep = lower[part], upper[part], owner[part], depth[part]
-        lower, upper, owner, depth = (each[: part.start] for each in (lower, upper, owner, depth))
+        lower, upper, owner, depth = lower[: part.start], upper[: part.start], owner[: part.start], depth[: part.start]
         kept = ~np.asarray(root.is_outside(low, high), dtype=bool)
         low, high = root.contracted(low[kept], high[kept])
         of, deep = of[kept], deep[kept]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from ....models import FloatArray
 from ...case.pose import Free, Value
 from ...case.workspace import TurnKind, Workspace
 from .exactly import tangent_ends
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Part of itself by which tangents move outwards where they multiply an axis: its doubles are of length 1 to rounding.
 #: A fixed angle's coordinate is a rounded tangent too.
@@ -43,10 +47,12 @@ class PoseRoot:
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace."""
         at = [Fraction(each) for each in y.tolist()]
-        inside = all(low <= each <= high for low, each, high in zip(self.inner_lower, at, self.inner_upper, strict=True))
+        inside = all(
+            low <= each <= high for low, each, high in zip(self.inner_lower, at, self.inner_upper, strict=True)
+        )
         return inside and (self.inner_ball is None or sum(each * each for each in at[3:]) <= self.inner_ball)
 
-    def is_outside(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    def is_outside(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
         """Return whether no pose of the workspace is in boxes (B, 6)."""
         if not math.isfinite(self.ball):
             return np.zeros(len(lower), dtype=bool)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ....models import FloatArray
 from .ballslopes import UP
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Steps of the power method.
 _STEPS = 12
@@ -20,7 +23,7 @@ _ROUNDING = 1e-13
 class Contraction(NamedTuple):
     """Whether each of B matrices has a spectral radius below 1, and the vectors (B, 6) reached."""
 
-    holds: FloatArray
+    holds: NDArray[np.bool_]
     v: FloatArray
 
 
@@ -39,26 +42,26 @@ def contraction(B: FloatArray) -> Contraction:
     return Contraction(holds, v)
 
 
-def are_positive(matrices: FloatArray) -> FloatArray:
+def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
     """Return whether symmetric matrices (..., n, n) are positive definite; their lower triangles are read."""
     M = np.array(matrices)
     n = M.shape[-1]
-    good = np.isfinite(M).all(axis=(-2, -1))
+    good = np.asarray(np.isfinite(M).all(axis=(-2, -1)))
     shift = _ROUNDING * np.abs(np.trace(M, axis1=-2, axis2=-1))
     for k in range(n):
         M[..., k, k] -= shift
     with np.errstate(all="ignore"):
         for k in range(n):
             pivot = M[..., k, k]
-            good = good & (pivot > 0)
+            good = np.asarray(good & (pivot > 0))
             column = M[..., k + 1 :, k] / np.sqrt(np.where(good, pivot, 1.0))[..., None]
             M[..., k + 1 :, k + 1 :] -= column[..., :, None] * column[..., None, :]
-    return np.asarray(good)
+    return good
 
 
 def inverses(matrices: FloatArray) -> FloatArray:
     """Return approximate inverses of matrices (B, n, n); NaN where there is none."""
-    good = np.isfinite(matrices).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     good &= np.linalg.det(np.where(good[:, None, None], matrices, 0.0)) != 0
     found = np.full_like(matrices, np.nan)
     found[good] = np.linalg.inv(matrices[good])

@@ -1,6 +1,7 @@
 """The claim that J has full rank at every pose of a box.
 
-With the rows ``A(y) in A(c) + sum_k S_k (y_k - c_k)`` and C near the inverse of A(c), every ``C A(y)`` has an inverse where
+With the rows ``A(y) in A(c) + sum_k S_k (y_k - c_k)`` and C near the inverse of A(c), every ``C A(y)`` has an inverse
+where
 
     |I - C A(c)| + sum_k h_k |C S_k|     has a spectral radius below 1.
 """
@@ -17,8 +18,8 @@ from .ballrows import Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
 from .exactly import determinant_sign
 from .pieces import Attempt
-from .positive import contraction, inverses
 from .poseroot import PoseRoot
+from .positive import contraction, inverses
 
 #: Rounding of a product of matrices (6, 6), in parts of the product of sizes.
 PRODUCT = 16 * UNIT

@@ -14,13 +14,15 @@ from ...certificate.proofwriter import ProofWriter
 from .tree import PoseNode, split_bytes
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ....models import FloatArray
     from ...certificate.certificate import Certificate
     from ...program.nlp import Nlp
     from ..claims import Claim
     from ..regularity import RankExamination
 
-#: Part of itself by which the bound of a number that does not depend on the pose is moved outwards, as that of a search.
+#: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
 
 
@@ -37,22 +39,23 @@ class TreeRecord:
         """Record boxes (B, 6) that were examined for regular rows.
 
         Args:
-            lower, upper: their ends before the examination.
+            lower: their lower ends before the examination.
+            upper: their upper ends.
             found: its results; an open box is cut next.
         """
         # The numbers of ``Rank``: open boxes are cut, and those outside are leaves of their own kind.
         outside, open_ = found.verdict == 2, found.verdict == 0
         self._add(lower, upper, found.lower, found.upper, found.split, open_, outside)
 
-    def cuts(self, lower: FloatArray, upper: FloatArray, split: FloatArray) -> None:
+    def cuts(self, lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]) -> None:
         """Record boxes (B, 6) that are cut in the middle of a coordinate each, (B,)."""
         every = np.ones(len(lower), dtype=bool)
         self._add(lower, upper, lower, upper, split, every, ~every)
 
     def contractions(
-        self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: FloatArray
+        self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
     ) -> None:
-        """Record that boxes were moved to the ball of rotations: their ends before and after, and where none is left."""
+        """Record boxes that were moved to the ball of rotations: ends before and after, and where none is left."""
         for k, (old, new) in enumerate(zip(_keys(*before), _keys(*after), strict=True)):
             if outside[k]:
                 self._outside.add(old)
@@ -65,9 +68,9 @@ class TreeRecord:
         upper: FloatArray,
         low: FloatArray,
         high: FloatArray,
-        split: FloatArray,
-        cut: FloatArray,
-        outside: FloatArray,
+        split: NDArray[np.signedinteger],
+        cut: NDArray[np.bool_],
+        outside: NDArray[np.bool_],
     ) -> None:
         """Record boxes with ends before and after their contraction."""
         keys = _keys(lower, upper)
@@ -150,7 +153,9 @@ class PaperRecord:
 
     def program(self, claim: Claim, found: Certificate, writer: ProofWriter) -> None:
         """Record a search of a number."""
-        has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(found.bound)
+        has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(
+            found.bound
+        )
         tree = writer.tree(with_open=True) if has_bound else None
         bound = -found.nlp.sign * found.bound
         self.programs[claim.name, claim.sense.value] = ProgramRecord(found.nlp, bound, tree)

@@ -1,7 +1,7 @@
-"""The claims that the smallest singular value of J is at least, or its condition number at most, a number on a box.
+"""The claims that the smallest singular value of J is at least, or its condition number at most, a number.
 
-J has unit rows, moments divided by a length L. With A the rows whose force is multiplied by L, and D the diagonal matrix
-of the squares of the sizes of the forces,
+J has unit rows, moments divided by a length L. With A the rows whose force is multiplied by L, and D the diagonal
+matrix of the squares of the sizes of the forces,
 
     smallest singular value >= t:   A A' - (t L)^2 D      is positive semidefinite,
     largest singular value <= t:    (t L)^2 D - A A'      is positive semidefinite.
@@ -22,8 +22,8 @@ from ....models import FloatArray
 from .ballrows import CORNERS, Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
 from .pieces import Attempt
-from .positive import are_positive, inverses
 from .poseroot import PoseRoot
+from .positive import are_positive, inverses
 from .rankclaim import PRODUCT
 
 #: Pairs of rows of a symmetric matrix, and their places in it.
@@ -102,7 +102,9 @@ def _positive(K: BallSlopes) -> Attempt:
         M = centre[:, None] + change
         M = 0.5 * (M + M.transpose(0, 1, 3, 2))
         # The sum of seven matrices rounds too.
-        off = (off + 16 * UNIT * (np.abs(centre) + np.abs(h[:, :, None, None] * T).sum(axis=1)).sum(axis=2).max(axis=1)) * UP
+        off = (
+            off + 16 * UNIT * (np.abs(centre) + np.abs(h[:, :, None, None] * T).sum(axis=1)).sum(axis=2).max(axis=1)
+        ) * UP
         M -= off[:, None, None, None] * np.eye(6)
         holds = good & np.asarray(are_positive(M)).all(axis=1)
         shares = h * np.abs(T).sum(axis=(2, 3))

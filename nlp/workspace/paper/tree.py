@@ -14,12 +14,17 @@ from __future__ import annotations
 
 import enum
 import struct
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...certificate.proof import ProofError
 from .document import COORDINATES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ....models import FloatArray
 
 _VALUE = struct.Struct("<d")
 
@@ -35,9 +40,9 @@ class PoseNode(enum.IntEnum):
 class Leaves(NamedTuple):
     """Leaves of a tree: ends (B, 6) of their boxes, and whether each is claimed to be outside of the workspace."""
 
-    lower: np.ndarray
-    upper: np.ndarray
-    outside: np.ndarray
+    lower: FloatArray
+    upper: FloatArray
+    outside: NDArray[np.bool_]
 
 
 def split_bytes(coordinate: int, value: float) -> bytes:
@@ -45,12 +50,13 @@ def split_bytes(coordinate: int, value: float) -> bytes:
     return bytes([PoseNode.SPLIT, coordinate]) + _VALUE.pack(value)
 
 
-def read_leaves(tree: bytes, lower: np.ndarray, upper: np.ndarray) -> Leaves:
+def read_leaves(tree: bytes, lower: FloatArray, upper: FloatArray) -> Leaves:
     """Read the leaves of a tree.
 
     Args:
         tree: its bytes.
-        lower, upper: (6,) ends of the root.
+        lower: (6,) lower ends of the root.
+        upper: (6,) upper ends.
 
     Raises:
         ProofError: the bytes are no tree of this root.

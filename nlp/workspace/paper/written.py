@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
-_NO_TREE = "its search has no bound"
+_NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
 def paper_of(
@@ -94,24 +94,34 @@ def _number(
     if found.outcome is not Outcome.PROVED:
         return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
     if each.kind == "number":
-        program = record.programs.get(each.key)
-        if program is None or program.tree is None:
-            return _NO_TREE
-        graph = fingerprint(program.nlp)
-        return PaperClaim(each.name, each.sense, "program", program.bound, graph, program.tree)
+        return _program(each, record)
     if each.kind in ("stroke", "dead length"):
         leg = each.name.partition(" ")[2].removeprefix("limb ")
-        if any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max")):
-            return "the lengths of the leg have no proof"
-        return PaperClaim(each.name, each.sense, "lengths", found.bound)
+        missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
+        return _NO_LENGTHS if missing else PaperClaim(each.name, each.sense, "lengths", found.bound)
+    return _boxes(each, found.bound, record, proved)
+
+
+def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
+    """Return a claim with a tree of the search of ``certify``, or why there is none."""
+    program = record.programs.get(each.key)
+    if program is None or program.tree is None:
+        return "its search has no bound"
+    return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
+
+
+def _boxes(
+    each: ExpectedClaim, reached: float, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]
+) -> PaperClaim | str:
+    """Return a claim with a tree of a search of its own, or why there is none."""
     if each.name not in record.boxes:
         return "its search was not recorded"
-    tree = record.boxes[each.name].tree()
     if each.kind == "error":
         if not any(name.startswith("leg_length limb ") and sense == "min" for name, sense in proved):
-            return "the lengths of the legs have no proof"
-        return PaperClaim(each.name, each.sense, "boxes", record.firsts[each.name] * (1 + _OUTWARDS), tree=tree)
-    limit = math.inf if each.limit is None else each.limit
-    # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
-    bound = max(limit, found.bound) if each.sense == "max" else min(limit, found.bound)
-    return PaperClaim(each.name, each.sense, "boxes", bound, tree=tree)
+            return _NO_LENGTHS
+        bound = record.firsts[each.name] * (1 + _OUTWARDS)
+    else:
+        limit = math.inf if each.limit is None else each.limit
+        # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
+        bound = max(limit, reached) if each.sense == "max" else min(limit, reached)
+    return PaperClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())
