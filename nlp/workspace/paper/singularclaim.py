@@ -1,15 +1,15 @@
 """The claims that the smallest singular value of J is at least, or its condition number at most, a number.
 
-J has unit rows, moments divided by a length L. With A the rows whose force is multiplied by L, and D the diagonal
-matrix of the squares of the sizes of the forces,
+J has unit rows, moments divided by a length L. The smallest singular value is at least t where the inverse, which is
+affine in the coordinates but for a rest (:mod:`.inverserows`), is of a norm of at most 1 / t: a convex function, so
+that the corners of a box decide. With A the rows whose force is multiplied by L, and D the diagonal matrix of the squares of
+the sizes of the forces, the largest singular value is at most t where
 
-    smallest singular value >= t:   A A' - (t L)^2 D      is positive semidefinite,
-    largest singular value <= t:    (t L)^2 D - A A'      is positive semidefinite.
+    K = (t L)^2 D - A A'      is positive semidefinite.
 
-A condition number is at most k where both hold with t and k t in the places of t, for any t. Over a box such a matrix K
-is affine in the coordinates but for a rest. Its smallest eigenvalue is concave, so that the affine part is positive
-definite on the box where it is so at the corners. K is first multiplied by a matrix W near the inverse of its factor of
-Cholesky's at the centre, from both sides.
+K is affine too but for a rest. It is first multiplied by a matrix W near the inverse of its factor of Cholesky's at the
+centre, from both sides. A condition number is at most k where the smallest singular value is at least t and the largest
+at most k t, for any t.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 from ....models import FloatArray
 from .ballrows import CORNERS, Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
+from .inverserows import inverse_rows
 from .pieces import Attempt
 from .poseroot import PoseRoot
 from .positive import are_positive, inverses
@@ -50,32 +51,50 @@ class SingularClaim:
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
         rows = ball_rows(self._root, self._joints, lower, upper).rows
+        if not self._is_condition:
+            return self._of_inverse(rows, np.full(len(lower), self._bound))
         A = rows.times(np.array([*[self._length] * 3, 1.0, 1.0, 1.0]))
         gram = (A[:, _PAIRS[:, 0]] * A[:, _PAIRS[:, 1]]).sum(2)
         forces = rows[:, :, :3]
         squares = (forces * forces).sum(2)
-        if not self._is_condition:
-            # (t L)^2 is rounded up: the claim with it is the stronger one.
-            factor = np.full(len(lower), (self._bound * self._length) ** 2 * (1 + 8 * UNIT))
-            return _positive(_difference(gram, squares, factor, 1.0))
         with np.errstate(all="ignore"):
             unit = A.c / np.sqrt(squares.c)[..., None]
             values = np.linalg.svd(np.nan_to_num(unit), compute_uv=False)
-            t = np.sqrt(values[:, -1] * values[:, 0] / self._bound)
-        # The condition number claimed is rounded down twice.
-        above = _positive(_difference(gram, squares, t * t * (1 + 8 * UNIT), 1.0))
-        below = _positive(_difference(gram, squares, t * t * self._bound**2 * (1 - 16 * UNIT), -1.0))
-        return Attempt(above.holds & below.holds, above.shares + below.shares)
+            low, high = values[:, -1] / self._length, values[:, 0] / self._length
+            # The smallest singular value changes more: most of the room between the two is left to it.
+            least = high / self._bound
+            t = least * np.sqrt(np.sqrt(low / least))
+            most = (t * self._bound * self._length) ** 2 * (1 - 16 * UNIT)
+        one, other = self._of_inverse(rows, t), _positive(_difference(gram, squares, most))
+        return Attempt(one.holds & other.holds, one.shares + np.where(other.holds, 0.0, 1.0)[:, None] * other.shares)
+
+    def _of_inverse(self, rows: BallSlopes, t: FloatArray) -> Attempt:
+        """Try to show that the smallest singular value is at least t (B,)."""
+        found = inverse_rows(rows)
+        scale = np.array([1.0, 1.0, 1.0, *[self._length] * 3])[:, None]
+        with np.errstate(all="ignore"):
+            rest = found.rest * scale
+            off = np.sqrt((rest * rest).sum(axis=(1, 2))) * UP
+            room = (1 - 8 * UNIT) / t - off
+            corners = found.at_corners(slice(0, 6)) * scale
+            square = corners @ corners.transpose(0, 1, 3, 2)
+            # Scaling and the product round by a part of the square of the Frobenius norm.
+            rounding = 8 * PRODUCT * np.trace(square, axis1=2, axis2=3)
+            free = (room * room * (1 - 8 * UNIT))[:, None] - rounding
+            holds = found.known & (room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1)
+            moved = np.abs(found.T * scale[..., None]).sum(axis=(1, 2))
+            shares = moved + found.shares * rest.sum(axis=(1, 2))[:, None]
+        return Attempt(np.asarray(holds), shares)
 
 
-def _difference(gram: BallSlopes, squares: BallSlopes, factor: FloatArray, sign: float) -> BallSlopes:
-    """Return ``sign (A A' - factor D)``, (B, 21)."""
+def _difference(gram: BallSlopes, squares: BallSlopes, factor: FloatArray) -> BallSlopes:
+    """Return ``factor D - A A'``, (B, 21)."""
     scaled = squares.times(factor[:, None])
     diagonal = _PLACES[np.arange(6), np.arange(6)]
     c, ce, s, se = gram.c.copy(), gram.ce.copy(), gram.s.copy(), gram.se.copy()
     part = gram[:, diagonal] - scaled
     c[:, diagonal], ce[:, diagonal], s[:, diagonal], se[:, diagonal] = part.c, part.ce, part.s, part.se
-    return BallSlopes(sign * c, ce, sign * s, se, gram.h)
+    return BallSlopes(-c, ce, -s, se, gram.h)
 
 
 def _positive(K: BallSlopes) -> Attempt:
