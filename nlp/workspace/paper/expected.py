@@ -75,7 +75,10 @@ def expected_claims(
     ]
     if legs is None:
         return found
-    found += _of_strokes(case)
+    strokes = list(_of_strokes(case))
+    # At one pose the limits on a leg's stroke say less: those over all poses take their place.
+    over_all = {each.key for each in strokes}
+    found = [each for each in found if each.key not in over_all] + strokes
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
             name = "smallest_singular_value"

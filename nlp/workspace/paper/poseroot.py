@@ -123,4 +123,4 @@ def _down(value: Fraction) -> float:
 
 def _up(value: Fraction) -> float:
     """Return a double that is not below a fraction."""
-    return -_down(-value)
+    return 0.0 - _down(-value)

@@ -2,8 +2,8 @@
 
 J has unit rows, moments divided by a length L. The smallest singular value is at least t where the inverse, which is
 affine in the coordinates but for a rest (:mod:`.inverserows`), is of a norm of at most 1 / t: a convex function, so
-that the corners of a box decide. With A the rows whose force is multiplied by L, and D the diagonal matrix of the squares of
-the sizes of the forces, the largest singular value is at most t where
+that the corners of a box decide. With A the rows whose force is multiplied by L, and D the diagonal matrix of the
+squares of the sizes of the forces, the largest singular value is at most t where
 
     K = (t L)^2 D - A A'      is positive semidefinite.
 
