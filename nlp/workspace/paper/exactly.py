@@ -54,6 +54,17 @@ def determinant_sign(
         platform: (6, 3) those on the platform.
         y: (6,) coordinates of the pose.
     """
+    return _sign(exact_rows(kind, axis, base, platform, y))
+
+
+def exact_rows(
+    kind: TurnKind,
+    axis: Sequence[float],
+    base: Sequence[Sequence[float]],
+    platform: Sequence[Sequence[float]],
+    y: Sequence[float],
+) -> list[list[Fraction]]:
+    """Return the scaled rows (6, 6) at a pose; arguments are those of :func:`determinant_sign`."""
     position = [Fraction(each) for each in y[:3]]
     turn = _scaled_rotation(_quaternion(kind, axis, [Fraction(each) for each in y[3:]]))
     scale = turn[3][0]
@@ -61,9 +72,11 @@ def determinant_sign(
     for foot, joint in zip(base, platform, strict=True):
         a = [Fraction(each) for each in joint]
         arm = [sum((row[j] * a[j] for j in range(3)), Fraction(0)) for row in turn[:3]]
-        span = [scale * (p - Fraction(b)) + each for p, b, each in zip(position, foot, arm, strict=True)]
-        rows.append([*span, *(arm[i - 2] * span[i - 1] - arm[i - 1] * span[i - 2] for i in range(3))])
-    return _sign(rows)
+        span = [scale * (p - Fraction(b)) for p, b in zip(position, foot, strict=True)]
+        # The moment of s (p - b) + u about the platform's origin is u x s (p - b): times s once too often.
+        moment = [(arm[i - 2] * span[i - 1] - arm[i - 1] * span[i - 2]) / scale for i in range(3)]
+        rows.append([*(each + part for each, part in zip(span, arm, strict=True)), *moment])
+    return rows
 
 
 def _quaternion(kind: TurnKind, axis: Sequence[float], turn: Sequence[Fraction]) -> _Quaternion:
