@@ -11,7 +11,7 @@ import numpy as np
 from ....models import FloatArray
 from .ballrows import BallRows, Joints, ball_rows
 from .ballslopes import UNIT
-from .pieces import Attempt
+from .pieces import WRONG, Attempt
 from .poseroot import PoseRoot
 
 #: Steps in the search of the nearest points: any direction is allowed, a good one closes larger boxes.
@@ -58,7 +58,9 @@ class ClearanceClaim:
             fine = least >= room * (1 + 8 * UNIT)
             holds = holds & fine
             shares = shares + np.where(fine[:, None], 0.0, (np.abs(each.s) + each.se) * each.h)
-        return Attempt(holds, shares)
+        # The distance is at most that of two points of the legs.
+        is_wrong = np.sqrt((n * n).sum(axis=1)) < self._least * (1 - WRONG)
+        return Attempt(holds, shares, np.asarray(is_wrong))
 
     def _direction(self, found: BallRows) -> FloatArray:
         """Return vectors (B, 3) from the nearest point of the second leg to that of the first, at the centres."""

@@ -15,7 +15,7 @@ from ....models import FloatArray
 from .ballrows import CORNERS, Joints, ball_rows
 from .ballslopes import UNIT, UP
 from .inverserows import inverse_rows
-from .pieces import Attempt
+from .pieces import WRONG, Attempt
 from .poseroot import PoseRoot
 
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
@@ -47,7 +47,9 @@ class ErrorClaim:
             sizes = (np.abs(found.P0) + np.abs(found.T).sum(axis=3))[:, self._part].sum(axis=(1, 2))
             worst = (worst + np.sqrt((sums * sums).sum(axis=1)) + 64 * UNIT * sizes) * UP
             shares = np.abs(found.T[:, self._part]).sum(axis=(1, 2)) + found.shares * sums.sum(axis=1)[:, None]
-        return Attempt(np.asarray(found.known & (worst <= self._most)), shares)
+            at_centre = np.linalg.norm(found.P0[:, self._part] @ _ERRORS, axis=1).max(axis=1)
+        is_wrong = found.known & (at_centre > self._most * (1 + WRONG))
+        return Attempt(np.asarray(found.known & (worst <= self._most)), shares, np.asarray(is_wrong))
 
 
 def whole_errors(position: float, rotation: float, eps: float, shortest: float, reach: float) -> tuple[float, float]:

@@ -19,12 +19,24 @@ _BLOCK = 256
 #: Largest number of pieces of a box, and of bisections on the way to one of them.
 _MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
 
+#: Number of points of a block that are looked at for one that shows a claim to be wrong.
+_LOOKED_AT = 4
+#: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
+WRONG = 1e-6
+
 
 class Attempt(NamedTuple):
-    """Whether a claim is shown on each of B boxes, and the share (B, 6) of each coordinate in what is missing."""
+    """An attempt to show a claim on B boxes.
+
+    Attributes:
+        holds: (B,) whether it is shown.
+        shares: (B, 6) share of each coordinate in what is missing.
+        is_wrong: (B,) whether the number at the centre is clearly beyond the bound; None where that is not asked.
+    """
 
     holds: NDArray[np.bool_]
     shares: FloatArray
+    is_wrong: NDArray[np.bool_] | None = None
 
 
 class BoxClaim(Protocol):
@@ -64,7 +76,9 @@ def show(claim: BoxClaim, root: PoseRoot, leaves: Leaves) -> int:
             continue
         np.add.at(used, of, 1)
         total += of.size
-        holds, shares = claim.attempt(low, high)
+        holds, shares, is_wrong = claim.attempt(low, high)
+        if is_wrong is not None:
+            _refuse_wrong(root, 0.5 * low[is_wrong] + 0.5 * high[is_wrong])
         left = np.flatnonzero(~np.asarray(holds, dtype=bool))
         failed = (used[of[left]] > _MOST_PIECES) | (deep[left] >= _MOST_BISECTIONS)
         if failed.any():
@@ -82,6 +96,17 @@ def show(claim: BoxClaim, root: PoseRoot, leaves: Leaves) -> int:
         lower, upper = np.concatenate([lower, low, above]), np.concatenate([upper, below, high])
         owner, depth = np.concatenate([owner, of, of]), np.concatenate([depth, deep, deep])
     return total
+
+
+def _refuse_wrong(root: PoseRoot, points: FloatArray) -> None:
+    """Refuse a claim that is wrong at points (K, 6), of which the first ones are looked at.
+
+    Raises:
+        ProofError: one of them is a pose of the workspace.
+    """
+    for y in points[:_LOOKED_AT]:
+        if root.holds(y):
+            raise ProofError(f"the claim is wrong at the pose with the coordinates {', '.join(f'{v:.6g}' for v in y)}")
 
 
 def _words(lower: FloatArray, upper: FloatArray) -> str:

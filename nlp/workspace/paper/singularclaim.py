@@ -22,7 +22,7 @@ from ....models import FloatArray
 from .ballrows import CORNERS, Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
 from .inverserows import inverse_rows
-from .pieces import Attempt
+from .pieces import WRONG, Attempt
 from .poseroot import PoseRoot
 from .positive import are_positive, inverses
 from .rankclaim import PRODUCT
@@ -66,7 +66,8 @@ class SingularClaim:
             t = least * np.sqrt(np.sqrt(low / least))
             most = (t * self._bound * self._length) ** 2 * (1 - 16 * UNIT)
         one, other = self._of_inverse(rows, t), _positive(_difference(gram, squares, most))
-        return Attempt(one.holds & other.holds, one.shares + np.where(other.holds, 0.0, 1.0)[:, None] * other.shares)
+        shares = one.shares + np.where(other.holds, 0.0, 1.0)[:, None] * other.shares
+        return Attempt(one.holds & other.holds, shares, high > low * self._bound * (1 + WRONG))
 
     def _of_inverse(self, rows: BallSlopes, t: FloatArray) -> Attempt:
         """Try to show that the smallest singular value is at least t (B,)."""
@@ -84,7 +85,9 @@ class SingularClaim:
             holds = found.known & (room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1)
             moved = np.abs(found.T * scale[..., None]).sum(axis=(1, 2))
             shares = moved + found.shares * rest.sum(axis=(1, 2))[:, None]
-        return Attempt(np.asarray(holds), shares)
+            at_centre = np.linalg.norm(np.nan_to_num(found.P0 * scale), 2, axis=(1, 2))
+            is_wrong = found.known & (at_centre * t > 1 + WRONG)
+        return Attempt(np.asarray(holds), shares, np.asarray(is_wrong))
 
 
 def _difference(gram: BallSlopes, squares: BallSlopes, factor: FloatArray) -> BallSlopes:
