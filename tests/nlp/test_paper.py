@@ -87,12 +87,14 @@ def case_of(text: str = TEXT) -> Case:
 @pytest.fixture(scope="module")
 def judged() -> tuple[Judgement, PaperRecord]:
     record = PaperRecord()
-    return judge_workspace(case_of(), gap=0.05, leg_error=0.004, paper=record), record
+    # Lengths of legs are asked for once more, without their limit.
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.004, paper=record)
+    return found, record
 
 
 @pytest.fixture(scope="module")
 def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
-    return paper_of(*judged, TEXT, leg_error=0.004)
+    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.004)
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +151,9 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple
     assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}
     bounds = {(each.name, each.sense): each.bound for each in checked.claims}
     assert bounds["smallest_singular_value", "min"] == 0.25
+    limits = {(each.name, each.sense): each.limit for each in checked.claims}
+    assert limits["leg_length limb 1-", "max"] == pytest.approx(44)
+    assert limits["actuator.stroke_max limb 1-", "max"] == 30
     assert bounds["position error", "max"] is not None
     for each in judged[0].extremes:
         bound = bounds[each.name, each.sense.value]

@@ -70,9 +70,11 @@ def expected_claims(
         InputError: the robot has no measure of a name.
     """
     found = [ExpectedClaim(REGULAR, "", "regular")]
-    found += [
-        ExpectedClaim(each.name, each.sense.value, "number", each.limit, each) for each in claims_of(layout, quantities)
-    ]
+    # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
+    numbers: dict[tuple[str, str], Claim] = {}
+    for each in claims_of(layout, quantities):
+        numbers.setdefault((each.name, each.sense.value), each)
+    found += [ExpectedClaim(*key, "number", each.limit, each) for key, each in numbers.items()]
     if legs is None:
         return found
     strokes = list(_of_strokes(case))

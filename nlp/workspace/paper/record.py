@@ -149,7 +149,7 @@ class PaperRecord:
         """Record a number that does not depend on the pose."""
         bound = -nlp.sign * value
         tree = bytes([Node.BOUNDED])
-        self.programs[claim.name, claim.sense.value] = ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree)
+        self._keep(claim, ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree))
 
     def program(self, claim: Claim, found: Certificate, writer: ProofWriter) -> None:
         """Record a search of a number."""
@@ -158,4 +158,8 @@ class PaperRecord:
         )
         tree = writer.tree(with_open=True) if has_bound else None
         bound = -found.nlp.sign * found.bound
-        self.programs[claim.name, claim.sense.value] = ProgramRecord(found.nlp, bound, tree)
+        self._keep(claim, ProgramRecord(found.nlp, bound, tree))
+
+    def _keep(self, claim: Claim, record: ProgramRecord) -> None:
+        """Keep the record of a number; of two of one name that of the first, as in :mod:`.expected`."""
+        self.programs.setdefault((claim.name, claim.sense.value), record)

@@ -37,10 +37,13 @@ def paper_of(
     """
     legs = legs_of(judged.case)
     layout = posed_layout(judged.case, judged.workspace)
-    extremes = {(each.name, each.sense.value): each for each in judged.extremes}
+    # Of numbers of one name the first counts, and of strokes, which come later, that over all poses.
+    last = {(each.name, each.sense.value): each for each in judged.extremes}
+    first = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
     proved: dict[tuple[str, str], PaperClaim] = {}
     unproved = []
     for each in expected_claims(judged.case, layout, legs, quantities, leg_error):
+        extremes = first if each.kind == "number" else last
         found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
         if isinstance(found, PaperClaim):
             proved[each.key] = found
