@@ -63,17 +63,17 @@ class ProofWriter:
         self._limbs.append(_LimbRecord(writer, bound))
         return writer
 
-    def _tree_of_limbs(self) -> bytes:
+    def _tree_of_limbs(self, *, with_open: bool) -> bytes:
         """Return the limbs' bounds and trees."""
         bounds = [each.bound() for each in self._limbs]
         parts = [bytes([Node.LIMBS])]
         for each, bound in zip(self._limbs, bounds, strict=True):
             if bound == -np.inf:
-                parts += [struct.pack("<d", bound), each.writer.tree()]
+                parts += [struct.pack("<d", bound), each.writer.tree(with_open=with_open)]
             elif -np.inf in bounds:
                 parts += [struct.pack("<d", np.inf), bytes([Node.BOUNDED])]
             else:
-                parts += [struct.pack("<d", bound + _OUTWARDS * abs(bound)), each.writer.tree()]
+                parts += [struct.pack("<d", bound + _OUTWARDS * abs(bound)), each.writer.tree(with_open=with_open)]
         return b"".join(parts)
 
     def record(self, boxes: Boxes, found: Examination, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
@@ -93,18 +93,24 @@ class ProofWriter:
             following = [] if child < 0 else [child + 1, child] if is_cut else [child]
             self._nodes[place] = _NodeRecord(self._node_bytes(found, k, is_cut, boxes.upper[:, k]), following)
 
-    def tree(self) -> bytes:
+    def tree(self, *, with_open: bool = False) -> bytes:
         """Return the whole tree.
+
+        Args:
+            with_open: whether open boxes are leaves too: the bound of a search that stopped is one for them as well.
 
         Raises:
             ProofError: a box is not closed.
         """
         if self._limbs:
-            return self._tree_of_limbs()
+            return self._tree_of_limbs(with_open=with_open)
         parts: list[bytes] = []
         waiting = [0]
         while waiting:
             place = waiting.pop()
+            if place not in self._nodes and with_open:
+                parts.append(bytes([Node.BOUNDED]))
+                continue
             if place not in self._nodes:
                 raise ProofError("the search did not close every box, so there is no proof to write")
             text, following = self._nodes[place]

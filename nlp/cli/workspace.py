@@ -12,6 +12,7 @@ from .options import CaseName, Jobs, JsonFile, SettingTexts, check_picture, cons
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..workspace.judge import Judgement
+    from ..workspace.paper.record import PaperRecord
     from ..workspace.slices import Slice
 
 
@@ -43,6 +44,7 @@ def workspace(
         ),
     ] = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
+    proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
     jobs: Jobs = None,
     json_file: JsonFile = None,
     plot: Annotated[
@@ -58,6 +60,7 @@ def workspace(
     from ..results.workspace import workspace_of
     from ..workspace.machine import workspace_of_case
     from .dimensions import settings_of_result
+    from .paper import paper_record, write_paper
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
@@ -65,18 +68,19 @@ def workspace(
         raise InputError(f"--time {time:g}: must be positive")
     if not 0 <= leg_error < float("inf"):
         raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
+    record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
     given = {} if of is None else settings_of_result(of)
-    loaded, _, inputs = read_case(case, {**given, **read_settings(settings)})
+    loaded, text, inputs = read_case(case, {**given, **read_settings(settings)})
     workspace_of_case(loaded)
     check_picture(plot)
-    check_outputs(inputs, {"--json": json_file, "--plot": plot})
+    check_outputs(inputs, {"--json": json_file, "--plot": plot, "--proof": proof})
     slices: tuple[Slice, ...] = ()
     if plot is not None:
         from ..workspace.slices import slices_of
 
         slices = slices_of(loaded)
-    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs)
+    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
     largest = None
     if scale:
         from ..results.workspacescale import scale_data
@@ -92,7 +96,9 @@ def workspace(
         from ..output.pictures.workspaceslices import slices_picture
 
         write_bytes(plot, slices_picture(loaded, slices, ending_of(plot)))
-    if json_file != "-":
+    if proof is not None:
+        write_paper(proof, judged, record, text, of_quantity or (), leg_error)
+    if "-" not in (json_file, proof):
         from ..output.terminal import show
         from ..results.workspacewording import workspace_summary
 
@@ -101,7 +107,13 @@ def workspace(
 
 
 def _judge_with_progress(
-    case: Case, quantities: list[str], gap: float, time: float, leg_error: float, jobs: int | None
+    case: Case,
+    quantities: list[str],
+    gap: float,
+    time: float,
+    leg_error: float,
+    jobs: int | None,
+    paper: PaperRecord | None,
 ) -> Judgement:
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
     import sys
@@ -109,7 +121,9 @@ def _judge_with_progress(
     from ..workspace.judge import judge_workspace
 
     if not sys.stderr.isatty():
-        return judge_workspace(case, quantities=quantities, gap=gap, time_limit=time, leg_error=leg_error, jobs=jobs)
+        return judge_workspace(
+            case, quantities=quantities, gap=gap, time_limit=time, leg_error=leg_error, jobs=jobs, paper=paper
+        )
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress, SpinnerColumn, TextColumn
@@ -135,4 +149,5 @@ def _judge_with_progress(
             jobs=jobs,
             rank_progress=show_boxes,
             progress=show_number,
+            paper=paper,
         )

@@ -11,12 +11,15 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from ...models import FloatArray
 from .posebox import PoseBox
+
+if TYPE_CHECKING:
+    from .paper.record import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 256
@@ -74,6 +77,7 @@ def prove_minimum(
     limit: float | None = None,
     time_limit: float | None = None,
     interrupted: Callable[[], bool] = lambda: False,
+    recorder: TreeRecord | None = None,
 ) -> Minimum:
     """Prove the smallest value of a function over a box of poses.
 
@@ -84,6 +88,7 @@ def prove_minimum(
         limit: the search ends, with a wider gap, once the bound is at least this.
         time_limit: seconds after which the search stops with the bound reached.
         interrupted: whether the work is requested to stop.
+        recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
     began = time.perf_counter()
     y, value = _good_point(oracle, box)
@@ -109,7 +114,11 @@ def prove_minimum(
         middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
         left, right = part_upper.copy(), part_lower.copy()
         left[every, split] = right[every, split] = middle
-        children = box.contracted(np.concatenate([part_lower, right]), np.concatenate([left, part_upper]))
+        halves = np.concatenate([part_lower, right]), np.concatenate([left, part_upper])
+        children = box.contracted(*halves)
+        if recorder is not None:
+            recorder.cuts(part_lower, part_upper, split)
+            recorder.contractions(halves, (children.lower, children.upper), children.outside)
         kept = ~children.outside
         new_lower, new_upper = children.lower[kept], children.upper[kept]
         at = oracle.bounds(new_lower, new_upper)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ...models import Dimension, FloatArray, axis_angle_from_matrix, frozen_arra
 from ..case.task import Sense
 from ..certificate.branchandbound import certify_program
 from ..certificate.certificate import Certificate, CertificateStatus
+from ..certificate.proofwriter import ProofWriter
 from ..errors import UncoveredError
 from ..program.layout import Layout
 from ..program.nlp import Nlp
@@ -22,6 +24,9 @@ from .claims import Claim
 from .posebox import PoseNumbers
 from .posed import extreme_program, varies
 from .verdict import Outcome
+
+if TYPE_CHECKING:
+    from .paper.record import PaperRecord
 
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
@@ -72,6 +77,7 @@ def prove_extreme(
     time_limit: float | None = None,
     jobs: int | None = None,
     interrupted: Callable[[], bool] = lambda: False,
+    paper: PaperRecord | None = None,
 ) -> Extreme:
     """Prove the smallest or the largest value of a number over a workspace.
 
@@ -82,23 +88,31 @@ def prove_extreme(
         time_limit: seconds after which the search stops with the bound reached.
         jobs: threads.
         interrupted: whether the work is requested to stop.
+        paper: records the search for a proof.
     """
     if interrupted():
         return _extreme(claim, math.inf, math.nan, None, 0, 0.0, "interrupted", gap_met=False)
     nlp = extreme_program(layout, claim.expression, claim.sense)
     if not varies(layout, [claim.expression])[0]:
         value = nlp.evaluate(nlp.start).F
+        if paper is not None:
+            paper.constant(claim, nlp, value)
         return _extreme(claim, value, value, _pose(nlp, nlp.start), 0, 0.0, "", gap_met=True)
+    # A program of a claim has one function, and its search is that of certify with or without a record.
+    writer = None if paper is None else ProofWriter(1)
     try:
-        found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs)
+        found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs, recorder=writer)
         if _is_between(claim, found) and not interrupted():
-            found = certify_program(nlp, found.x, gap=_FINE, time_limit=time_limit, jobs=jobs)
+            writer = None if paper is None else ProofWriter(1)
+            found = certify_program(nlp, found.x, gap=_FINE, time_limit=time_limit, jobs=jobs, recorder=writer)
     except UncoveredError as error:
         return _extreme(claim, math.inf, math.nan, None, 0, 0.0, str(error), gap_met=False)
     if found.status is CertificateStatus.INFEASIBLE:
         return _extreme(
             claim, math.inf, math.nan, None, found.boxes, found.seconds, "the robot has no pose there", gap_met=False
         )
+    if paper is not None and writer is not None:
+        paper.program(claim, found, writer)
     # A search that ends early has a bound too, which may be as good as asked for.
     met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     pose = None if found.x is None else _pose(nlp, found.x)

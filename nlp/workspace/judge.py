@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..case.case import Case
 from ..case.workspace import Workspace
@@ -17,6 +18,9 @@ from .posebox import pose_box
 from .posed import posed_layout
 from .search import RankProgress, prove_regular
 from .verdict import Outcome, Regularity
+
+if TYPE_CHECKING:
+    from .paper.record import PaperRecord
 
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
@@ -67,6 +71,7 @@ def judge_workspace(
     leg_error: float = 0.0,
     rank_progress: RankProgress | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    paper: PaperRecord | None = None,
 ) -> Judgement:
     """Prove, for every pose of a case's workspace, that its machine is regular and keeps its limits, or find a pose.
 
@@ -85,6 +90,7 @@ def judge_workspace(
         until_fault: whether the work ends at the first claim that is not proved.
         rank_progress: called during the search for singular poses.
         progress: called before each number with its name, the number of those done, and of all.
+        paper: records the searches for a proof.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
@@ -97,25 +103,32 @@ def judge_workspace(
     claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
     regularity = None
     if legs is not None:
-        regularity = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=rank_progress)
+        recorder = None if paper is None else paper.rank
+        regularity = prove_regular(
+            legs, box, engine=engine, time_limit=time_limit, progress=rank_progress, recorder=recorder
+        )
     extremes: list[Extreme] = []
     if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
         return Judgement(case, workspace, regularity, ())
     for done, claim in enumerate(claims):
         if progress is not None:
             progress(claim.name, done, len(claims))
-        found = prove_extreme(layout, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested)
+        found = prove_extreme(
+            layout, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested, paper=paper
+        )
         extremes.append(found)
         if until_fault and found.outcome is not Outcome.PROVED:
             return Judgement(case, workspace, regularity, tuple(extremes))
     if legs is not None and with_limits:
         extremes += strokes(case, extremes)
-        for found in own_searches(case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested):
+        for found in own_searches(
+            case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested, paper=paper
+        ):
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
     if legs is not None and with_limits and with_objective and eps > 0:
         shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
-        extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
+        extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested, paper=paper)
     return Judgement(case, workspace, regularity, tuple(extremes))

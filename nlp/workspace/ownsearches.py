@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from .poseerror import PoseErrors, WorstError, displaced, with_rest
 from .singular import SingularValues
 from .verdict import Outcome
 
+if TYPE_CHECKING:
+    from .paper.record import PaperRecord, TreeRecord
+
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in extremes.
 _ON_LIMIT = 1e-9
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
@@ -39,6 +43,7 @@ def own_searches(
     gap: float,
     time_limit: float | None,
     interrupted: Callable[[], bool],
+    paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the extremes of the case's limits that have searches of their own.
 
@@ -49,21 +54,27 @@ def own_searches(
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
+        paper: records the searches for a proof.
     """
+
+    def search(oracle: Oracle, least: float, name: str) -> Minimum:
+        recorder = None if paper is None else paper.own(name)
+        return _minimum(oracle, box, least, gap, time_limit, interrupted, recorder)
+
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
             oracle = SingularValues(legs, box, limit.length, is_condition=False)
-            found = _minimum(oracle, box, limit.min, gap, time_limit, interrupted)
+            found = search(oracle, limit.min, "smallest_singular_value")
             yield _from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
         elif isinstance(limit, ConditionNumber):
             oracle = SingularValues(legs, box, limit.length, is_condition=True)
-            found = _minimum(oracle, box, -limit.max, gap, time_limit, interrupted)
+            found = search(oracle, -limit.max, "condition_number")
             yield _from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
         elif isinstance(limit, LegClearance):
             names = [leg.name for leg in case.model.legs]
             for one, other in itertools.combinations(range(len(names)), 2):
-                found = _minimum(Clearance(legs, box, one, other), box, limit.min, gap, time_limit, interrupted)
                 name = f"leg_clearance limbs {names[one]} and {names[other]}"
+                found = search(Clearance(legs, box, one, other), limit.min, name)
                 yield _from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
 
 
@@ -74,10 +85,13 @@ def _minimum(
     gap: float,
     time_limit: float | None,
     interrupted: Callable[[], bool],
+    recorder: TreeRecord | None,
 ) -> Minimum:
     """Return the smallest value of a function, only as accurately as its limit needs."""
     allowed = gap * max(abs(limit), _NEAR_ZERO)
-    return prove_minimum(oracle, box, gap=allowed, limit=limit, time_limit=time_limit, interrupted=interrupted)
+    return prove_minimum(
+        oracle, box, gap=allowed, limit=limit, time_limit=time_limit, interrupted=interrupted, recorder=recorder
+    )
 
 
 def _from_minimum(
@@ -174,6 +188,7 @@ def pose_errors(
     *,
     time_limit: float | None,
     interrupted: Callable[[], bool],
+    paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
 
@@ -184,16 +199,24 @@ def pose_errors(
         shortest: proven shortest length of a leg over the poses.
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
+        paper: records the searches for a proof.
     """
+    names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
     searches = [WorstError(legs, box, is_rotation=is_rotation) for is_rotation in (False, True)]
     found = []
-    for each in searches:
+    for each, (name, _) in zip(searches, names, strict=True):
         size = abs(float(each.values(0.5 * (box.lower + box.upper)[None])[0]))
-        found.append(prove_minimum(each, box, gap=_ERROR_GAP * size, time_limit=time_limit, interrupted=interrupted))
+        recorder = None if paper is None else paper.own(name)
+        found.append(
+            prove_minimum(
+                each, box, gap=_ERROR_GAP * size, time_limit=time_limit, interrupted=interrupted, recorder=recorder
+            )
+        )
+        if paper is not None:
+            paper.firsts[name] = -found[-1].bound
     first = PoseErrors(*(-eps * each.bound for each in found))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
     whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
-    names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
     for k, (name, dimension) in enumerate(names):
         y, bound = found[k].y, whole[k]
         # To first order both signs give the same error.

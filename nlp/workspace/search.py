@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from .machine import Legs
 from .posebox import PoseBox
 from .regularity import Rank, RankExamination
 from .verdict import Outcome, Regularity
+
+if TYPE_CHECKING:
+    from .paper.record import TreeRecord
 
 #: Width of a box, in parts of the whole box, below which it is not bisected: the rows over it differ by little more
 #: than their rounding.
@@ -43,6 +47,7 @@ def prove_regular(
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
+    recorder: TreeRecord | None = None,
 ) -> Regularity:
     """Prove that J has full rank at every pose of a box, or find a pose at which it has not.
 
@@ -53,11 +58,12 @@ def prove_regular(
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
+        recorder: records the boxes for a proof.
 
     Raises:
         ValueError: there is no engine of that name here.
     """
-    search = _Search(legs, box, rank_engine(legs, box, engine))
+    search = _Search(legs, box, rank_engine(legs, box, engine), recorder)
     try:
         reason = search.run(time_limit, most_boxes, progress)
     except KeyboardInterrupt:
@@ -72,10 +78,11 @@ class _Search:
         legs: joint centres.
         box: the whole box.
         engine: examines boxes.
+        recorder: records them; None without a proof.
     """
 
-    def __init__(self, legs: Legs, box: PoseBox, engine: RankEngine) -> None:
-        self._legs, self._box, self._engine = legs, box, engine
+    def __init__(self, legs: Legs, box: PoseBox, engine: RankEngine, recorder: TreeRecord | None = None) -> None:
+        self._legs, self._box, self._engine, self._recorder = legs, box, engine, recorder
         self._began = time.perf_counter()
         self._stack: list[tuple[FloatArray, FloatArray]] = [(box.lower[None], box.upper[None])]
         self._small: list[tuple[FloatArray, FloatArray]] = []
@@ -110,6 +117,8 @@ class _Search:
             place = len(self._stack) - 1
             found = self._engine.examine(lower[:block], upper[:block])
             self._boxes += len(found.verdict)
+            if self._recorder is not None:
+                self._recorder.ranks(lower[:block], upper[:block], found)
             self._branch(found)
             del self._stack[place]
             if self._is_refuted(found):

@@ -1,0 +1,295 @@
+"""Check of a proof on paper, without trust in who made it.
+
+Everything is built again from the case: the box of poses, the joint centres, the expressions of numbers, and the claims
+that there must be. Trees of ``certify`` are checked by its checker. Every leaf of the other trees is shown again with
+balls and slopes (:mod:`.ballslopes`), and signs of determinants with fractions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....models import Dimension
+from ...case.case import Case
+from ...case.task import Sense
+from ...certificate.proof import Proof, ProofError, Statement
+from ...certificate.proofcheck import check_proof
+from ...errors import ScrewsynthError
+from ...program.layout import Layout
+from ..machine import Legs, legs_of, workspace_of_case
+from ..posed import extreme_program, posed_layout
+from .ballrows import Joints
+from .clearanceclaim import ClearanceClaim
+from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
+from .errorclaim import ErrorClaim, whole_errors
+from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
+from .pieces import BoxClaim, show
+from .poseroot import PoseRoot, pose_root
+from .rankclaim import RankClaim
+from .singularclaim import SingularClaim
+from .tree import read_leaves
+
+#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
+_ON_LIMIT = 1e-9
+#: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
+_SAME = 1e-9
+#: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
+_ROUNDING = 1e-15
+#: Reason that each kind of claim must have.
+_REASONS = {
+    "regular": ("regular", "singular"),
+    "number": ("program",),
+    "stroke": ("lengths",),
+    "dead length": ("lengths",),
+}
+#: Callback with the name of a claim, the number of claims checked, and of all.
+PaperProgress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class CheckedClaim:
+    """A claim that holds.
+
+    Attributes:
+        name, sense: of the claim.
+        bound: proven bound of the number as it reads in results, radians for angles; None without a number.
+        limit: limit of the case that it keeps, read in the same way; None without one.
+        is_refuted: whether the opposite is shown: a singular pose.
+        dimension: of the number.
+    """
+
+    name: str
+    sense: str
+    dimension: Dimension = Dimension.NUMBER
+    bound: float | None = None
+    limit: float | None = None
+    is_refuted: bool = False
+
+
+@dataclass(frozen=True)
+class CheckedPaper:
+    """A proof that holds.
+
+    Attributes:
+        claims: what it proves.
+        unproved: claims of the case that it does not prove.
+        leaves: number of claims about boxes in it.
+        pieces: number of boxes that were evaluated to show them.
+    """
+
+    claims: tuple[CheckedClaim, ...]
+    unproved: tuple[Unproved, ...]
+    leaves: int
+    pieces: int
+
+
+def check_paper(proof: PaperProof, case: Case, progress: PaperProgress | None = None) -> CheckedPaper:
+    """Check a proof of a workspace, by showing each of its claims again.
+
+    Args:
+        proof: the proof.
+        case: the case that it is about.
+        progress: called before each claim.
+
+    Raises:
+        ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
+        CaseError: the case has no workspace, or a free dimension.
+    """
+    checker = _Checker(proof, case)
+    given = {(each.name, each.sense): each for each in proof.claims}
+    others = [(each.name, each.sense) for each in proof.unproved]
+    expected = {each.key: each for each in checker.expected}
+    if sorted([*given, *others]) != sorted(expected) or len(given) != len(proof.claims):
+        wrong = [*(set(expected) - {*given, *others}), *({*given, *others} - set(expected))]
+        name = " ".join(min(wrong)).strip() if wrong else "one of them"
+        raise ProofError(f"the claims are not those of the case, each once: see {name}")
+    claims = []
+    for done, (key, each) in enumerate(expected.items()):
+        if key not in given:
+            continue
+        if progress is not None:
+            progress(each.name, done, len(expected))
+        try:
+            claims.append(checker.check(each, given[key]))
+        except ProofError as error:
+            raise ProofError(f"{' '.join(key).strip()}: {error}") from None
+    return CheckedPaper(tuple(claims), proof.unproved, checker.leaves, checker.pieces)
+
+
+class _Checker:
+    """A check of claims one after the other; later ones use the bounds of earlier ones.
+
+    Args:
+        proof: the proof.
+        case: the case.
+
+    Raises:
+        ProofError: the proof is for another workspace, or for other joint centres.
+    """
+
+    def __init__(self, proof: PaperProof, case: Case) -> None:
+        workspace = workspace_of_case(case)
+        if workspace_numbers(workspace) != proof.workspace:
+            raise ProofError("the proof is for another workspace than this case's")
+        self._case, self._proof, self._legs = case, proof, legs_of(case)
+        _compare_legs(self._legs, proof)
+        self._layout: Layout = posed_layout(case, workspace)
+        self._root: PoseRoot = pose_root(workspace)
+        self._eps = leg_error_of(case, proof.leg_error)
+        self._bounds: dict[tuple[str, str], float] = {}
+        self.leaves = self.pieces = 0
+        try:
+            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, proof.leg_error)
+        except ProofError:
+            raise
+        except ScrewsynthError as error:
+            raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
+
+    def check(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check one claim.
+
+        Raises:
+            ProofError: it could not be shown.
+        """
+        if given.reason not in _REASONS.get(each.kind, ("boxes",)):
+            raise ProofError(f"'{given.reason}' is no reason of this claim")
+        if given.reason == "singular":
+            return self._check_sides(each, given)
+        if each.kind == "regular":
+            self._show(RankClaim(self._root, self._joints), given.tree)
+            return CheckedClaim(each.name, each.sense)
+        if given.bound is None or not math.isfinite(given.bound):
+            raise ProofError("the claim has no bound")
+        if each.kind == "number":
+            return self._check_program(each, given)
+        if each.kind in ("stroke", "dead length"):
+            return self._check_stroke(each)
+        if each.kind == "error":
+            return self._check_error(each, given)
+        bound = float(given.bound)
+        _keep_limit(each, bound)
+        claim: BoxClaim
+        if each.kind == "clearance":
+            claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), bound)
+        else:
+            is_condition = each.kind == "condition"
+            claim = SingularClaim(self._root, self._joints, each.length, bound, is_condition=is_condition)
+        self._show(claim, given.tree)
+        dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
+        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
+
+    @property
+    def _joints(self) -> Joints:
+        """Joint centres of the case's legs.
+
+        Raises:
+            ProofError: the robot is not six straight legs.
+        """
+        if self._legs is None:
+            raise ProofError("the case's robot is not six straight legs")
+        return Joints(np.array(self._legs.base), np.array(self._legs.platform))
+
+    def _show(self, claim: BoxClaim, tree: bytes) -> None:
+        """Show a claim on every leaf of a tree."""
+        leaves = read_leaves(tree, self._root.lower, self._root.upper)
+        self.leaves += len(leaves.lower)
+        self.pieces += show(claim, self._root, leaves)
+
+    def _check_sides(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check that two poses of the workspace have determinants of opposite signs."""
+        sides = [np.array(side, dtype=float) for side in given.sides]
+        if len(sides) != 2 or any(side.shape != (COORDINATES,) or not np.isfinite(side).all() for side in sides):
+            raise ProofError("the claim has no two poses")
+        if not all(self._root.holds(side) for side in sides):
+            raise ProofError("a pose is not one of the workspace")
+        claim = RankClaim(self._root, self._joints)
+        if claim.sign_at(sides[0]) * claim.sign_at(sides[1]) >= 0:
+            raise ProofError("the determinant has not opposite signs at the two poses")
+        return CheckedClaim(each.name, each.sense, is_refuted=True)
+
+    def _check_program(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check a tree of ``certify`` for a number."""
+        claim = each.claim
+        if claim is None or given.bound is None:
+            raise ProofError("the claim has no bound")
+        nlp = extreme_program(self._layout, claim.expression, claim.sense)
+        checked = check_proof(Proof("", each.name, Statement(), given.graph, given.bound, given.tree), nlp)
+        self.leaves += checked.leaves
+        self.pieces += checked.pieces
+        bound = -nlp.sign * checked.bound
+        _keep_limit(each, bound)
+        self._bounds[each.key] = bound
+        read = claim.reading.from_value
+        limit = None if claim.limit is None else read(claim.limit)
+        return CheckedClaim(each.name, each.sense, claim.reading.dimension, read(bound), limit)
+
+    def _length(self, leg: str, sense: str) -> float:
+        """Return the proven shortest or longest length of a leg.
+
+        Raises:
+            ProofError: there is no proof of it.
+        """
+        key = f"leg_length limb {leg}", sense
+        if key not in self._bounds:
+            raise ProofError(f"the lengths of limb {leg} have no proof")
+        outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
+        return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
+
+    def _check_stroke(self, each: ExpectedClaim) -> CheckedClaim:
+        """Check a limit on a telescoping leg from the lengths of the leg."""
+        leg = self._case.model.legs[each.legs[0]].name
+        short, long = self._length(leg, "min"), self._length(leg, "max")
+        off = _ROUNDING * long
+        bound = long - short + off if each.kind == "stroke" else 2 * short - long - off
+        _keep_limit(each, bound)
+        return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
+
+    def _check_error(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
+        firsts = {one.name: one.bound for one in self._proof.claims if one.name in ERRORS}
+        position, rotation = (firsts.get(name) for name in ERRORS)
+        if position is None or rotation is None:
+            raise ProofError("one of the two errors has no proof")
+        is_rotation = each.name == ERRORS[1]
+        most = rotation if is_rotation else position
+        self._show(ErrorClaim(self._root, self._joints, most, is_rotation=is_rotation), given.tree)
+        shortest = min(self._length(leg.name, "min") for leg in self._case.model.legs)
+        reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)
+        whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
+        if not math.isfinite(whole):
+            raise ProofError("the errors are too large for a bound of their part of second order")
+        return CheckedClaim(each.name, each.sense, Dimension.ANGLE if is_rotation else Dimension.LENGTH, whole)
+
+
+def _compare_legs(legs: Legs | None, proof: PaperProof) -> None:
+    """Refuse a proof for other joint centres.
+
+    Raises:
+        ProofError: it is one.
+    """
+    numbers = [] if legs is None else [*legs.base.tolist(), *legs.platform.tolist()]
+    given = [list(each) for each in proof.legs]
+    same = len(numbers) == len(given) and all(len(each) == 3 for each in given)
+    if same and numbers:
+        size = float(np.abs(numbers).max())
+        same = bool(np.allclose(given, numbers, rtol=0.0, atol=_SAME * size))
+    if not same:
+        raise ProofError("the proof is for other joint centres than this case's")
+
+
+def _keep_limit(each: ExpectedClaim, bound: float) -> None:
+    """Refuse a bound beyond the limit of the case.
+
+    Raises:
+        ProofError: it is beyond.
+    """
+    if each.limit is None:
+        return
+    sign = 1.0 if each.sense == Sense.MAX.value else -1.0
+    slack = _ON_LIMIT * max(abs(each.limit), abs(bound))
+    if not sign * (bound - each.limit) <= slack:
+        raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {each.limit:.10g}")

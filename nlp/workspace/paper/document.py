@@ -1,0 +1,188 @@
+"""The proof of a workspace as JSON: one file with the case, the workspace, and a tree of boxes for each claim.
+
+A claim is proved by one of
+
+    regular     a tree of boxes, each regular or outside of the workspace
+    singular    the opposite: two poses at which the determinant of the rows has opposite signs
+    program     a tree of ``certify`` for one number, with its bound
+    boxes       a tree of boxes on each of which a number is not below (above) its bound
+    lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+from ...case.pose import Free
+from ...case.workspace import Workspace
+from ...certificate.proof import ProofError
+
+FORMAT = "screwsynth-workspace-proof"
+_VERSION = 1
+#: Number of coordinates of a pose.
+COORDINATES = 6
+#: Reasons of claims.
+REASONS = ("regular", "singular", "program", "boxes", "lengths")
+
+
+@dataclass(frozen=True)
+class PaperClaim:
+    """A claim that is proved.
+
+    Attributes:
+        name: in the words of the command.
+        sense: ``min`` or ``max`` for a number, else empty.
+        reason: one of :data:`REASONS`.
+        bound: bound of the number in the unit of its search: of a program's objective, of a distance, of a singular
+            value or a condition number, or, for errors of a pose, of their part of first order for legs that are one
+            unit of length off; None without a number.
+        graph: fingerprint of the program; empty for other reasons.
+        tree: nodes in bytes; empty for a claim without a tree.
+        sides: two poses (6,) with determinants of opposite signs; empty for other reasons.
+    """
+
+    name: str
+    sense: str
+    reason: str
+    bound: float | None = None
+    graph: str = ""
+    tree: bytes = b""
+    sides: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class Unproved:
+    """A claim without a proof, and the reason."""
+
+    name: str
+    sense: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class PaperProof:
+    """Proofs of claims about a workspace.
+
+    Attributes:
+        case: the case file's text.
+        name: the case's name.
+        workspace: the poses, from :func:`workspace_numbers`.
+        legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
+        quantities: measures that were asked for.
+        leg_error: largest error of a leg's length.
+        claims: the claims that are proved.
+        unproved: the others.
+    """
+
+    case: str
+    name: str
+    workspace: object
+    legs: tuple[tuple[float, ...], ...]
+    quantities: tuple[str, ...]
+    leg_error: float
+    claims: tuple[PaperClaim, ...]
+    unproved: tuple[Unproved, ...]
+
+    def as_text(self) -> str:
+        """Return the JSON text."""
+        content = {
+            "format": FORMAT,
+            "version": _VERSION,
+            "name": self.name,
+            "case": self.case,
+            "workspace": self.workspace,
+            "legs": self.legs,
+            "quantities": self.quantities,
+            "leg_error": self.leg_error,
+            "claims": [
+                {
+                    "name": each.name,
+                    "sense": each.sense,
+                    "reason": each.reason,
+                    "bound": each.bound,
+                    "graph": each.graph,
+                    "sides": each.sides,
+                    "digest": hashlib.sha256(each.tree).hexdigest(),
+                    "tree": base64.b64encode(zlib.compress(each.tree, 9)).decode("ascii"),
+                }
+                for each in self.claims
+            ],
+            "not_on_paper": [vars(each) for each in self.unproved],
+        }
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def workspace_numbers(workspace: Workspace) -> object:
+    """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
+    position, angles = (
+        tuple((each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in values)
+        for values in (workspace.position, workspace.turns.angles)
+    )
+    return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
+
+
+def is_paper(text: str) -> bool:
+    """Return whether a text is a proof of a workspace, and not one of ``certify``."""
+    try:
+        content = json.loads(text)
+    except ValueError:
+        return False
+    return isinstance(content, dict) and content.get("format") == FORMAT
+
+
+def read_paper(text: str, source: str) -> PaperProof:
+    """Read a proof from its JSON text.
+
+    Args:
+        text: the JSON text.
+        source: its name, for messages.
+
+    Raises:
+        ProofError: the text is no proof, or is damaged.
+    """
+    try:
+        content: dict[str, Any] = json.loads(text)
+        if content["format"] != FORMAT or content["version"] != _VERSION:
+            raise ProofError(f"{source}: is no proof of this version")
+        claims = tuple(_claim(each, source) for each in content["claims"])
+        return PaperProof(
+            case=str(content["case"]),
+            name=str(content["name"]),
+            workspace=_tuples(content["workspace"]),
+            legs=tuple(tuple(map(float, each)) for each in content["legs"]),
+            quantities=tuple(map(str, content["quantities"])),
+            leg_error=float(content["leg_error"]),
+            claims=claims,
+            unproved=tuple(
+                Unproved(str(each["name"]), str(each["sense"]), str(each["reason"])) for each in content["not_on_paper"]
+            ),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, zlib.error):
+        raise ProofError(f"{source}: is no proof as workspace --proof writes it") from None
+
+
+def _claim(content: dict[str, Any], source: str) -> PaperClaim:
+    """Return a claim from its JSON object.
+
+    Raises:
+        ProofError: its tree is not the one of its digest.
+    """
+    tree = zlib.decompress(base64.b64decode(content["tree"], validate=True))
+    name = str(content["name"])
+    if content["digest"] != hashlib.sha256(tree).hexdigest():
+        raise ProofError(f"{source}: is damaged: the digest of '{name}' is not that of its tree")
+    if content["reason"] not in REASONS:
+        raise ProofError(f"{source}: gives '{content['reason']}' as the reason of '{name}', which is none")
+    sides = tuple(tuple(map(float, each)) for each in content["sides"])
+    bound = None if content["bound"] is None else float(content["bound"])
+    return PaperClaim(name, str(content["sense"]), content["reason"], bound, str(content["graph"]), tree, sides)
+
+
+def _tuples(value: object) -> object:
+    """Return lists within lists as tuples."""
+    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value

@@ -1,0 +1,130 @@
+"""The proof on paper of a judgement, from the records of its searches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ...certificate.proof import fingerprint
+from ..machine import Legs, legs_of
+from ..posed import posed_layout
+from ..verdict import Outcome
+from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
+from .expected import ERRORS, ExpectedClaim, expected_claims
+from .record import PaperRecord
+
+if TYPE_CHECKING:
+    from ..extremes import Extreme
+    from ..judge import Judgement
+
+#: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
+_OUTWARDS = 1e-6
+_NO_LENGTHS = "the lengths of legs that it needs have no proof"
+
+
+def paper_of(
+    judged: Judgement, record: PaperRecord, text: str, *, quantities: Sequence[str] = (), leg_error: float = 0.0
+) -> PaperProof:
+    """Return the proof of what is proved, or refuted by two poses, and the claims that have none.
+
+    Args:
+        judged: the verdicts.
+        record: of the searches that led to them.
+        text: the case file's text.
+        quantities: measures that were asked for.
+        leg_error: largest error of a leg's length.
+    """
+    legs = legs_of(judged.case)
+    layout = posed_layout(judged.case, judged.workspace)
+    # Of numbers of one name the first counts, and of strokes, which come later, that over all poses.
+    last = {(each.name, each.sense.value): each for each in judged.extremes}
+    first = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
+    proved: dict[tuple[str, str], PaperClaim] = {}
+    unproved = []
+    for each in expected_claims(judged.case, layout, legs, quantities, leg_error):
+        extremes = first if each.kind == "number" else last
+        found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
+        if isinstance(found, PaperClaim):
+            proved[each.key] = found
+        else:
+            unproved.append(Unproved(each.name, each.sense, found))
+    # The whole errors follow from those of first order together, and from the lengths of legs.
+    missing = [each for each in ERRORS if (each, "max") not in proved]
+    if len(missing) == 1:
+        (other,) = [each for each in ERRORS if each not in missing]
+        del proved[other, "max"]
+        unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
+    return PaperProof(
+        case=text,
+        name=judged.case.name,
+        workspace=workspace_numbers(judged.workspace),
+        legs=legs_numbers(legs),
+        quantities=tuple(quantities),
+        leg_error=leg_error,
+        claims=tuple(proved.values()),
+        unproved=tuple(unproved),
+    )
+
+
+def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
+    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
+    return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
+
+
+def _regular(judged: Judgement, record: PaperRecord) -> PaperClaim | str:
+    """Return the claim that J has full rank with its proof, or why there is none."""
+    found = judged.regularity
+    if found is None:
+        return "regular poses are proved for robots with six straight legs only"
+    if found.outcome is Outcome.PROVED:
+        return PaperClaim("regular", "", "regular", tree=record.rank.tree())
+    if found.outcome is Outcome.REFUTED and found.sides is not None:
+        return PaperClaim("regular", "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+    return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
+
+
+def _number(
+    each: ExpectedClaim,
+    extremes: dict[tuple[str, str], Extreme],
+    record: PaperRecord,
+    proved: dict[tuple[str, str], PaperClaim],
+) -> PaperClaim | str:
+    """Return the claim about a number with its proof, or why there is none."""
+    found = extremes.get(each.key)
+    if found is None:
+        return "it was not judged"
+    if found.outcome is not Outcome.PROVED:
+        return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
+    if each.kind == "number":
+        return _program(each, record)
+    if each.kind in ("stroke", "dead length"):
+        leg = each.name.partition(" ")[2].removeprefix("limb ")
+        missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
+        return _NO_LENGTHS if missing else PaperClaim(each.name, each.sense, "lengths", found.bound)
+    return _boxes(each, found.bound, record, proved)
+
+
+def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
+    """Return a claim with a tree of the search of ``certify``, or why there is none."""
+    program = record.programs.get(each.key)
+    if program is None or program.tree is None:
+        return "its search has no bound"
+    return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
+
+
+def _boxes(
+    each: ExpectedClaim, reached: float, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]
+) -> PaperClaim | str:
+    """Return a claim with a tree of a search of its own, or why there is none."""
+    if each.name not in record.boxes:
+        return "its search was not recorded"
+    if each.kind == "error":
+        if not any(name.startswith("leg_length limb ") and sense == "min" for name, sense in proved):
+            return _NO_LENGTHS
+        bound = record.firsts[each.name] * (1 + _OUTWARDS)
+    else:
+        limit = math.inf if each.limit is None else each.limit
+        # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
+        bound = max(limit, reached) if each.sense == "max" else min(limit, reached)
+    return PaperClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())

@@ -1,0 +1,528 @@
+"""Proofs of workspaces on paper: what the checker accepts, and that it rejects everything that was tampered with."""
+
+import base64
+import hashlib
+import json
+import math
+import struct
+import subprocess
+import sys
+import time
+import tomllib
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, Free
+from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.certificate.proof import ProofError
+from screwsynth.nlp.workspace.boundsearch import Oracle
+from screwsynth.nlp.workspace.clearance import Clearance
+from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.paper import ballrows, check
+from screwsynth.nlp.workspace.paper.ballslopes import BallSlopes, coordinates
+from screwsynth.nlp.workspace.paper.clearanceclaim import ClearanceClaim
+from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
+from screwsynth.nlp.workspace.paper.errorclaim import ErrorClaim, whole_errors
+from screwsynth.nlp.workspace.paper.exactly import determinant_sign, tangent_ends
+from screwsynth.nlp.workspace.paper.inverserows import inverse_rows
+from screwsynth.nlp.workspace.paper.pieces import BoxClaim, show
+from screwsynth.nlp.workspace.paper.poseroot import PoseRoot, pose_root
+from screwsynth.nlp.workspace.paper.positive import are_positive, contraction
+from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
+from screwsynth.nlp.workspace.paper.record import PaperRecord, TreeRecord
+from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
+from screwsynth.nlp.workspace.paper.tree import Leaves, PoseNode, read_leaves, split_bytes
+from screwsynth.nlp.workspace.paper.written import paper_of
+from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.workspace.poseerror import PoseErrors, WorstError, with_rest
+from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.verdict import Outcome
+
+Run = Callable[..., tuple[int, str, str]]
+#: The machine of LinuxCNC's hexapod kinematics, with a limit of every kind.
+TEXT = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 1, x4 = 5 }
+[pose]
+position = [0, 0, 20]
+[tolerance]
+joint_centre = 0.002
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+leg_length = { min = 17, max = 44 }
+actuator = { stroke_max = 30, dead_length = 0.1 }
+platform_joint_angle = { max = 60, about = "home" }
+leg_clearance = { min = 0.5 }
+smallest_singular_value = { min = 0.25, length = 11.5 }
+condition_number = { max = 8, length = 11.5 }
+home = { position = [0, 0, 20] }
+[workspace]
+position = [{ min = -2, max = 2 }, 0.5, { min = 18, max = 21 }]
+rotation = { roll = 3, pitch = { min = -5, max = 9 } }
+"""
+POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+
+
+def case_of(text: str = TEXT) -> Case:
+    return case_from_tables(tomllib.loads(text), name="machine", source="machine.toml")
+
+
+@pytest.fixture(scope="module")
+def judged() -> tuple[Judgement, PaperRecord]:
+    record = PaperRecord()
+    # Lengths of legs are asked for once more, without their limit.
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.004, paper=record)
+    return found, record
+
+
+@pytest.fixture(scope="module")
+def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
+    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.004)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Legs:
+    found = legs_of(case_of(TEXT.replace("x3 = 1", "x3 = 0")))
+    assert found is not None
+    return found
+
+
+def turned(kind: TurnKind, degrees: float) -> Workspace:
+    angle = Free(-math.radians(degrees), math.radians(degrees))
+    return Workspace(POSITION, Turns(kind, (angle,) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1), (0.6, 0.0, 0.8)))
+
+
+def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    lower = rng.uniform(root.lower, root.upper, (count, 6))
+    upper = np.minimum(lower + (root.upper - root.lower) * rng.uniform(0, width, (count, 6)), root.upper)
+    return lower, upper
+
+
+def rejected(proof: PaperProof, case: Case | None = None) -> str:
+    with pytest.raises(ProofError) as caught:
+        check.check_paper(proof, case_of() if case is None else case)
+    return str(caught.value)
+
+
+def changed(proof: PaperProof, name: str, sense: str = "", **values: object) -> PaperProof:
+    """The proof with other values in one of its claims."""
+    assert any((each.name, each.sense) == (name, sense) for each in proof.claims)
+    claims = [
+        replace(each, **values) if (each.name, each.sense) == (name, sense) else each  # type: ignore[arg-type]
+        for each in proof.claims
+    ]
+    return replace(proof, claims=tuple(claims))
+
+
+def alone(proof: PaperProof, *names: str) -> PaperProof:
+    """The proof with these claims alone; it says of the others that they have none."""
+    kept = tuple(each for each in proof.claims if each.name in names)
+    others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
+    return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
+
+
+def claim(proof: PaperProof, name: str, sense: str = "") -> PaperClaim:
+    return next(each for each in proof.claims if (each.name, each.sense) == (name, sense))
+
+
+def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple[Judgement, PaperRecord]) -> None:
+    assert not proof.unproved
+    again = read_paper(proof.as_text(), "again")
+    assert again == proof
+    checked = check.check_paper(again, case_of())
+    assert len(checked.claims) == len(proof.claims)
+    assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}
+    bounds = {(each.name, each.sense): each.bound for each in checked.claims}
+    assert bounds["smallest_singular_value", "min"] == 0.25
+    limits = {(each.name, each.sense): each.limit for each in checked.claims}
+    assert limits["leg_length limb 1-", "max"] == pytest.approx(44)
+    assert limits["actuator.stroke_max limb 1-", "max"] == 30
+    assert bounds["position error", "max"] is not None
+    for each in judged[0].extremes:
+        bound = bounds[each.name, each.sense.value]
+        sign = 1.0 if each.sense.value == "max" else -1.0
+        assert bound is not None
+        assert sign * bound >= sign * each.reached - 1e-9 * abs(each.reached)
+
+
+@pytest.mark.parametrize(
+    ("name", "sense", "factor"),
+    [
+        ("smallest_singular_value", "min", 4.5),
+        ("condition_number", "max", 0.18),
+        ("position error", "max", 0.7),
+        ("F", "max", 0.9),
+        ("leg_length limb 1-", "min", 1.2),
+        ("leg_clearance limbs 1- and 1+", "min", 9.0),
+    ],
+)
+def test_another_bound_is_rejected(proof: PaperProof, name: str, sense: str, factor: float) -> None:
+    bound = claim(proof, name, sense).bound
+    assert bound is not None
+    needed = (name, "rotation error") if name == "position error" else (name,)
+    assert name in rejected(alone(changed(proof, name, sense, bound=bound * factor), *needed))
+
+
+def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: PaperProof) -> None:
+    assert "does not keep" in rejected(changed(alone(proof, "condition_number"), "condition_number", "max", bound=9.0))
+    tighter = case_of(TEXT.replace("max = 44", "max = 30"))
+    proof = alone(proof, "leg_length limb 1-", "actuator.stroke_max limb 1-")
+    assert "does not keep" in rejected(proof, tighter)
+    assert "does not keep" in rejected(proof, case_of(TEXT.replace("stroke_max = 30", "stroke_max = 2")))
+
+
+def test_other_trees_are_rejected(proof: PaperProof) -> None:
+    proof = alone(proof, "regular", "position error", "rotation error")
+    tree = claim(proof, "position error", "max").tree
+    assert tree[0] == PoseNode.SPLIT
+    assert "ends" in rejected(changed(proof, "position error", "max", tree=tree[:-1]))
+    assert "goes on" in rejected(changed(proof, "position error", "max", tree=tree + tree[-1:]))
+    assert "where a box must be" in rejected(changed(proof, "regular", tree=b"\x07"))
+    assert "cuts no coordinate" in rejected(changed(proof, "regular", tree=b"\x01\x06" + bytes(8)))
+    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([PoseNode.OUTSIDE])))
+    (at,) = struct.unpack("<d", tree[2:10])
+    width = float(np.ptp(proof.workspace[0][0])) if tree[1] == 0 else 9.0  # type: ignore[index]
+    shifted = split_bytes(tree[1], at + width) + tree[10:]
+    assert "outside of it" in rejected(changed(proof, "position error", "max", tree=shifted))
+
+
+def test_a_proof_is_for_its_case_only(proof: PaperProof) -> None:
+    assert "another workspace" in rejected(proof, case_of(TEXT.replace("max = 9 }", "max = 9.5 }")))
+    assert "other joint centres" in rejected(proof, case_of(TEXT.replace("11.543", "11.544")))
+    assert "other expressions" in rejected(
+        alone(proof, "F"), case_of(TEXT.replace("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
+    )
+    fewer = replace(proof, claims=proof.claims[1:])
+    assert "see regular" in rejected(fewer)
+    assert "each once" in rejected(replace(proof, claims=(*proof.claims, proof.claims[0])))
+    without = case_of(TEXT.replace("leg_clearance = { min = 0.5 }", ""))
+    assert "leg_clearance" in rejected(proof, without)
+    assert "no reason" in rejected(
+        changed(alone(proof, "condition_number"), "condition_number", "max", reason="lengths")
+    )
+    assert "measure" in rejected(replace(proof, quantities=("none",)))
+
+
+def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
+    """40 degrees about any axis: singular. So is every tree that claims otherwise."""
+    root = pose_root(turned(TurnKind.ANY_AXIS, 40))
+    for tree in (bytes([PoseNode.CLOSED]), split_bytes(0, 0.5) + bytes([PoseNode.CLOSED] * 2)):
+        with pytest.raises(ProofError, match="opposite signs"):
+            show(rank(root, robot), root, read_leaves(tree, root.lower, root.upper))
+
+
+def rank(root: PoseRoot, robot: Legs) -> RankClaim:
+    return RankClaim(root, ballrows.Joints(*robot))
+
+
+def test_a_refuted_workspace_carries_two_poses() -> None:
+    text = TEXT.replace("x3 = 1", "x3 = 0")
+    text = (
+        text[: text.index("[workspace]")] + "[workspace]\nposition = [{min=-5,max=5}, {min=-5,max=5}, {min=15,max=25}]"
+    )
+    text += "\nrotation = {angle={min=-40,max=40}}\n"
+    record, case = PaperRecord(), case_of(text)
+    given = paper_of(judge_workspace(case, with_limits=False, paper=record), record, text)
+    (found,) = check.check_paper(read_paper(given.as_text(), "again"), case).claims
+    assert found.is_refuted
+    assert {each.reason for each in given.unproved} == {"it was not judged"}
+    first, second = claim(given, "regular").sides
+    assert "opposite signs" in rejected(changed(given, "regular", sides=(first, first)), case)
+    assert "not one of the workspace" in rejected(changed(given, "regular", sides=(first, (9.0, *second[1:]))), case)
+    assert "no two poses" in rejected(changed(given, "regular", sides=(first,)), case)
+
+
+def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
+    file, target = tmp_path / "machine.toml", tmp_path / "proof.json"
+    # The strokes are longer than allowed: these claims have no proof.
+    text = TEXT.replace("stroke_max = 30", "stroke_max = 2")
+    for key in ("condition_number", "smallest_singular_value", "platform_joint_angle", "leg_clearance", "home ="):
+        text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(key))
+    file.write_text(text, encoding="utf-8")
+    code, _, err = cli("workspace", str(file), "--gap", "0.1", "--proof", str(target))
+    assert code == 1
+    missing = "not on paper: actuator.stroke_max limb 1- max: refuted"
+    assert missing in err
+    for arguments in ((str(target),), (str(target), str(file))):
+        code, out, err = cli("verify-proof", *arguments)
+        assert code == 0, err
+        assert out.startswith("holds: ")
+        assert "regular: J has full rank at every pose" in out
+        assert missing in out
+    file.write_text(text.replace("min = -2, max = 2", "min = -2, max = 3"), encoding="utf-8")
+    code, _, err = cli("verify-proof", str(target), str(file))
+    assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
+    content = json.loads(target.read_text(encoding="utf-8"))
+    content["claims"][0]["tree"] = base64.b64encode(zlib.compress(bytes([PoseNode.OUTSIDE]))).decode()
+    target.write_text(json.dumps(content), encoding="utf-8")
+    code, _, err = cli("verify-proof", str(target))
+    assert code == 2
+    assert "is damaged" in err
+    content["claims"][0]["digest"] = hashlib.sha256(bytes([PoseNode.OUTSIDE])).hexdigest()
+    target.write_text(json.dumps(content), encoding="utf-8")
+    code, _, err = cli("verify-proof", str(target))
+    assert code == 1
+    assert "rejected: regular" in err
+    target.write_text(json.dumps(content | {"claims": [{}]}), encoding="utf-8")
+    code, _, err = cli("verify-proof", str(target))
+    assert (code, len(err.splitlines())) == (2, 1)
+    code, _, err = cli("workspace", str(file), "--proof", "-", "--json", "-")
+    assert code == 2
+    assert "standard output" in err
+
+
+def test_random_machines_are_accepted() -> None:
+    """A dozen random hexapods of each kind of rotation, and the time against that of the NumPy search."""
+    rng = np.random.default_rng(5)
+    ratios = []
+    while len(ratios) < 12:
+        machine = Legs(
+            np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
+            np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
+        )
+        kind, size = list(TurnKind)[len(ratios) % 3], float(rng.uniform(0.1, 0.3))
+        turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
+        near = rng.uniform((-3, -3, 9), (3, 3, 15))
+        place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
+        workspace = Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
+        record = TreeRecord()
+        began = time.process_time()
+        found = prove_regular(machine, pose_box(workspace), engine="numpy", most_boxes=3000, recorder=record)
+        searched = time.process_time()
+        if found.outcome is not Outcome.PROVED:
+            continue
+        root = pose_root(workspace)
+        show(rank(root, machine), root, read_leaves(record.tree(), root.lower, root.upper))
+        ratios.append((time.process_time() - searched) / (searched - began))
+    assert float(np.median(ratios)) < 20
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_balls_with_slopes_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
+    rng = np.random.default_rng(7)
+    workspace = turned(kind, 50)
+    root = pose_root(workspace)
+    lower, upper = random_boxes(root, 12, 0.3, rng)
+    lower[6:], upper[6:] = lower[6:], lower[6:] + (upper[6:] - lower[6:]) * 1e-13
+    rows = ballrows.ball_rows(root, ballrows.Joints(*robot), lower, upper).rows
+    y = coordinates(lower, upper)
+    rounded, bent = 0, 0
+    for k in range(12):
+        e = rng.uniform(-1, 1, 6) if k % 2 else np.sign(rng.normal(size=6))
+        step = [Fraction(float(h)) * Fraction(float(each)) for h, each in zip(y.h[k], e, strict=True)]
+        centre = [Fraction(float(each)) for each in y.c[k]]
+        exact = exact_rows(robot, kind, workspace, [a + b for a, b in zip(centre, step, strict=True)])
+        at_centre = exact_rows(robot, kind, workspace, centre)
+        for i, j in np.ndindex(6, 6):
+            off = abs(at_centre[i][j] - Fraction(float(rows.c[k, i, j])))
+            assert off <= Fraction(float(rows.ce[k, i, j]))
+            rounded += off > 0
+            moved = exact[i][j] - at_centre[i][j]
+            middle = sum(Fraction(float(s)) * d for s, d in zip(rows.s[k, i, j], step, strict=True))
+            radius = sum(Fraction(float(s)) * abs(d) for s, d in zip(rows.se[k, i, j], step, strict=True))
+            assert abs(moved - middle) <= radius
+            bent += abs(moved - middle) > radius / 4
+    # Without rounding, or with slopes a quarter as wide, the balls would not hold the rows: the test can fail.
+    assert rounded
+    assert bent
+
+
+def exact_rows(robot: Legs, kind: TurnKind, workspace: Workspace, y: list[Fraction]) -> list[list[Fraction]]:
+    """The rows from a product of rotations in fractions, and from a rotation about an axis otherwise."""
+    one = Fraction(1)
+    turn = [[one * (i == j) for j in range(3)] for i in range(3)]
+    if kind is TurnKind.ROLL_PITCH_YAW:
+        for about, t in zip((2, 1, 0), (y[5], y[4], y[3]), strict=True):
+            i, j = (about + 1) % 3, (about + 2) % 3
+            single = [[Fraction(0)] * 3 for _ in range(3)]
+            single[about][about], single[i][i], single[j][j] = 1 + t * t, 1 - t * t, 1 - t * t
+            single[j][i], single[i][j] = 2 * t, -2 * t
+            turn = [[sum(a * single[k][j] for k, a in enumerate(row)) for j in range(3)] for row in turn]
+        scale = (1 + y[3] ** 2) * (1 + y[4] ** 2) * (1 + y[5] ** 2)
+    else:
+        r = y[3:] if kind is TurnKind.ANY_AXIS else [y[3] * Fraction(each) for each in workspace.turns.axis]
+        cross = [[Fraction(0), -r[2], r[1]], [r[2], Fraction(0), -r[0]], [-r[1], r[0], Fraction(0)]]
+        square = sum(each * each for each in r)
+        scale = 1 + square
+        turn = [[(1 - square) * (i == j) + 2 * cross[i][j] + 2 * r[i] * r[j] for j in range(3)] for i in range(3)]
+    rows = []
+    for base, platform in zip(robot.base.tolist(), robot.platform.tolist(), strict=True):
+        u = [sum(t * Fraction(a) for t, a in zip(row, platform, strict=True)) for row in turn]
+        d = [p - Fraction(b) for p, b in zip(y[:3], base, strict=True)]
+        moment = [u[1] * d[2] - u[2] * d[1], u[2] * d[0] - u[0] * d[2], u[0] * d[1] - u[1] * d[0]]
+        rows.append([*(scale * each + part for each, part in zip(d, u, strict=True)), *moment])
+    return rows
+
+
+def test_roots_hold_their_values() -> None:
+    rng = np.random.default_rng(2)
+    lower = rng.uniform(0.5, 2.0, (50, 6))
+    upper = lower + rng.uniform(0, 0.5, (50, 6))
+    y = coordinates(lower, upper)
+    root: BallSlopes = (y * y)[:, :1].root()
+    for share in (0.0, 0.3, 1.0):
+        at = lower + share * (upper - lower)
+        moved = at[:, 0] - y.c[:, 0]
+        middle, radius = root.s[:, 0, 0] * moved, root.se[:, 0, 0] * np.abs(moved)
+        assert (np.abs(at[:, 0] - root.c[:, 0] - middle) <= radius + root.ce[:, 0] + 1e-15).all()
+    assert np.isnan((y * y - y)[:, :1].plus(np.array([-2.0])).root().s).any()
+
+
+def test_tangents_lie_between_fractions() -> None:
+    for angle in (0.0, 1e-9, -0.3, 1.0, math.radians(150), -math.radians(150)):
+        low, high = tangent_ends(angle)
+        assert low <= high
+        assert float(high - low) <= 1e-20 * (1 + abs(float(high)))
+        assert float(low) == pytest.approx(math.tan(angle / 2), rel=1e-15, abs=1e-300)
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_the_root_holds_the_searched_box(kind: TurnKind) -> None:
+    workspace = replace(turned(kind, 33), position=(1.5, Free(-1.0, 2.0), 20.0))
+    root, box = pose_root(workspace), pose_box(workspace)
+    np.testing.assert_allclose(root.lower, box.lower, rtol=1e-14, atol=0)
+    np.testing.assert_allclose(root.upper, box.upper, rtol=1e-14, atol=0)
+    inside = 0.999 * box.random(200, np.random.default_rng(1)) + 0.001 * 0.5 * (box.lower + box.upper)
+    assert all(root.holds(y) for y in inside)
+    assert not root.holds(np.where(box.upper > box.lower, box.upper * (1 + 1e-9), box.upper))
+    # A box in a corner of the cube around the ball is outside, and contraction loses no pose.
+    if kind is TurnKind.ANY_AXIS:
+        corner = np.concatenate([box.lower[:3], 0.9 * box.upper[3:]])[None]
+        assert root.is_outside(corner, np.maximum(corner, box.upper[None])).all()
+        lower, upper = random_boxes(root, 300, 0.5, np.random.default_rng(2))
+        low, high = root.contracted(lower, upper)
+        points = box.random(3000, np.random.default_rng(3))
+        held = ((points[:, None] >= lower) & (points[:, None] <= upper)).all(axis=2)
+        kept = ((points[:, None] >= low) & (points[:, None] <= high)).all(axis=2)
+        assert (kept == held).all()
+        assert (low > lower).any()
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, kind: TurnKind) -> None:
+    """Boxes against the values of the search's oracles at samples, which the check does not use."""
+    rng = np.random.default_rng(4)
+    workspace = turned(kind, 20)
+    root, box, joints = pose_root(workspace), pose_box(workspace), ballrows.Joints(*robot)
+    lower, upper = random_boxes(root, 120, 0.03, rng)
+    points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
+    flat = points.reshape(-1, 6)
+    oracles: list[tuple[Oracle, float, float]] = [
+        (SingularValues(robot, box, 11.5, is_condition=False), 1.0, 0.9),
+        (SingularValues(robot, box, 11.5, is_condition=True), -1.0, 2.0),
+        (WorstError(robot, box, is_rotation=False), -1.0, 2.0),
+        (Clearance(robot, box, 0, 2), 1.0, 15.0),
+    ]
+    claims: list[BoxClaim] = [
+        SingularClaim(root, joints, 11.5, 0.9, is_condition=False),
+        SingularClaim(root, joints, 11.5, 2.0, is_condition=True),
+        ErrorClaim(root, joints, 2.0, is_rotation=False),
+        ClearanceClaim(root, joints, (0, 2), 15.0),
+    ]
+    for (oracle, sign, bound), each in zip(oracles, claims, strict=True):
+        least = oracle.values(flat).reshape(30, 120).min(axis=0)
+        holds = each.attempt(lower, upper).holds
+        assert not holds[least < sign * bound].any()
+        # Most boxes on which the number is 6 % better than claimed are shown at once.
+        good = least > sign * bound + 0.06 * bound
+        assert good.any()
+        assert holds[good].mean() > 0.8
+
+
+def test_inverses_hold_those_at_samples(robot: Legs) -> None:
+    rng = np.random.default_rng(8)
+    workspace = turned(TurnKind.ANY_AXIS, 20)
+    root, joints = pose_root(workspace), ballrows.Joints(*robot)
+    lower, upper = random_boxes(root, 60, 0.1, rng)
+    found = inverse_rows(ballrows.ball_rows(root, joints, lower, upper).rows)
+    assert found.known.mean() > 0.5
+    tight = 0
+    for _ in range(10):
+        e = np.round(rng.uniform(-1, 1, (60, 6)))
+        y = 0.5 * (lower + upper) + 0.5 * (upper - lower) * e
+        rows = ballrows.ball_rows(root, joints, y, y).rows.c
+        exact = np.linalg.inv(rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True))
+        off = np.abs(exact - found.P0 - np.einsum("bijk,bk->bij", found.T, e))
+        assert (off <= found.rest + 1e-12)[found.known].all()
+        tight += int((off > 0.05 * found.rest)[found.known].any())
+    assert tight
+
+
+def test_matrices_and_errors_of_second_order() -> None:
+    rng = np.random.default_rng(9)
+    M = rng.normal(size=(300, 6, 6))
+    M = M @ M.transpose(0, 2, 1) - rng.uniform(0, 0.3, (300, 1, 1)) * np.eye(6)
+    least = np.linalg.eigvalsh(M)[:, 0]
+    assert (are_positive(M) == (least > 1e-11)).all()
+    assert 50 < (least > 0).sum() < 250
+    B = rng.uniform(0, 0.3, (300, 6, 6))
+    radius = np.abs(np.linalg.eigvals(B)).max(axis=1)
+    assert (contraction(B).holds == (radius < 1)).mean() > 0.95
+    assert not contraction(B).holds[radius >= 1].any()
+    first = PoseErrors(0.02, 0.003)
+    ours = whole_errors(2.5, 0.375, 0.008, 20.0, 11.5)
+    assert ours == pytest.approx(tuple(with_rest(first, 0.008, 20.0, 11.5)), rel=1e-5)
+    assert ours[0] > 0.02
+    assert whole_errors(2.5, 0.375, 8.0, 20.0, 11.5) == (math.inf, math.inf)
+
+
+def test_signs_of_determinants_are_those_of_rotation_matrices(robot: Legs) -> None:
+    rng = np.random.default_rng(6)
+    for kind in TurnKind:
+        box = pose_box(turned(kind, 60))
+        for y in box.random(20, rng):
+            pose = box.pose(y)
+            arm = robot.platform @ pose.rotation.T
+            span = pose.position + arm - robot.base
+            value = np.linalg.det(np.hstack([span, np.cross(arm, span)]))
+            sign = determinant_sign(kind, box.axis.tolist(), robot.base.tolist(), robot.platform.tolist(), y.tolist())
+            assert sign == np.sign(value)
+
+
+def test_the_check_loads_nothing_of_the_search() -> None:
+    """Loaded in an interpreter of its own: what the check needs of the room, and no engine and no search."""
+    room = "screwsynth.nlp.workspace."
+    script = (
+        f"import sys, screwsynth.nlp.workspace.paper.check\nprint(*[m for m in sys.modules if m.startswith('{room}')])"
+    )
+    run = subprocess.run([sys.executable, "-P", "-c", script], capture_output=True, text=True, check=True)
+    loaded = {name.removeprefix(room) for name in run.stdout.split()}
+    assert {name for name in loaded if not name.startswith("paper")} == {"claims", "machine", "posed"}
+    assert not loaded & {"paper.record", "paper.written"}
+
+
+def test_leaves_that_are_no_boxes_of_the_workspace_count_for_nothing(robot: Legs) -> None:
+    root = pose_root(turned(TurnKind.ANY_AXIS, 20))
+    far = np.concatenate([root.lower[:3], 0.9 * root.upper[3:]])
+    leaves = Leaves(far[None], np.maximum(far, root.upper)[None], np.array([True]))
+    assert show(rank(root, robot), root, leaves) == 0
+
+
+@pytest.mark.slow
+def test_the_shipped_workspace_is_accepted(cli: Run, tmp_path: Path) -> None:
+    result, target = tmp_path / "result.json", tmp_path / "proof.json"
+    code, _, _ = cli("solve", "hexapod-workspace", "--starts", "4", "--json", str(result))
+    assert code == 0
+    arguments = ("--of", str(result), "--gap", "2e-4", "--proof", str(target))
+    code, _, err = cli("workspace", "hexapod-workspace", *arguments)
+    assert (code, err) == (0, "")
+    code, out, err = cli("verify-proof", str(target))
+    assert code == 0, err
+    assert out.startswith("holds: 57 of 57 claims")
