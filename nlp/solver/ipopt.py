@@ -5,6 +5,7 @@ No other module knows Ipopt's strings.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -23,6 +24,17 @@ TOLERANCE = 1e-8
 _SAMPLED = 4
 #: Length of a gradient in scaled variables below which ranges are narrow: an ordinary rotation of 3 degrees has 1e-3.
 _SHORT = 1e-4
+#: Distance from bounds, barrier and multipliers that Ipopt keeps at a point that is optimal already: below its tolerance,
+#: so that it need not leave the point.
+_MARGIN = 1e-9
+_WARM = (
+    "mu_init",
+    "warm_start_bound_push",
+    "warm_start_bound_frac",
+    "warm_start_slack_bound_push",
+    "warm_start_slack_bound_frac",
+    "warm_start_mult_bound_push",
+)
 _REASONS = {
     "Solve_Succeeded": StopReason.SUCCEEDED,
     "Maximum_Iterations_Exceeded": StopReason.ITERATION_LIMIT,
@@ -39,29 +51,67 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
     Raises:
         InputError: the objective is to be compiled, and cannot be.
     """
-    symbols = _scaled_problem(nlp)
-    problem = _compiled_problem(symbols) if search.compiled else symbols
-    functions = [ca.nlpsol("solver", "ipopt", problem, _options(search.max_iterations)) for _ in range(count)]
-    sizes = _constraint_sizes(nlp, points)
-    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale], sizes])
-    lower, upper = nlp.g_lower / sizes, nlp.g_upper / sizes
+    problem = _Problem(nlp, search, points)
+    options = _options(search.max_iterations)
+    return [partial(problem.search, problem.function(options)) for _ in range(count)]
 
-    def search_with(function: ca.Function) -> LocalSearch:
-        def search_one(point: FloatArray) -> SolverResult:
-            scaled = (point - nlp.centre) / nlp.scale
-            result = function(x0=scaled, p=parameters, lbx=-1, ubx=1, lbg=lower, ubg=upper)
-            stats = function.stats()
-            return SolverResult(
-                x=nlp.centre + nlp.scale * result["x"].full().ravel(),
-                bound_multipliers=result["lam_x"].full().ravel(),
-                constraint_multipliers=result["lam_g"].full().ravel() / sizes,
-                reason=_REASONS.get(str(stats["return_status"]), StopReason.OTHER),
-                iterations=int(stats.get("iter_count", 0)),
-            )
 
-        return search_one
+class Confirmation:
+    """Ipopt from points that are optimal already, with their multipliers: where it agrees, it stays there.
 
-    return [search_with(function) for function in functions]
+    Like every search it must be built, and used, in one thread.
+
+    Args:
+        nlp: the program.
+        search: the limit of iterations, and whether functions are to be compiled.
+        points: (k, n) starting points, by which constraints are scaled.
+
+    Raises:
+        InputError: the objective is to be compiled, and cannot be.
+    """
+
+    def __init__(self, nlp: Nlp, search: Search, points: FloatArray) -> None:
+        options = _options(search.max_iterations)
+        options["ipopt"] |= dict.fromkeys(_WARM, _MARGIN) | {"warm_start_init_point": "yes"}
+        self._problem = _Problem(nlp, search, points)
+        self._function = self._problem.function(options)
+
+    def __call__(self, optimum: SolverResult) -> SolverResult:
+        """Search from the point at which another solver stopped."""
+        return self._problem.search(self._function, optimum.x, optimum)
+
+
+class _Problem:
+    """A program over scaled variables as Ipopt gets it, and the numbers with which it is scaled."""
+
+    def __init__(self, nlp: Nlp, search: Search, points: FloatArray) -> None:
+        self._nlp, symbols = nlp, _scaled_problem(nlp)
+        self._problem = _compiled_problem(symbols) if search.compiled else symbols
+        self._sizes = _constraint_sizes(nlp, points)
+        weight = [nlp.sign / nlp.objective_scale]
+        self._parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, weight, self._sizes])
+        self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes
+
+    def function(self, options: dict[str, Any]) -> ca.Function:
+        """Return a new solver, for one thread."""
+        return ca.nlpsol("solver", "ipopt", self._problem, options)
+
+    def search(self, function: ca.Function, point: FloatArray, optimum: SolverResult | None = None) -> SolverResult:
+        """Search from a point (n,), with the multipliers of an optimum where one is given."""
+        nlp, sizes = self._nlp, self._sizes
+        scaled = (point - nlp.centre) / nlp.scale
+        given: dict[str, Any] = {"x0": scaled, "p": self._parameters, "lbg": self._lower, "ubg": self._upper}
+        if optimum is not None:
+            given |= {"lam_x0": optimum.bound_multipliers, "lam_g0": optimum.constraint_multipliers * sizes}
+        result = function(lbx=-1, ubx=1, **given)
+        stats = function.stats()
+        return SolverResult(
+            x=nlp.centre + nlp.scale * result["x"].full().ravel(),
+            bound_multipliers=result["lam_x"].full().ravel(),
+            constraint_multipliers=result["lam_g"].full().ravel() / sizes,
+            reason=_REASONS.get(str(stats["return_status"]), StopReason.OTHER),
+            iterations=int(stats.get("iter_count", 0)),
+        )
 
 
 def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
