@@ -53,8 +53,8 @@ _PARTS = {
     "-batch.c": "batch.c",
     ".hpp": "api.hpp",
 }
-#: Endings of the files of the search, which are C as they are: the extension of ``nlp/screening`` is built from the same
-#: files. A folder has the case's prefix in the place of their names' own.
+#: Endings of the files of the search, which are C as they are: the extension of ``nlp/screening`` is made of them too.
+#: A folder has the case's prefix in the place of their own.
 _CORE = ("-sqp.h", "-search.h", "-sqp.c", "-step.c", "-restore.c", "-qp.c")
 _CORE_PREFIX = "screwsynth"
 #: Files of every folder whose names do not begin with the prefix.

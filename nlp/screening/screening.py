@@ -66,7 +66,7 @@ def can_screen(nlp: Nlp) -> bool:
     return small and extension() is not None and evaluator() is not None
 
 
-def screen(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None = None) -> Screened:
+def screen(nlp: Nlp, points: FloatArray, sizes: FloatArray, max_iterations: int, jobs: int | None = None) -> Screened:
     """Search a program from each of several points.
 
     A search that is requested to stop ends at once, and counts as not converged.
@@ -74,6 +74,7 @@ def screen(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None =
     Args:
         nlp: the program, for which :func:`can_screen` holds.
         points: (k, n) starting points, in the program's units.
+        sizes: (c,) typical lengths of the constraints' gradients in scaled variables, by which they are divided.
         max_iterations: largest number of iterations of each search.
         jobs: number of threads; left out, as many as there are processors and work.
     """
@@ -86,7 +87,7 @@ def screen(nlp: Nlp, points: FloatArray, max_iterations: int, jobs: int | None =
     stop = np.zeros(1, dtype=np.intc)
     chunks = [(first, min(first + _CHUNK, count)) for first in range(0, count, _CHUNK)]
     threads = max(1, min(jobs if jobs is not None else os.cpu_count() or 1, len(chunks)))
-    programs = [_Program(nlp, address, min(max_iterations, _ITERATIONS)) for _ in range(threads)]
+    programs = [_Program(nlp, sizes, address, min(max_iterations, _ITERATIONS)) for _ in range(threads)]
     # Also a single thread leaves this one free to see a request to stop.
     pool = ThreadPoolExecutor(threads)
 
@@ -116,11 +117,12 @@ class _Program:
 
     Args:
         nlp: the program.
+        sizes: (c,) those of the constraints.
         address: that of the function that evaluates CasADi's buffers.
         max_iterations: largest number of iterations of each search.
     """
 
-    def __init__(self, nlp: Nlp, address: int, max_iterations: int) -> None:
+    def __init__(self, nlp: Nlp, sizes: FloatArray, address: int, max_iterations: int) -> None:
         n, c = nlp.n, len(nlp.program.constraints)
         x, factor, multipliers = np.zeros(n), np.zeros(1), np.zeros(c)
         arguments = np.array(nlp.arguments, dtype=np.float64)
@@ -129,8 +131,6 @@ class _Program:
             buffer_of(nlp.program.hessian, x, arguments, factor, multipliers),
         )
         derivatives, hessian = self.kept
-        # Divided by these, the gradients of constraints are of order 1.
-        sizes = np.where(nlp.row_sizes > 0, nlp.row_sizes, 1.0)
         constants = (nlp.centre, nlp.scale, nlp.lower, nlp.upper, sizes, nlp.g_lower / sizes, nlp.g_upper / sizes)
         weight = nlp.sign / nlp.objective_scale
         self.packed: tuple[Any, ...] = (

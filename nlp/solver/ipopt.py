@@ -6,11 +6,11 @@ No other module knows Ipopt's strings.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import MX, SX
 
 from ...models import FloatArray
 from ..case.settings import Search
@@ -24,8 +24,8 @@ TOLERANCE = 1e-8
 _SAMPLED = 4
 #: Length of a gradient in scaled variables below which ranges are narrow: an ordinary rotation of 3 degrees has 1e-3.
 _SHORT = 1e-4
-#: Distance from bounds, barrier and multipliers that Ipopt keeps at a point that is optimal already: below its tolerance,
-#: so that it need not leave the point.
+#: Distance from bounds, barrier and multipliers that Ipopt keeps at a point that is optimal already: below its
+#: tolerance, so that it need not leave the point.
 _MARGIN = 1e-9
 _WARM = (
     "mu_init",
@@ -51,7 +51,7 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
     Raises:
         InputError: the objective is to be compiled, and cannot be.
     """
-    problem = _Problem(nlp, search, points)
+    problem = _Problem(nlp, search, constraint_sizes(nlp, points))
     options = _options(search.max_iterations)
     return [partial(problem.search, problem.function(options)) for _ in range(count)]
 
@@ -59,21 +59,27 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
 class Confirmation:
     """Ipopt from points that are optimal already, with their multipliers: where it agrees, it stays there.
 
-    Like every search it must be built, and used, in one thread.
+    Its derivatives are the program's own functions, which exist by then; differentiating once more takes longer than a
+    search. Like every search it must be built, and used, in one thread.
 
     Args:
         nlp: the program.
         search: the limit of iterations, and whether functions are to be compiled.
-        points: (k, n) starting points, by which constraints are scaled.
+        sizes: (c,) those of the constraints, by :func:`constraint_sizes`.
 
     Raises:
         InputError: the objective is to be compiled, and cannot be.
     """
 
-    def __init__(self, nlp: Nlp, search: Search, points: FloatArray) -> None:
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
         options = _options(search.max_iterations)
         options["ipopt"] |= dict.fromkeys(_WARM, _MARGIN) | {"warm_start_init_point": "yes"}
-        self._problem = _Problem(nlp, search, points)
+        if search.compiled:
+            self._problem = _Problem(nlp, search, sizes)
+        else:
+            given = _given_derivatives(nlp)
+            self._problem = _Problem(nlp, search, sizes, given.problem)
+            options |= given.options
         self._function = self._problem.function(options)
 
     def __call__(self, optimum: SolverResult) -> SolverResult:
@@ -82,12 +88,19 @@ class Confirmation:
 
 
 class _Problem:
-    """A program over scaled variables as Ipopt gets it, and the numbers with which it is scaled."""
+    """A program over scaled variables as Ipopt gets it, and the numbers with which it is scaled.
 
-    def __init__(self, nlp: Nlp, search: Search, points: FloatArray) -> None:
-        self._nlp, symbols = nlp, _scaled_problem(nlp)
-        self._problem = _compiled_problem(symbols) if search.compiled else symbols
-        self._sizes = _constraint_sizes(nlp, points)
+    Args:
+        nlp: the program.
+        search: whether functions are to be compiled.
+        sizes: (c,) those of the constraints.
+        symbols: the problem by CasADi's keys; that of :func:`_scaled_problem` where left out.
+    """
+
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray, symbols: dict[str, MX] | None = None) -> None:
+        problem = symbols or _scaled_problem(nlp)
+        self._nlp, self._sizes = nlp, sizes
+        self._problem = _compiled_problem(problem) if search.compiled else problem
         weight = [nlp.sign / nlp.objective_scale]
         self._parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, weight, self._sizes])
         self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes
@@ -114,7 +127,44 @@ class _Problem:
         )
 
 
-def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
+class _Given(NamedTuple):
+    """A problem by CasADi's keys, and options with its derivatives."""
+
+    problem: dict[str, MX]
+    options: dict[str, Any]
+
+
+def _given_derivatives(nlp: Nlp) -> _Given:
+    """Return the problem of :func:`_scaled_problem` as calls of the program's functions, with those of derivatives."""
+    program, n, c = nlp.program, nlp.n, len(nlp.program.constraints)
+    counts = [len(program.arguments), n, n, 1, c]
+    s, parameters, factor, multipliers = MX.sym("s", n), MX.sym("p", sum(counts)), MX.sym("factor"), MX.sym("m", c)
+    p, centre, scale, weight, sizes = ca.vertsplit(parameters, np.cumsum([0, *counts]).tolist())
+    x = centre + scale * s
+    F, gradient, g, jacobian = program.derivatives(x, p)
+    hessian = program.hessian(x, p, factor * weight, multipliers / sizes)
+    names = ["x", "p"]
+    options: dict[str, Any] = {
+        "grad_f": ca.Function(
+            "nlp_grad_f", [s, parameters], [weight * F, weight * gradient.T * scale], names, ["f", "grad_f_x"]
+        ),
+        "hess_lag": ca.Function(
+            "nlp_hess_l",
+            [s, parameters, factor, multipliers],
+            [ca.triu(hessian * (scale @ scale.T))],
+            [*names, "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        ),
+    }
+    rows = jacobian * ca.repmat(scale.T, c, 1) / ca.repmat(sizes, 1, n)
+    # CasADi would differentiate once more, for multipliers that are not asked for.
+    options["no_nlp_grad"] = True
+    options["jac_g"] = ca.Function("nlp_jac_g", [s, parameters], [g / sizes, rows], names, ["g", "jac_g_x"])
+    values = program.values(x, p)
+    return _Given({"x": s, "p": parameters, "f": weight * values[0], "g": values[1] / sizes}, options)
+
+
+def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
     """Return (c,) typical lengths of each limit's gradient in scaled variables; divided by them, rows are of order 1.
 
     The program's other constraints are of order 1 already, and have 1, except where narrow ranges make them small.

@@ -1,7 +1,7 @@
 """Starts that are screened: each is searched by sequential quadratic programming in C, and Ipopt has the last word.
 
-The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Every distinct point that it finds is
-given to Ipopt, with its multipliers, and it is Ipopt's point that is corrected and judged. A start from which the
+The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Every distinct optimum that it finds
+is given to Ipopt, with its multipliers: what Ipopt confirms, or finds from there, is the answer. A start from which the
 search in C does not converge, or whose end the program's own conditions refuse, is searched by Ipopt from the
 beginning, so that no start is lost.
 """
@@ -17,7 +17,8 @@ from ..interruption import is_requested
 from ..program.nlp import Nlp
 from ..screening.screening import Screened, can_screen, screen
 from .interface import Solver, SolverResult, StopReason
-from .ipopt import Confirmation, ipopt
+from .ipopt import Confirmation, constraint_sizes, ipopt
+from .optima import same_value
 from .starts import SAME_F, Start, StartStatus, judge, known_optimum, search_from
 
 #: Name of the search in C as the solver that ended a start.
@@ -45,8 +46,9 @@ def search_each(
     if solver is not ipopt or not search.screen or not can_screen(nlp):
         yield from search_from(nlp, points, search, jobs, solver)
         return
-    found = screen(nlp, points, search.max_iterations, jobs)
-    confirmed = _Confirmed(nlp, search, points)
+    sizes = constraint_sizes(nlp, points)
+    found = screen(nlp, points, sizes, search.max_iterations, jobs)
+    confirmed = _Confirmed(nlp, search, sizes)
     starts: list[Start | None] = []
     for k in range(len(points)):
         if is_requested():
@@ -70,14 +72,17 @@ def search_each(
 class _Confirmed:
     """Starts that the search in C brought to an optimum, and that Ipopt confirms.
 
+    Of points of one F, as on a connected set of optima, Ipopt confirms the first, and each that is better even by
+    rounding, so that a best one is always Ipopt's.
+
     Args:
         nlp: the program.
         search: the solver's settings.
-        points: (k, n) starting points, by which Ipopt's problem is scaled.
+        sizes: (c,) those of the constraints; see :func:`~screwsynth.nlp.solver.ipopt.constraint_sizes`.
     """
 
-    def __init__(self, nlp: Nlp, search: Search, points: FloatArray) -> None:
-        self._nlp, self._search, self._points = nlp, search, points
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
+        self._nlp, self._search, self._sizes = nlp, search, sizes
         self._confirmation: Confirmation | None = None
         self._known: list[Start] = []
 
@@ -102,18 +107,29 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the start whose search in C ended at an optimum; None where its end is none by the program's conditions.
+        """Return the start whose search in C ended at a point; None where the program's conditions refuse it.
 
         Ipopt's point counts unless Ipopt fails from there, or leaves for a worse one.
         """
         nlp = self._nlp
+        own = replace(judge(nlp, screened), solver=SCREEN)
+        is_good = own.status is StartStatus.CONVERGED
+        if is_good and self._is_of_known_value(own):
+            return own
         if self._confirmation is None:
-            self._confirmation = Confirmation(nlp, self._search, self._points)
-        confirmed = self._confirmation(screened)
-        best = nlp.sign * nlp.evaluate(screened.x)[0] + SAME_F * nlp.objective_scale
-        for result, name in ((confirmed, "ipopt"), (screened, SCREEN)):
-            start = judge(nlp, result)
-            if start.status is StartStatus.CONVERGED and nlp.sign * start.F <= best:
-                iterations = screened.iterations + (confirmed.iterations if name == "ipopt" else 0)
-                return replace(start, iterations=iterations, solver=name)
-        return None
+            self._confirmation = Confirmation(nlp, self._search, self._sizes)
+        result = self._confirmation(screened)
+        iterations = screened.iterations + result.iterations
+        if is_good and result.reason is StopReason.SUCCEEDED and known_optimum(nlp, result.x, [own]) is not None:
+            return replace(own, iterations=iterations, solver=ipopt.__name__)
+        confirmed = replace(judge(nlp, result), iterations=iterations)
+        if confirmed.status is not StartStatus.CONVERGED:
+            return own if is_good else None
+        loss = nlp.sign * (confirmed.F - own.F)
+        return own if is_good and loss > SAME_F * nlp.objective_scale else confirmed
+
+    def _is_of_known_value(self, start: Start) -> bool:
+        """Return whether Ipopt has confirmed a point of the same F that is at least as good."""
+        tolerance, sign = same_value(self._nlp), self._nlp.sign
+        known = (sign * (start.F - each.F) for each in self._known if each.solver != SCREEN)
+        return any(0 <= worse <= tolerance for worse in known)

@@ -31,6 +31,8 @@ _NEAR = 1e-2
 #: parts follow.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
+#: Stationarity and violation that are rounding error: a correction would change nothing.
+_EXACT = 1e-13
 #: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
 _WORSE = 1e-8
 #: Two optima are the same when their points differ by less than this, in half ranges.
@@ -168,7 +170,8 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     stationarity = multipliers(at, at.active())[1]
-    for share in _SHARES if np.isfinite(raw.violation) else ():
+    is_exact = stationarity <= _EXACT and raw.violation <= _EXACT
+    for share in _SHARES if np.isfinite(raw.violation) and not is_exact else ():
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
         # A correction that makes F worse leads to another stationary point.
