@@ -36,9 +36,10 @@ class Buffer(NamedTuple):
 @cache
 def evaluator() -> int | None:
     """Return the address of the C function that evaluates a buffer; None where CasADi's library does not export it."""
+    interface: Any = ca
     try:
         # The library of the Python interface is loaded already; a symbol is also looked for in those that it needs.
-        found: Any = getattr(ctypes.CDLL(ca._casadi.__file__), _SYMBOL)
+        found: Any = getattr(ctypes.CDLL(interface._casadi.__file__), _SYMBOL)
     except (OSError, AttributeError):
         return None
     return ctypes.cast(found, ctypes.c_void_p).value
@@ -51,6 +52,7 @@ def buffer_of(function: ca.Function, *inputs: FloatArray) -> Buffer:
         function: the function, made of ``SX``.
         inputs: memory of each input, which the function reads when it is evaluated.
     """
+    buffer: Any
     buffer, _ = function.buffer()
     outputs = tuple(np.zeros(function.numel_out(i)) for i in range(function.n_out()))
     for index, array in enumerate(inputs):

@@ -98,9 +98,13 @@ class _Problem:
     """
 
     def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray, symbols: dict[str, MX] | None = None) -> None:
-        problem = symbols or _scaled_problem(nlp)
         self._nlp, self._sizes = nlp, sizes
-        self._problem = _compiled_problem(problem) if search.compiled else problem
+        self._problem: str | dict[str, MX] | dict[str, SX]
+        if symbols is not None:
+            self._problem = symbols
+        else:
+            own = _scaled_problem(nlp)
+            self._problem = _compiled_problem(own) if search.compiled else own
         weight = [nlp.sign / nlp.objective_scale]
         self._parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, weight, self._sizes])
         self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes

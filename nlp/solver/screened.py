@@ -23,6 +23,9 @@ from .starts import SAME_F, Start, StartStatus, judge, known_optimum, search_fro
 
 #: Name of the search in C as the solver that ended a start.
 SCREEN = "sqp"
+#: Starts that are screened before the first of them is confirmed: few, so that long searches show progress and answer
+#: a request to stop with what they have.
+_BLOCK = 32
 
 
 def search_each(
@@ -46,9 +49,18 @@ def search_each(
     if solver is not ipopt or not search.screen or not can_screen(nlp):
         yield from search_from(nlp, points, search, jobs, solver)
         return
-    sizes = constraint_sizes(nlp, points)
-    found = screen(nlp, points, sizes, search.max_iterations, jobs)
-    confirmed = _Confirmed(nlp, search, sizes)
+    confirmed = _Confirmed(nlp, search, constraint_sizes(nlp, points))
+    for first in range(0, len(points), _BLOCK):
+        yield from _search_block(nlp, points[first : first + _BLOCK], search, jobs, confirmed)
+        if is_requested():
+            return
+
+
+def _search_block(
+    nlp: Nlp, points: FloatArray, search: Search, jobs: int | None, confirmed: _Confirmed
+) -> Iterator[Start]:
+    """Screen points, and yield their starts in order; those that are done, where the work is requested to stop."""
+    found = screen(nlp, points, confirmed.sizes, search.max_iterations, jobs)
     starts: list[Start | None] = []
     for k in range(len(points)):
         if is_requested():
@@ -59,10 +71,9 @@ def search_each(
             yield start
     if None not in starts:
         return
-    first = starts.index(None)
     left = [k for k, start in enumerate(starts) if start is None]
-    searched = search_from(nlp, points[left], search, jobs, solver)
-    for start in starts[first:]:
+    searched = search_from(nlp, points[left], search, jobs)
+    for start in starts[left[0] :]:
         following = start or next(searched, None)
         if following is None:  # interrupted
             return
@@ -82,7 +93,7 @@ class _Confirmed:
     """
 
     def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
-        self._nlp, self._search, self._sizes = nlp, search, sizes
+        self._nlp, self._search, self.sizes = nlp, search, sizes
         self._confirmation: Confirmation | None = None
         self._known: list[Start] = []
 
@@ -117,7 +128,7 @@ class _Confirmed:
         if is_good and self._is_of_known_value(own):
             return own
         if self._confirmation is None:
-            self._confirmation = Confirmation(nlp, self._search, self._sizes)
+            self._confirmation = Confirmation(nlp, self._search, self.sizes)
         result = self._confirmation(screened)
         iterations = screened.iterations + result.iterations
         if is_good and result.reason is StopReason.SUCCEEDED and known_optimum(nlp, result.x, [own]) is not None:
