@@ -31,7 +31,7 @@ _NEAR = 1e-2
 #: parts follow.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
-#: Stationarity and violation that are rounding error: a correction would change nothing.
+#: Stationarity, violation and distance from active sides that are rounding error: a correction would change nothing.
 _EXACT = 1e-13
 #: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
 _WORSE = 1e-8
@@ -169,8 +169,10 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     """Correct the point at which a solver stopped, and judge it by the program's own conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
-    stationarity = multipliers(at, at.active())[1]
-    is_exact = stationarity <= _EXACT and raw.violation <= _EXACT
+    active = at.active()
+    stationarity = multipliers(at, active)[1]
+    off = max(raw.violation, float(np.abs(raw.slack[list(active)]).max(initial=0.0)))
+    is_exact = max(stationarity, off) <= _EXACT
     for share in _SHARES if np.isfinite(raw.violation) and not is_exact else ():
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
