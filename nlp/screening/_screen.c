@@ -3,6 +3,7 @@
  * The search is that of nlp/embedding/c: the same source. CasADi evaluates the functions: its buffers are called through a C
  * pointer, so that no line of Python runs and other threads may. Each thread has buffers and a workspace of its own.
  */
+#define Py_LIMITED_API 0x030B0000
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <math.h>
