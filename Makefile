@@ -45,4 +45,4 @@ figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py
 
 clean: ## remove the environment and all build results
-	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so nlp/workspace/_workspace*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so nlp/workspace/_workspace*.so nlp/screening/_screen*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

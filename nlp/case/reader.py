@@ -157,7 +157,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,
-        search=Search(search.starts, search.seed, search.max_iterations),
+        search=Search(search.starts, search.seed, search.max_iterations, screen=search.screen),
         method=method,
         title=written.title,
         name=name,

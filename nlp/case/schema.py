@@ -246,6 +246,9 @@ class SolveTable(Table):
     starts: int = Field(default=Search.starts, ge=1, le=100_000, description="number of starting points")
     seed: int = Field(default=Search.seed, ge=0, description="seed of the random ones")
     max_iterations: int = Field(default=Search.max_iterations, ge=1, le=1_000_000, description="limit for each start")
+    screen: bool = Field(
+        default=Search.screen, description="whether a quick search in C finds the optima that Ipopt confirms"
+    )
 
 
 class ExpectedValueTable(Table):

@@ -17,6 +17,8 @@ class Search:
         max_iterations: the solver's limit for each start.
         compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. Compiled C
             needs a C compiler, and a second or two the first time.
+        screen: whether a quick search in C finds the optima from the starts, which Ipopt then confirms, instead of
+            Ipopt from each start. Where that search does not apply, Ipopt searches from each start.
 
     Raises:
         CaseError: a number is not whole, or too small.
@@ -26,6 +28,7 @@ class Search:
     seed: int = 0
     max_iterations: int = 500
     compiled: bool = False
+    screen: bool = True
 
     def __post_init__(self) -> None:
         for key, value, least in (
@@ -51,6 +54,7 @@ class Search:
             self.seed if seed is None else seed,
             self.max_iterations,
             self.compiled or compiled,
+            self.screen,
         )
 
 

@@ -83,7 +83,8 @@ def _lines(case: Case) -> Iterator[str]:
     if case.workspace is not None:
         yield from toml_table("[workspace]", case.workspace.to_keys(case.units))
     search, default = case.search, Search()
-    settings = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
+    settings: dict[str, int] = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
+    settings["screen"] = search.screen
     yield from toml_table("[solve]", {key: value for key, value in settings.items() if value != getattr(default, key)})
     yield from _expectation(case.expect)
     for row in case.published:

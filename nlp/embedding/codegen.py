@@ -8,6 +8,7 @@ and versions give the same bytes.
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -47,16 +48,15 @@ _PARTS = {
     "-solver.c": "solver.c",
     "-scaled.h": "scaled.h",
     "-scaled.c": "scaled.c",
-    "-sqp.h": "sqp.h",
-    "-search.h": "search.h",
-    "-sqp.c": "sqp.c",
-    "-step.c": "step.c",
-    "-restore.c": "restore.c",
-    "-qp.c": "qp.c",
+    "-functions.h": "functions.h",
     "-limits.c": "limits.c",
     "-batch.c": "batch.c",
     ".hpp": "api.hpp",
 }
+#: Endings of the files of the search, which are C as they are: the extension of ``nlp/screening`` is made of them too.
+#: A folder has the case's prefix in the place of their own.
+_CORE = ("-sqp.h", "-search.h", "-sqp.c", "-step.c", "-restore.c", "-qp.c")
+_CORE_PREFIX = "screwsynth"
 #: Files of every folder whose names do not begin with the prefix.
 _OTHERS = (
     *("selftest.c", "stack.c", "bench.c", "example.c", "example.cpp", "realtime.c", "sfunction.c"),
@@ -99,11 +99,12 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         parts["-loops.c"] = "loops.c"
     if staged.loops.spectra:
         parts["-spectrum.c"] = "spectrum.c"
-    sources = [f"{prefix}{ending}" for ending in (*parts, "-casadi.c") if ending.endswith(".c")]
-    headers = [f"{prefix}{ending}" for ending in (*parts, "-casadi.h") if ending.endswith(".h")]
+    sources = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.c") if ending.endswith(".c")]
+    headers = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.h") if ending.endswith(".h")]
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
     names["headers"] = " ".join(headers)
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
+    files |= {f"{prefix}{ending}": _core_text(ending, prefix, names) for ending in _CORE}
     for name in _OTHERS:
         files[name] = _fill_template(f"{name}.in", names)
     casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
@@ -136,6 +137,14 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
 def _fill_template(template: str, names: dict[str, str]) -> str:
     """Return a template's text with its placeholders replaced."""
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
+
+
+def _core_text(ending: str, prefix: str, names: Mapping[str, str]) -> str:
+    """Return the text of a file of the search, with a case's prefix and with the constants of :mod:`.worstcase`."""
+    text = (_TEMPLATES / f"{_CORE_PREFIX}{ending}").read_text(encoding="utf-8")
+    text = re.sub(r"(?<=#define TRIALS )\d+", names["trials"], text)
+    text = re.sub(r"(?<=parts\[\] = \{)[^}]+", names["parts"], text)
+    return text.replace(_CORE_PREFIX, prefix).replace(_CORE_PREFIX.upper(), prefix.upper())
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:

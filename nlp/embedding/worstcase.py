@@ -1,6 +1,6 @@
 """Largest numbers of iterations and evaluations of a solve in C, from the constants of the solver.
 
-The templates take the constants from here, so that the bounds and the solver cannot differ.
+The generated C takes the constants from here, so that the bounds and the solver cannot differ.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...models import FloatArray
 from ..program.nlp import Nlp, Side
+from .equations import gradient_sizes, linearise_equations
 from .linalg import nonnegative_least_squares
 
 #: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
@@ -104,10 +105,7 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     F, gradient, g, jacobian = nlp.program.kernels.derivatives(x, nlp.arguments)
     sides, scale = nlp.sides, nlp.scale
     rows = jacobian * scale
-    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    # Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
-    typical = np.where(nlp.row_sizes > 0, np.minimum(nlp.row_sizes, 1.0), 1.0)
-    sizes = np.where(sizes > NO_GRADIENT * typical, sizes, typical)
+    sizes = gradient_sizes(rows, nlp.row_sizes, NO_GRADIENT)
     per_unit = 1 / np.concatenate([scale, sizes])[sides.place]
     residual = sides.sign * (np.concatenate([x, g.ravel()])[sides.place] - sides.limit) * per_unit
     outward = sides.sign * per_unit
@@ -308,20 +306,21 @@ def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
     Returns:
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
     """
-    start = linearise(nlp, x)
     rows = np.flatnonzero(nlp.sides.equal)
+    start = linearise_equations(nlp, rows, x, NO_GRADIENT)
     if not len(rows):
         return start.x
     at = start
     for movable in _movable(nlp):
         at = start
         for _ in range(_NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS):
-            if np.max(np.abs(at.residual[rows])) <= _ROUNDING or not np.isfinite(at.violation):
+            if np.max(np.abs(at.residual)) <= _ROUNDING or not at.is_defined:
                 break
             step = np.zeros(nlp.n)
-            step[movable] = np.linalg.lstsq(at.normals[rows][:, movable], -at.residual[rows], rcond=None)[0]
-            at = linearise(nlp, np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper))
-        if np.max(np.abs(at.residual[rows])) <= FEASIBLE:
+            step[movable] = np.linalg.lstsq(at.normals[:, movable], -at.residual, rcond=None)[0]
+            moved = np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper)
+            at = linearise_equations(nlp, rows, moved, NO_GRADIENT)
+        if np.max(np.abs(at.residual)) <= FEASIBLE:
             break
     return at.x
 

@@ -5,11 +5,12 @@ No other module knows Ipopt's strings.
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import MX, SX
 
 from ...models import FloatArray
 from ..case.settings import Search
@@ -23,6 +24,17 @@ TOLERANCE = 1e-8
 _SAMPLED = 4
 #: Length of a gradient in scaled variables below which ranges are narrow: an ordinary rotation of 3 degrees has 1e-3.
 _SHORT = 1e-4
+#: Distance from bounds, barrier and multipliers that Ipopt keeps at a point that is optimal already: below its
+#: tolerance, so that it need not leave the point.
+_MARGIN = 1e-9
+_WARM = (
+    "mu_init",
+    "warm_start_bound_push",
+    "warm_start_bound_frac",
+    "warm_start_slack_bound_push",
+    "warm_start_slack_bound_frac",
+    "warm_start_mult_bound_push",
+)
 _REASONS = {
     "Solve_Succeeded": StopReason.SUCCEEDED,
     "Maximum_Iterations_Exceeded": StopReason.ITERATION_LIMIT,
@@ -39,32 +51,124 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
     Raises:
         InputError: the objective is to be compiled, and cannot be.
     """
-    symbols = _scaled_problem(nlp)
-    problem = _compiled_problem(symbols) if search.compiled else symbols
-    functions = [ca.nlpsol("solver", "ipopt", problem, _options(search.max_iterations)) for _ in range(count)]
-    sizes = _constraint_sizes(nlp, points)
-    parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, [nlp.sign / nlp.objective_scale], sizes])
-    lower, upper = nlp.g_lower / sizes, nlp.g_upper / sizes
-
-    def search_with(function: ca.Function) -> LocalSearch:
-        def search_one(point: FloatArray) -> SolverResult:
-            scaled = (point - nlp.centre) / nlp.scale
-            result = function(x0=scaled, p=parameters, lbx=-1, ubx=1, lbg=lower, ubg=upper)
-            stats = function.stats()
-            return SolverResult(
-                x=nlp.centre + nlp.scale * result["x"].full().ravel(),
-                bound_multipliers=result["lam_x"].full().ravel(),
-                constraint_multipliers=result["lam_g"].full().ravel() / sizes,
-                reason=_REASONS.get(str(stats["return_status"]), StopReason.OTHER),
-                iterations=int(stats.get("iter_count", 0)),
-            )
-
-        return search_one
-
-    return [search_with(function) for function in functions]
+    problem = _Problem(nlp, search, constraint_sizes(nlp, points))
+    options = _options(search.max_iterations)
+    return [partial(problem.search, problem.function(options)) for _ in range(count)]
 
 
-def _constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
+class Confirmation:
+    """Ipopt from points that are optimal already, with their multipliers: where it agrees, it stays there.
+
+    Its derivatives are the program's own functions, which exist by then; differentiating once more takes longer than a
+    search. Like every search it must be built, and used, in one thread.
+
+    Args:
+        nlp: the program.
+        search: the limit of iterations, and whether functions are to be compiled.
+        sizes: (c,) those of the constraints, by :func:`constraint_sizes`.
+
+    Raises:
+        InputError: the objective is to be compiled, and cannot be.
+    """
+
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
+        options = _options(search.max_iterations)
+        options["ipopt"] |= dict.fromkeys(_WARM, _MARGIN) | {"warm_start_init_point": "yes"}
+        if search.compiled:
+            self._problem = _Problem(nlp, search, sizes)
+        else:
+            given = _given_derivatives(nlp)
+            self._problem = _Problem(nlp, search, sizes, given.problem)
+            options |= given.options
+        self._function = self._problem.function(options)
+
+    def __call__(self, optimum: SolverResult) -> SolverResult:
+        """Search from the point at which another solver stopped."""
+        return self._problem.search(self._function, optimum.x, optimum)
+
+
+class _Problem:
+    """A program over scaled variables as Ipopt gets it, and the numbers with which it is scaled.
+
+    Args:
+        nlp: the program.
+        search: whether functions are to be compiled.
+        sizes: (c,) those of the constraints.
+        symbols: the problem by CasADi's keys; that of :func:`_scaled_problem` where left out.
+    """
+
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray, symbols: dict[str, MX] | None = None) -> None:
+        self._nlp, self._sizes = nlp, sizes
+        self._problem: str | dict[str, MX] | dict[str, SX]
+        if symbols is not None:
+            self._problem = symbols
+        else:
+            own = _scaled_problem(nlp)
+            self._problem = _compiled_problem(own) if search.compiled else own
+        weight = [nlp.sign / nlp.objective_scale]
+        self._parameters = np.concatenate([nlp.arguments, nlp.centre, nlp.scale, weight, self._sizes])
+        self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes
+
+    def function(self, options: dict[str, Any]) -> ca.Function:
+        """Return a new solver, for one thread."""
+        return ca.nlpsol("solver", "ipopt", self._problem, options)
+
+    def search(self, function: ca.Function, point: FloatArray, optimum: SolverResult | None = None) -> SolverResult:
+        """Search from a point (n,), with the multipliers of an optimum where one is given."""
+        nlp, sizes = self._nlp, self._sizes
+        scaled = (point - nlp.centre) / nlp.scale
+        given: dict[str, Any] = {"x0": scaled, "p": self._parameters, "lbg": self._lower, "ubg": self._upper}
+        if optimum is not None:
+            given |= {"lam_x0": optimum.bound_multipliers, "lam_g0": optimum.constraint_multipliers * sizes}
+        result = function(lbx=-1, ubx=1, **given)
+        stats = function.stats()
+        return SolverResult(
+            x=nlp.centre + nlp.scale * result["x"].full().ravel(),
+            bound_multipliers=result["lam_x"].full().ravel(),
+            constraint_multipliers=result["lam_g"].full().ravel() / sizes,
+            reason=_REASONS.get(str(stats["return_status"]), StopReason.OTHER),
+            iterations=int(stats.get("iter_count", 0)),
+        )
+
+
+class _Given(NamedTuple):
+    """A problem by CasADi's keys, and options with its derivatives."""
+
+    problem: dict[str, MX]
+    options: dict[str, Any]
+
+
+def _given_derivatives(nlp: Nlp) -> _Given:
+    """Return the problem of :func:`_scaled_problem` as calls of the program's functions, with those of derivatives."""
+    program, n, c = nlp.program, nlp.n, len(nlp.program.constraints)
+    counts = [len(program.arguments), n, n, 1, c]
+    s, parameters, factor, multipliers = MX.sym("s", n), MX.sym("p", sum(counts)), MX.sym("factor"), MX.sym("m", c)
+    p, centre, scale, weight, sizes = ca.vertsplit(parameters, np.cumsum([0, *counts]).tolist())
+    x = centre + scale * s
+    F, gradient, g, jacobian = program.derivatives(x, p)
+    hessian = program.hessian(x, p, factor * weight, multipliers / sizes)
+    names = ["x", "p"]
+    options: dict[str, Any] = {
+        "grad_f": ca.Function(
+            "nlp_grad_f", [s, parameters], [weight * F, weight * gradient.T * scale], names, ["f", "grad_f_x"]
+        ),
+        "hess_lag": ca.Function(
+            "nlp_hess_l",
+            [s, parameters, factor, multipliers],
+            [ca.triu(hessian * (scale @ scale.T))],
+            [*names, "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        ),
+    }
+    rows = jacobian * ca.repmat(scale.T, c, 1) / ca.repmat(sizes, 1, n)
+    # CasADi would differentiate once more, for multipliers that are not asked for.
+    options["no_nlp_grad"] = True
+    options["jac_g"] = ca.Function("nlp_jac_g", [s, parameters], [g / sizes, rows], names, ["g", "jac_g_x"])
+    values = program.values(x, p)
+    return _Given({"x": s, "p": parameters, "f": weight * values[0], "g": values[1] / sizes}, options)
+
+
+def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
     """Return (c,) typical lengths of each limit's gradient in scaled variables; divided by them, rows are of order 1.
 
     The program's other constraints are of order 1 already, and have 1, except where narrow ranges make them small.

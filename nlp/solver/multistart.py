@@ -32,7 +32,8 @@ from .interface import Solver
 from .ipopt import ipopt
 from .optima import Optimum, distinct_optima
 from .phase import Phase, PhaseProgress, no_phase
-from .starts import Start, StartStatus, search_from
+from .screened import search_each
+from .starts import Start, StartStatus
 from .status import Status
 
 #: A point better than the best optimum by more than this part of F's scale is better by more than rounding.
@@ -181,7 +182,7 @@ def _search(
     while left and not is_requested():
         phase(Phase.STARTS, len(found), len(points))
         # Interrupted searches end before the last point.
-        for k, start in zip(left, search_from(nlp, points[left], search, jobs, solver), strict=False):
+        for k, start in zip(left, search_each(nlp, points[left], search, jobs, solver), strict=False):
             if not found and start.status is StartStatus.CONVERGED:
                 _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
             found[k] = start

@@ -31,13 +31,15 @@ _NEAR = 1e-2
 #: parts follow.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
+#: Stationarity, violation and distance from active sides that are rounding error: a correction would change nothing.
+_EXACT = 1e-13
 #: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
 _WORSE = 1e-8
 #: Two optima are the same when their points differ by less than this, in half ranges.
 SAME_POINT = 1e-4
 #: Largest difference of F between the solver's point and the optimum nearby, in parts of F's scale: the remainder of an
 #: interior-point method's barrier.
-_SAME_F = 1e-6
+SAME_F = 1e-6
 #: Starts for each thread: with fewer, building another solver takes longer than the thread saves.
 _STARTS_PER_JOB = 12
 
@@ -76,7 +78,8 @@ class Start:
         F: objective there, NaN where it is undefined.
         stationarity: largest scaled derivative of the Lagrangian there.
         violation: largest distance outside a limit there, in half ranges.
-        iterations: of the solver.
+        iterations: of the solvers.
+        solver: name of the solver that ended it: ``sqp`` where the search in C alone did.
     """
 
     status: StartStatus
@@ -85,6 +88,7 @@ class Start:
     stationarity: float
     violation: float
     iterations: int
+    solver: str = "ipopt"
 
 
 def search_from(
@@ -107,6 +111,7 @@ def search_from(
     """
     threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
     idle: SimpleQueue[LocalSearch] = SimpleQueue()
+    name = getattr(solver, "__name__", type(solver).__name__)
     for each in solver(nlp, search, points, min(threads, len(points))):
         idle.put(each)
 
@@ -125,8 +130,9 @@ def search_from(
             found = _wait_for(future)
             if found is None:
                 return
-            same = _known_optimum(nlp, found.x, known) if found.reason is StopReason.SUCCEEDED else None
+            same = known_optimum(nlp, found.x, known) if found.reason is StopReason.SUCCEEDED else None
             start = judge(nlp, found) if same is None else replace(same, iterations=found.iterations)
+            start = replace(start, solver=name)
             if same is None and start.status is StartStatus.CONVERGED:
                 known.append(start)
             yield start
@@ -145,7 +151,7 @@ def _wait_for(future: Future[SolverResult]) -> SolverResult | None:
     return None
 
 
-def _known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:
+def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:
     """Return the converged start whose optimum a solver's point is near, or None.
 
     Two searches ended at the same optimum where their points count as one and F agrees to the solver's accuracy: the
@@ -155,7 +161,7 @@ def _known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start |
     for start in known:
         if np.max(np.abs(x - start.x) / nlp.scale) <= SAME_POINT:
             off = abs(nlp.evaluate(x)[0] - start.F)
-            return start if off <= _SAME_F * nlp.objective_scale else None
+            return start if off <= SAME_F * nlp.objective_scale else None
     return None
 
 
@@ -163,8 +169,11 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     """Correct the point at which a solver stopped, and judge it by the program's own conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
-    stationarity = multipliers(at, at.active())[1]
-    for share in _SHARES if np.isfinite(raw.violation) else ():
+    active = at.active()
+    stationarity = multipliers(at, active)[1]
+    off = max(raw.violation, float(np.abs(raw.slack[list(active)]).max(initial=0.0)))
+    is_exact = max(stationarity, off) <= _EXACT
+    for share in _SHARES if np.isfinite(raw.violation) and not is_exact else ():
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
         # A correction that makes F worse leads to another stationary point.

@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -107,10 +108,14 @@ def slacks(result: dict[str, Any]) -> dict[str, float]:
     }
 
 
-def test_the_limited_design_keeps_every_limit_and_is_found_from_nearly_every_start(limited: Solution) -> None:
+def test_the_limited_design_keeps_every_limit_and_is_found_from_many_starts(limited: Solution) -> None:
     assert limited.status is Status.OPTIMAL
     assert len(limited.starts) == 64
-    assert limited.optima[0].count >= 0.9 * 64
+    # Screening finds several optima, most of which Ipopt passes by: its barrier leads nearly every start to the best.
+    assert limited.optima[0].count >= 0.4 * 64
+    by_ipopt = solve(replace(limited.case, search=replace(limited.case.search, starts=16, screen=False)))
+    assert by_ipopt.optima[0].count >= 0.9 * 16
+    assert pytest.approx(limited.F, rel=1e-9) == by_ipopt.F
     result = json_data(result_of(limited))
     found = slacks(result)
     assert set(found) == {row["key"] for row in result["limits"]}

@@ -334,7 +334,7 @@ def test_a_page_solves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("a page must not solve")
 
     monkeypatch.setattr(starts, "search_from", refuse)
-    monkeypatch.setattr(multistart, "search_from", refuse)
+    monkeypatch.setattr(multistart, "search_each", refuse)
     assert "compared" in page_of(report_of("", solution, result, check))
     assert 'id="compared"' not in page_of(report_of("", solution, result))
 

@@ -1,8 +1,8 @@
-/* The state of one search of ${id}-sqp.c, and what its step in ${id}-step.c offers. */
-#ifndef ${ID}_SEARCHH
-#define ${ID}_SEARCHH
+/* The state of one search of screwsynth-sqp.c, and what its step in screwsynth-step.c offers. */
+#ifndef SCREWSYNTH_SEARCHH
+#define SCREWSYNTH_SEARCHH
 
-#include "${id}-sqp.h"
+#include "screwsynth-sqp.h"
 
 #define MILD 1e-3         /* damping, in parts of the curvature, below which it is set to 0; the largest first shift */
 #define NARROW 1e-4       /* half range below which bounds are narrow: curvature improves F by parts of its half square only */
@@ -13,9 +13,9 @@ typedef struct {
 
 /* The state of one search. */
 typedef struct {
-    const ${id}_SQP_problem *p;
+    const screwsynth_SQP_problem *p;
     point at, to;       /* the iterate, and the trial point */
-    ${id}_QP_data q;    /* the quadratic program of a step */
+    screwsynth_QP_data q;    /* the quadratic program of a step */
     double *H, *L;      /* its matrix, and the triangle L */
     double *d, *bent_d; /* the step, and its second-order correction */
     double *u, *bent_u; /* multipliers of the sides */
@@ -35,32 +35,32 @@ typedef struct {
 } search;
 
 /* Largest size of n numbers; not a number where one of them is none. */
-double ${id}_SQP_largest(const double *values, int n);
+double screwsynth_SQP_largest(const double *values, int n);
 
 /* Largest violation of the constraints g. */
-double ${id}_SQP_violation(const ${id}_SQP_problem *p, const double *g);
+double screwsynth_SQP_violation(const screwsynth_SQP_problem *p, const double *g);
 
 /* H: the Hessian of the Lagrangian, restricted by the active sides. Returns 1 where it is not finite. */
-int ${id}_SQP_curve(search *of);
+int screwsynth_SQP_curve(search *of);
 
 /* L: the triangle of H + shift I, with a shift that makes it positive definite. Shifts are tried from the last residual on:
  * near optima that are not isolated, such as those with F = 0, larger ones would make the steps short. Returns 1 where no
  * shift does. */
-int ${id}_SQP_factorise(search *of);
+int screwsynth_SQP_factorise(search *of);
 
 /* Bounds of the quadratic program: part of the way to violated ones, and shifted by the curvature of the constraints. Its
  * variables are d / unit, so that rounding error is small beside narrow bounds too. */
-void ${id}_SQP_limit_step(search *of, double part, const double *bent);
+void screwsynth_SQP_limit_step(search *of, double part, const double *bent);
 
 /* The step within the bounds of limit_step. Returns 1 where there is none. */
-int ${id}_SQP_step_within(search *of, double *d, double *u);
+int screwsynth_SQP_step_within(search *of, double *d, double *u);
 
 /* The step d with its multipliers u. Where linearised bounds contradict each other, the step goes a part of the way to them,
  * in the end no part. Returns 1 where there is no step. */
-int ${id}_SQP_find_step(search *of);
+int screwsynth_SQP_find_step(search *of);
 
 /* Row of the triangle at which the restricted H shows negative curvature; n where it has none. Along a narrow range no
  * curvature makes a difference, so these are scaled down. */
-int ${id}_SQP_saddle_row(search *of);
+int screwsynth_SQP_saddle_row(search *of);
 
 #endif

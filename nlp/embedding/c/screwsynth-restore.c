@@ -5,18 +5,18 @@
  */
 #include <math.h>
 
-#include "${id}-sqp.h"
+#include "screwsynth-sqp.h"
 
 /* The search's own program, and numbers at the last point in its place: constraints, gradients, multipliers. */
 typedef struct {
-    const ${id}_SQP_problem *p;
+    const screwsynth_SQP_problem *p;
     double *gradient, *g, *rows, *multipliers;
     double objective, size;
 } restoration;
 
 /* Violation of constraint j in parts of the first largest one, negative below the lower bound. */
 static double violated(const restoration *of, int j) {
-    double off = ${id}_SQP_outside(of->p, j, of->g[j]) / of->size;
+    double off = screwsynth_SQP_outside(of->p, j, of->g[j]) / of->size;
     return of->g[j] < of->p->g_lower[j] ? -off : off;
 }
 
@@ -68,26 +68,26 @@ static int hessian(void *self, const double *s, double weight, const double *mul
     return 0;
 }
 
-int ${id}_SQP_restore(const ${id}_SQP_problem *p, double *s, double *work, int *iwork) {
-    ${id}_SQP_problem program = *p;
-    ${id}_SQP_end end;
+int screwsynth_SQP_restore(const screwsynth_SQP_problem *p, double *s, double *work, int *iwork) {
+    screwsynth_SQP_problem program = *p;
+    screwsynth_SQP_end end;
     restoration of;
     int j;
     if (p->c == 0) return 0;
     of.p = p;
-    of.gradient = work + ${ID}_SQPWORK(p->n, 0);
+    of.gradient = work + SCREWSYNTH_SQPWORK(p->n, 0);
     of.g = of.gradient + p->n;
     of.multipliers = of.g + p->c;
     of.rows = of.multipliers + p->c;
     of.size = 0.0;
     if (evaluate(&of, s)) return 0;
-    for (j = 0; j < p->c; ++j) of.size = fmax(of.size, ${id}_SQP_outside(p, j, of.g[j]));
+    for (j = 0; j < p->c; ++j) of.size = fmax(of.size, screwsynth_SQP_outside(p, j, of.g[j]));
     if (!(of.size > 0.0)) return 0;
     program.c = 0;
     program.values = values;
     program.hessian = hessian;
     program.visit = visit;
     program.self = &of;
-    if (${id}_SQP(&program, s, &end, work, iwork)) return 0;
+    if (screwsynth_SQP(&program, s, &end, work, iwork)) return 0;
     return end.iterations;
 }

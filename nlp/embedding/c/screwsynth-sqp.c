@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "${id}-search.h"
+#include "screwsynth-search.h"
 
 #define AIM 1e-10         /* residual at which the search ends; the caller's tolerances are wider */
 #define AIM_INSIDE 1e-12  /* violation likewise */
@@ -25,19 +25,19 @@
 #define POOR 3            /* number of steps in turn that go a part of the way to violated bounds, after which the search ends */
 #define IDLE 2            /* likewise from feasible points: narrow bounds or rounding error leave a violation of them */
 #define GOOD 0.7          /* part of the violation or residual to which a step must lessen it */
-#define TRIALS $trials        /* number of lengths of a step that are tried, each half of the one before */
+#define TRIALS 30        /* number of lengths of a step that are tried, each half of the one before */
 #define DESCENT 1e-4      /* part of the predicted descent that is required (Armijo) */
 #define ROUNDING 1e-14    /* rounding error of f, which is of order 1 */
 
-static double merit(const ${id}_SQP_problem *p, const point *at, const double *weights) {
+static double merit(const screwsynth_SQP_problem *p, const point *at, const double *weights) {
     double sum = at->f;
     int j;
-    for (j = 0; j < p->c; ++j) sum += weights[j] * ${id}_SQP_outside(p, j, at->g[j]);
+    for (j = 0; j < p->c; ++j) sum += weights[j] * screwsynth_SQP_outside(p, j, at->g[j]);
     return sum;
 }
 
 /* KKT residual: gradient of the Lagrangian, complementarity. The multipliers are not negative, by the quadratic program. */
-static double residual_of(const ${id}_SQP_problem *p, const point *at, const double *u, double *left) {
+static double residual_of(const screwsynth_SQP_problem *p, const point *at, const double *u, double *left) {
     int n = p->n, c = p->c, i, j;
     double most;
     for (i = 0; i < n; ++i) left[i] = at->gradient[i] - u[i] + u[n + i];
@@ -46,7 +46,7 @@ static double residual_of(const ${id}_SQP_problem *p, const point *at, const dou
         if (carried != 0.0)
             for (i = 0; i < n; ++i) left[i] -= carried * at->rows[j * n + i];
     }
-    most = ${id}_SQP_largest(left, n);
+    most = screwsynth_SQP_largest(left, n);
     for (i = 0; i < n; ++i) {
         double product = u[i] * (at->s[i] - p->lower[i]) + u[n + i] * (p->upper[i] - at->s[i]);
         if (!(product <= most)) most = product;
@@ -61,7 +61,7 @@ static double residual_of(const ${id}_SQP_problem *p, const point *at, const dou
     return most;
 }
 
-static int move(const ${id}_SQP_problem *p, const point *from, const double *d, double length, point *to) {
+static int move(const screwsynth_SQP_problem *p, const point *from, const double *d, double length, point *to) {
     int i;
     for (i = 0; i < p->n; ++i) {
         double s = from->s[i] + length * d[i];
@@ -76,13 +76,13 @@ static void exchange(point *a, point *b) {
     *b = kept;
 }
 
-static void set_up(search *of, const ${id}_SQP_problem *p, double *s, double *work, int *iwork) {
+static void set_up(search *of, const screwsynth_SQP_problem *p, double *s, double *work, int *iwork) {
     const int n = p->n, c = p->c;
     memset(of, 0, sizeof *of);
     of->p = p;
     of->qp_iwork = iwork;
     of->qp_work = work;
-    of->H = of->qp_work + ${ID}_QPWORK(n, c);
+    of->H = of->qp_work + SCREWSYNTH_QPWORK(n, c);
     of->L = of->H + n * n;
     of->basis = of->L + n * n;
     of->d = of->basis + n * n;
@@ -118,7 +118,7 @@ static void set_up(search *of, const ${id}_SQP_problem *p, double *s, double *wo
 
 /* Marks the sides that are active at the start: those that the point lies on and towards which f falls. */
 static void guess_sides(search *of) {
-    const ${id}_SQP_problem *p = of->p;
+    const screwsynth_SQP_problem *p = of->p;
     const point *at = &of->at;
     const int n = p->n, c = p->c;
     const double near = NEAR * p->extent;
@@ -147,7 +147,7 @@ static void leave_saddle(search *of, int k) {
         of->d[i] = -sum / of->L[i * n + i];
     }
     for (side = -1; side <= 1; side += 2) {
-        double length = side * KICK * of->p->extent / ${id}_SQP_largest(of->d, n);
+        double length = side * KICK * of->p->extent / screwsynth_SQP_largest(of->d, n);
         if (move(of->p, &of->at, of->d, length, &of->to) || !(merit(of->p, &of->to, of->weights) < best)) continue;
         best = merit(of->p, &of->to, of->weights);
         chosen = length;
@@ -158,10 +158,10 @@ static void leave_saddle(search *of, int k) {
 
 /* Sets the weights of the violations from the multipliers, and returns the slope of the merit along the step. */
 static double weigh(search *of) {
-    double slope = ${id}_QP_dot(of->at.gradient, of->d, of->p->n), distance = 0.0;
+    double slope = screwsynth_QP_dot(of->at.gradient, of->d, of->p->n), distance = 0.0;
     int j;
     for (j = 0; j < of->p->c; ++j) {
-        double needed = fabs(of->carried[j]), off = of->part * ${id}_SQP_outside(of->p, j, of->at.g[j]);
+        double needed = fabs(of->carried[j]), off = of->part * screwsynth_SQP_outside(of->p, j, of->at.g[j]);
         of->weights[j] = of->weights[j] > needed ? 0.5 * (of->weights[j] + needed) : needed;
         slope -= of->weights[j] * off;
         distance += off;
@@ -177,18 +177,18 @@ static double weigh(search *of) {
 
 /* Line search: takes the step, shortened until the merit falls enough. Returns its length, or 0 where the merit does not. */
 static double advance(search *of) {
-    const ${id}_SQP_problem *p = of->p;
+    const screwsynth_SQP_problem *p = of->p;
     const double slope = weigh(of), now = merit(p, &of->at, of->weights), slack = ROUNDING * (1.0 + fabs(now));
     double length = 1.0;
     int trial, j;
     for (trial = 0; trial < TRIALS; ++trial, length *= 0.5) {
         if (move(p, &of->at, of->d, length, &of->to)) continue;
         if (merit(p, &of->to, of->weights) <= now + DESCENT * length * slope + slack) break;
-        if (trial > 0 || ${id}_SQP_violation(p, of->to.g) <= ${id}_SQP_violation(p, of->at.g)) continue;
+        if (trial > 0 || screwsynth_SQP_violation(p, of->to.g) <= screwsynth_SQP_violation(p, of->at.g)) continue;
         for (j = 0; j < p->c; ++j)
-            of->bent[j] = of->to.g[j] - of->at.g[j] - ${id}_QP_dot(of->at.rows + j * p->n, of->d, p->n);
-        ${id}_SQP_limit_step(of, of->part, of->bent);
-        if (${id}_SQP_step_within(of, of->bent_d, of->bent_u)) continue;
+            of->bent[j] = of->to.g[j] - of->at.g[j] - screwsynth_QP_dot(of->at.rows + j * p->n, of->d, p->n);
+        screwsynth_SQP_limit_step(of, of->part, of->bent);
+        if (screwsynth_SQP_step_within(of, of->bent_d, of->bent_u)) continue;
         if (move(p, &of->at, of->bent_d, 1.0, &of->to)) continue;
         if (merit(p, &of->to, of->weights) <= now + DESCENT * slope + slack) break;
     }
@@ -206,7 +206,7 @@ static void compare_with_last(search *of, double residual, double violation) {
     of->last = violation;
 }
 
-int ${id}_SQP(const ${id}_SQP_problem *p, double *s, ${id}_SQP_end *end, double *work, int *iwork) {
+int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_end *end, double *work, int *iwork) {
     search of;
     int kicks = 0, settled = 0, i;
     set_up(&of, p, s, work, iwork);
@@ -218,23 +218,23 @@ int ${id}_SQP(const ${id}_SQP_problem *p, double *s, ${id}_SQP_end *end, double 
         int creeps;
         ++end->iterations;
         if (p->visit(p->self, of.at.s, of.at.f, of.at.g, of.at.rows, &of.is_feasible)) break;
-        if (${id}_SQP_curve(&of) || ${id}_SQP_factorise(&of) || ${id}_SQP_find_step(&of)) break;
+        if (screwsynth_SQP_curve(&of) || screwsynth_SQP_factorise(&of) || screwsynth_SQP_find_step(&of)) break;
         end->residual = residual_of(p, &of.at, of.u, of.spare);
-        end->violation = ${id}_SQP_violation(p, of.at.g);
+        end->violation = screwsynth_SQP_violation(p, of.at.g);
         compare_with_last(&of, end->residual, end->violation);
         if (of.poor == POOR) break;
-        if ((end->residual <= AIM && end->violation <= AIM_INSIDE) || ${id}_SQP_largest(of.d, p->n) <= STILL) settled = 1;
+        if ((end->residual <= AIM && end->violation <= AIM_INSIDE) || screwsynth_SQP_largest(of.d, p->n) <= STILL) settled = 1;
         if (of.idle == IDLE) settled = 1;
         /* Within narrow bounds F changes too little to tell: there the first step is always taken. */
-        if (end->iterations == 1 && p->extent < NARROW && ${id}_SQP_largest(of.d, p->n) > CREEP * p->extent) settled = 0;
+        if (end->iterations == 1 && p->extent < NARROW && screwsynth_SQP_largest(of.d, p->n) > CREEP * p->extent) settled = 0;
         /* Short steps with negative curvature approach a saddle. */
-        creeps = of.shift > of.damping * of.size && ${id}_SQP_largest(of.d, p->n) <= CREEP * p->extent && end->violation <= CREEP;
+        creeps = of.shift > of.damping * of.size && screwsynth_SQP_largest(of.d, p->n) <= CREEP * p->extent && end->violation <= CREEP;
         if (settled || (creeps && kicks < KICKS)) {
             int row;
             for (i = 0; settled && i < 2 * (p->n + p->c); ++i)
                 if (fabs(of.u[i]) <= WEAK) of.u[i] = 0.0;
-            if (${id}_SQP_curve(&of)) break; /* along the sides that are active now */
-            row = ${id}_SQP_saddle_row(&of);
+            if (screwsynth_SQP_curve(&of)) break; /* along the sides that are active now */
+            row = screwsynth_SQP_saddle_row(&of);
             end->is_minimum = settled && row == p->n;
             if (settled && (row == p->n || kicks == KICKS)) break;
             if (row < p->n) {
@@ -243,7 +243,7 @@ int ${id}_SQP(const ${id}_SQP_problem *p, double *s, ${id}_SQP_end *end, double 
                 settled = 0;
                 continue;
             }
-            if (${id}_SQP_curve(&of) || ${id}_SQP_factorise(&of)) break;
+            if (screwsynth_SQP_curve(&of) || screwsynth_SQP_factorise(&of)) break;
         }
         length = advance(&of);
         /* A matrix with too little curvature gives steps that have to be shortened. */
@@ -258,7 +258,7 @@ int ${id}_SQP(const ${id}_SQP_problem *p, double *s, ${id}_SQP_end *end, double 
     }
     /* The results are those of the last point. */
     end->f = of.at.f;
-    end->violation = ${id}_SQP_violation(p, of.at.g);
+    end->violation = screwsynth_SQP_violation(p, of.at.g);
     end->residual = residual_of(p, &of.at, of.u, of.spare);
     end->multipliers = of.u;
     if (of.at.s != s) memcpy(s, of.at.s, (size_t)p->n * sizeof *s);

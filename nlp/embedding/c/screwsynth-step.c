@@ -1,16 +1,16 @@
 /* The step of a search by sequential quadratic programming: the Hessian of the Lagrangian along the active sides, its shift
- * to a positive definite matrix, and the quadratic program. See ${id}-search.h.
+ * to a positive definite matrix, and the quadratic program. See screwsynth-search.h.
  */
 #include <math.h>
 
-#include "${id}-search.h"
+#include "screwsynth-search.h"
 
 #define LEAST 1e-8        /* smallest first shift, in parts of the curvature */
 #define FLAT 1e-6         /* curvature assumed for a function without any */
 #define CURVED 1e-7       /* part of the largest curvature below whose negative a curvature counts as negative */
 #define ROUNDED 1e-13     /* curvature of f, which is of order 1, below whose negative it may be rounding error */
 
-double ${id}_SQP_largest(const double *values, int n) {
+double screwsynth_SQP_largest(const double *values, int n) {
     double size = 0.0;
     int i;
     for (i = 0; i < n; ++i)
@@ -18,16 +18,16 @@ double ${id}_SQP_largest(const double *values, int n) {
     return size;
 }
 
-double ${id}_SQP_outside(const ${id}_SQP_problem *p, int j, double g) {
+double screwsynth_SQP_outside(const screwsynth_SQP_problem *p, int j, double g) {
     if (g < p->g_lower[j]) return p->g_lower[j] - g;
     return g > p->g_upper[j] ? g - p->g_upper[j] : 0.0;
 }
 
-double ${id}_SQP_violation(const ${id}_SQP_problem *p, const double *g) {
+double screwsynth_SQP_violation(const screwsynth_SQP_problem *p, const double *g) {
     double most = 0.0;
     int j;
     for (j = 0; j < p->c; ++j)
-        if (!(${id}_SQP_outside(p, j, g[j]) <= most)) most = ${id}_SQP_outside(p, j, g[j]);
+        if (!(screwsynth_SQP_outside(p, j, g[j]) <= most)) most = screwsynth_SQP_outside(p, j, g[j]);
     return most;
 }
 
@@ -36,7 +36,7 @@ static int cholesky(const double *M, double *L, int n, double shift, double leas
     int i, j;
     for (i = 0; i < n; ++i) {
         for (j = 0; j <= i; ++j) {
-            double sum = M[i * n + j] - ${id}_QP_dot(L + i * n, L + j * n, j);
+            double sum = M[i * n + j] - screwsynth_QP_dot(L + i * n, L + j * n, j);
             if (j < i) {
                 L[i * n + j] = sum / L[j * n + j];
                 continue;
@@ -52,7 +52,7 @@ static int cholesky(const double *M, double *L, int n, double shift, double leas
 
 /* Restricts H to the directions along the active sides, with curvature `size` across them. sides: multipliers or marks, not
  * 0 for an active side. Returns the largest entry of the restricted H. */
-static double reduce(const ${id}_SQP_problem *p, const point *at, const double *sides, double size, double *H, double *basis,
+static double reduce(const screwsynth_SQP_problem *p, const point *at, const double *sides, double size, double *H, double *basis,
                    double *w) {
     int n = p->n, c = p->c, count = 0, i, j, k;
     double free_size;
@@ -64,21 +64,21 @@ static double reduce(const ${id}_SQP_problem *p, const point *at, const double *
         double *v = basis + count * n, length, before;
         if (sides[2 * n + j] == 0.0 && sides[2 * n + c + j] == 0.0 && p->g_lower[j] < p->g_upper[j]) continue;
         for (i = 0; i < n; ++i) v[i] = sides[i] == 0.0 && sides[n + i] == 0.0 ? at->rows[j * n + i] : 0.0;
-        before = sqrt(${id}_QP_dot(v, v, n));
+        before = sqrt(screwsynth_QP_dot(v, v, n));
         for (k = 0; k < count; ++k) {
-            double part = ${id}_QP_dot(v, basis + k * n, n);
+            double part = screwsynth_QP_dot(v, basis + k * n, n);
             for (i = 0; i < n; ++i) v[i] -= part * basis[k * n + i];
         }
-        length = sqrt(${id}_QP_dot(v, v, n));
+        length = sqrt(screwsynth_QP_dot(v, v, n));
         if (!(length > 1e-8 * before)) continue;
         for (i = 0; i < n; ++i) v[i] /= length;
-        for (i = 0; i < n; ++i) w[i] = ${id}_QP_dot(H + i * n, v, n);
-        length = ${id}_QP_dot(v, w, n);
+        for (i = 0; i < n; ++i) w[i] = screwsynth_QP_dot(H + i * n, v, n);
+        length = screwsynth_QP_dot(v, w, n);
         for (i = 0; i < n; ++i)
             for (k = 0; k < n; ++k) H[i * n + k] += length * v[i] * v[k] - w[i] * v[k] - v[i] * w[k];
         ++count;
     }
-    free_size = ${id}_SQP_largest(H, n * n);
+    free_size = screwsynth_SQP_largest(H, n * n);
     for (i = 0; i < n; ++i)
         if (sides[i] != 0.0 || sides[n + i] != 0.0) H[i * n + i] = size;
     for (j = 0; j < count; ++j)
@@ -87,12 +87,12 @@ static double reduce(const ${id}_SQP_problem *p, const point *at, const double *
     return free_size;
 }
 
-int ${id}_SQP_curve(search *of) {
+int screwsynth_SQP_curve(search *of) {
     const int n = of->p->n;
     int is_flat;
     double size;
     if (of->p->hessian(of->p->self, of->at.s, 1.0, of->carried, of->H)) return 1;
-    size = ${id}_SQP_largest(of->H, n * n);
+    size = screwsynth_SQP_largest(of->H, n * n);
     is_flat = !(size > FLAT);
     if (is_flat) size = FLAT;
     of->free_size = reduce(of->p, &of->at, of->u, size, of->H, of->basis, of->spare);
@@ -104,7 +104,7 @@ int ${id}_SQP_curve(search *of) {
     return 0;
 }
 
-int ${id}_SQP_factorise(search *of) {
+int screwsynth_SQP_factorise(search *of) {
     const int n = of->p->n;
     const double most = 10.0 * n * of->size; /* n times the largest entry is enough where numbers are finite */
     const double least = of->size > of->free_size ? MILD : LEAST; /* of a linear f: no residual says more */
@@ -120,8 +120,8 @@ int ${id}_SQP_factorise(search *of) {
     return 0;
 }
 
-void ${id}_SQP_limit_step(search *of, double part, const double *bent) {
-    const ${id}_SQP_problem *p = of->p;
+void screwsynth_SQP_limit_step(search *of, double part, const double *bent) {
+    const screwsynth_SQP_problem *p = of->p;
     int i, j;
     for (i = 0; i < p->n; ++i) {
         of->low[i] = (p->lower[i] - of->at.s[i]) / of->unit;
@@ -138,15 +138,15 @@ void ${id}_SQP_limit_step(search *of, double part, const double *bent) {
     }
 }
 
-int ${id}_SQP_step_within(search *of, double *d, double *u) {
+int screwsynth_SQP_step_within(search *of, double *d, double *u) {
     int i;
-    if (${id}_QP(&of->q, d, u, of->qp_work, of->qp_iwork)) return 1;
+    if (screwsynth_QP(&of->q, d, u, of->qp_work, of->qp_iwork)) return 1;
     for (i = 0; i < of->p->n; ++i) d[i] *= of->unit;
     return 0;
 }
 
-int ${id}_SQP_find_step(search *of) {
-    static const double parts[] = {$parts};
+int screwsynth_SQP_find_step(search *of) {
+    static const double parts[] = {1.0, 0.25, 0.0625, 0.015625, 0.00390625, 0.0};
     const int n = of->p->n, c = of->p->c;
     const int last = (int)(sizeof parts / sizeof *parts) - 1;
     int failed = 1, i, j;
@@ -156,17 +156,17 @@ int ${id}_SQP_find_step(search *of) {
         of->part = parts[i];
         /* The violation of a feasible point may be larger than narrow bounds: then the step lessens it by a part of these. */
         if (i == 1 && of->is_feasible) {
-            of->part *= of->unit / fmax(${id}_SQP_violation(of->p, of->at.g), of->unit);
+            of->part *= of->unit / fmax(screwsynth_SQP_violation(of->p, of->at.g), of->unit);
             i = last - 1;
         }
-        ${id}_SQP_limit_step(of, of->part, 0);
-        failed = ${id}_SQP_step_within(of, of->d, of->u);
+        screwsynth_SQP_limit_step(of, of->part, 0);
+        failed = screwsynth_SQP_step_within(of, of->d, of->u);
     }
     for (j = 0; j < c; ++j) of->carried[j] = of->u[2 * n + c + j] - of->u[2 * n + j];
     return failed;
 }
 
-int ${id}_SQP_saddle_row(search *of) {
+int screwsynth_SQP_saddle_row(search *of) {
     const int n = of->p->n;
     double pivot;
     int i, k;

@@ -8,7 +8,7 @@
  */
 #include <math.h>
 
-#include "${id}-sqp.h"
+#include "screwsynth-sqp.h"
 
 /* Largest violation of a side that counts as rounding; variables and rows are of order 1. */
 #define VIOLATED 1e-13
@@ -19,7 +19,7 @@
 /* Part of a normal outside the span of the active ones below which it depends on them. */
 #define DEPENDENT 1e-11
 
-double ${id}_QP_dot(const double *a, const double *b, int n) {
+double screwsynth_QP_dot(const double *a, const double *b, int n) {
     double sum = 0.0;
     int i;
     for (i = 0; i < n; ++i) sum += a[i] * b[i];
@@ -28,7 +28,7 @@ double ${id}_QP_dot(const double *a, const double *b, int n) {
 
 /* Distance of d from a side, negative outside. Sides: n lower bounds, n upper bounds, lower and upper bounds of c rows, of
  * which `along` has the products with d. */
-static double slack(const ${id}_QP_data *q, int side, const double *d, const double *along) {
+static double slack(const screwsynth_QP_data *q, int side, const double *d, const double *along) {
     int n = q->n, c = q->c, j;
     if (side < n) return d[side] - q->lower[side];
     if (side < 2 * n) return q->upper[side - n] - d[side - n];
@@ -38,13 +38,13 @@ static double slack(const ${id}_QP_data *q, int side, const double *d, const dou
     return q->row_upper[j] - along[j];
 }
 
-static int is_equation(const ${id}_QP_data *q, int side) {
+static int is_equation(const screwsynth_QP_data *q, int side) {
     int j = side - 2 * q->n;
     return j >= 0 && j < q->c && q->row_lower[j] == q->row_upper[j];
 }
 
 /* t = J' times the inward normal of a side. */
-static void along(const ${id}_QP_data *q, int side, double sign, const double *J, double *t) {
+static void along(const screwsynth_QP_data *q, int side, double sign, const double *J, double *t) {
     int n = q->n, i, k, j = side - 2 * n;
     if (j < 0) {
         i = side < n ? side : side - n;
@@ -97,7 +97,7 @@ static void let_go(double *J, double *R, int *active, double *u, int n, int coun
     }
 }
 
-int ${id}_QP(const ${id}_QP_data *q, double *d, double *multipliers, double *work, int *iwork) {
+int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, double *work, int *iwork) {
     const int n = q->n, sides = 2 * (q->n + q->c), most = 20 * (sides + 5); /* stated in the README */
     double *J = work, *R = J + n * n, *t = R + n * n, *r = t + n, *u = r + n, *z = u + n, *products = z + n;
     int *active = iwork, *held = iwork + n;
@@ -118,7 +118,7 @@ int ${id}_QP(const ${id}_QP_data *q, double *d, double *multipliers, double *wor
     for (k = 0; k < n; ++k) t[k] = 0.0;
     for (i = 0; i < n; ++i)
         for (k = i; k < n; ++k) t[k] += J[i * n + k] * q->gradient[i];
-    for (i = 0; i < n; ++i) d[i] = -${id}_QP_dot(J + i * n + i, t + i, n - i);
+    for (i = 0; i < n; ++i) d[i] = -screwsynth_QP_dot(J + i * n + i, t + i, n - i);
     for (i = 0; i < n; ++i) lenient = fmax(lenient, ROUNDING * fabs(d[i]));
     for (side = 0; side < sides; ++side) {
         multipliers[side] = 0.0;
@@ -128,7 +128,7 @@ int ${id}_QP(const ${id}_QP_data *q, double *d, double *multipliers, double *wor
     for (pass = 0; pass < most; ++pass) {
         int entering = -1;
         double worst = -VIOLATED, sign = 1.0, fresh = 0.0;
-        for (k = 0; k < q->c; ++k) products[k] = ${id}_QP_dot(q->rows + k * n, d, n);
+        for (k = 0; k < q->c; ++k) products[k] = screwsynth_QP_dot(q->rows + k * n, d, n);
         /* The entering side: equations first, then the side with the largest violation. */
         for (side = 2 * n; side < 2 * n + q->c && entering < 0; ++side) {
             if (held[side] || !is_equation(q, side)) continue;
@@ -179,7 +179,7 @@ int ${id}_QP(const ${id}_QP_data *q, double *d, double *multipliers, double *wor
             for (k = 0; k < count; ++k) u[k] -= step * r[k];
             fresh += step;
             if (full < HUGE_VAL) {
-                for (i = 0; i < n; ++i) z[i] = ${id}_QP_dot(J + i * n + count, t + count, n - count);
+                for (i = 0; i < n; ++i) z[i] = screwsynth_QP_dot(J + i * n + count, t + count, n - count);
                 for (i = 0; i < n; ++i) d[i] += step * z[i];
                 worst += step * outside;
             }

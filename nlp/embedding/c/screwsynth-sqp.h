@@ -1,46 +1,28 @@
-/* Inner parts of the solver of ${id}.h, not for calls from outside. */
-#ifndef ${ID}_SQPH
-#define ${ID}_SQPH
+/* Inner parts of the solver of screwsynth.h, not for calls from outside. */
+#ifndef SCREWSYNTH_SQPH
+#define SCREWSYNTH_SQPH
 
 /* The solver tests for numbers that are infinite or none, and its tolerances are near rounding error. */
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "this solver needs IEEE arithmetic: compile it without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast"
 #endif
 
-/* Constraints, and with several poses the objective, by loops over functions of CasADi's: in ${id}-loops.c. */
-#define ${ID}_LOOPS $has_loops
-#define ${ID}_SPECTRA $nspectra
-#if ${ID}_LOOPS
-int ${id}_SQP_limits(const double **arg, double **res, double *work);
-int ${id}_SQP_derivatives(const double **arg, double **res, double *work);
-int ${id}_SQP_curvature(const double **arg, double **res, double *work);
-int ${id}_SQP_objective(const double **arg, double **res, double *work);
-#else
-#define ${id}_SQP_limits(arg, res, work) ${id}_CASADI_limits(arg, res, 0, work, 0)
-#define ${id}_SQP_derivatives(arg, res, work) ${id}_CASADI_derivatives(arg, res, 0, work, 0)
-#define ${id}_SQP_curvature(arg, res, work) ${id}_CASADI_curvature(arg, res, 0, work, 0)
-#endif
-
-/* The constraint s on singular values, from J and dJ (6 rows of J x N), moments about the platform's origin: value, gradient
- * by the entries of J, and unless it is 0 its second derivatives along the variables with J linear in them. */
-void ${id}_SQP_spectrum(int s, const double *J, const double *dJ, double *value, double *by_entry, double *second, double *work);
-
 /* minimise 1/2 d'Bd + gradient'd  with  lower <= d <= upper  and  row_lower <= rows d <= row_upper.
  * factor: lower triangle L of B = LL', n x n. rows: c x n. Equal bounds of a row make it an equation. */
 typedef struct {
     int n, c;
     const double *factor, *gradient, *lower, *upper, *rows, *row_lower, *row_upper;
-} ${id}_QP_data;
+} screwsynth_QP_data;
 
 /* Doubles and ints in the workspace of the quadratic program. */
-#define ${ID}_QPWORK(n, c) (2 * (n) * (n) + 4 * (n) + (c))
-#define ${ID}_QPIWORK(n, c) ((n) + 2 * ((n) + (c)))
+#define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 4 * (n) + (c))
+#define SCREWSYNTH_QPIWORK(n, c) ((n) + 2 * ((n) + (c)))
 
 /* Solution d and the multiplier of each side: n lower bounds, n upper bounds, lower and upper bounds of c rows. That of an
  * equation is among the lower ones, and may have any sign. Returns 0, or 1 where there is no solution. */
-int ${id}_QP(const ${id}_QP_data *q, double *d, double *multipliers, double *work, int *iwork);
+int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, double *work, int *iwork);
 
-double ${id}_QP_dot(const double *a, const double *b, int n);
+double screwsynth_QP_dot(const double *a, const double *b, int n);
 
 /* A program to be minimised, in n variables of order 1. The functions take `self` first. */
 typedef struct {
@@ -56,26 +38,26 @@ typedef struct {
     /* Called at each iterate, before its Hessian. Sets whether it is feasible; returns 1 to end the search there. */
     int (*visit)(void *self, const double *s, double f, const double *g, const double *rows, int *is_feasible);
     void *self;
-} ${id}_SQP_problem;
+} screwsynth_SQP_problem;
 
 typedef struct {
     double f, violation, residual; /* recomputed at the point returned */
     const double *multipliers;     /* of its sides, in the order of the quadratic program; in the workspace */
     int iterations;
     int is_minimum; /* 0 where f falls, to second order, along the sides that the point lies on */
-} ${id}_SQP_end;
+} screwsynth_SQP_end;
 
-#define ${ID}_SQPWORK(n, c) (${ID}_QPWORK(n, c) + 3 * (n) * (n) + 12 * (n) + 11 * (c) + 2 * (n) * (c))
-#define ${ID}_SQPIWORK(n, c) ${ID}_QPIWORK(n, c)
+#define SCREWSYNTH_SQPWORK(n, c) (SCREWSYNTH_QPWORK(n, c) + 3 * (n) * (n) + 12 * (n) + 11 * (c) + 2 * (n) * (c))
+#define SCREWSYNTH_SQPIWORK(n, c) SCREWSYNTH_QPIWORK(n, c)
 
 /* Searches from s, and sets it to the point where the search ends. Returns 0, or 1 where f is not finite at s. */
-int ${id}_SQP(const ${id}_SQP_problem *problem, double *s, ${id}_SQP_end *end, double *work, int *iwork);
+int screwsynth_SQP(const screwsynth_SQP_problem *problem, double *s, screwsynth_SQP_end *end, double *work, int *iwork);
 
 /* Searches for a feasible point from s: for the least sum of squared violations within the bounds of the variables. Ends at
  * the first feasible point. The workspaces are as large as those of a search. Returns the number of iterations. */
-int ${id}_SQP_restore(const ${id}_SQP_problem *problem, double *s, double *work, int *iwork);
+int screwsynth_SQP_restore(const screwsynth_SQP_problem *problem, double *s, double *work, int *iwork);
 
 /* Distance of a constraint outside its bounds. */
-double ${id}_SQP_outside(const ${id}_SQP_problem *problem, int j, double g);
+double screwsynth_SQP_outside(const screwsynth_SQP_problem *problem, int j, double g);
 
 #endif

@@ -1,0 +1,146 @@
+"""Starts that are screened: each is searched by sequential quadratic programming in C, and Ipopt has the last word.
+
+The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Every distinct optimum that it finds
+is given to Ipopt, with its multipliers: what Ipopt confirms, or finds from there, is the answer. A start from which the
+search in C does not converge, or whose end the program's own conditions refuse, is searched by Ipopt from the
+beginning, so that no start is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ...models import FloatArray
+from ..case.settings import Search
+from ..interruption import is_requested
+from ..program.nlp import Nlp
+from ..screening.screening import Screened, can_screen, screen
+from .interface import Solver, SolverResult, StopReason
+from .ipopt import Confirmation, constraint_sizes, ipopt
+from .optima import same_value
+from .starts import SAME_F, Start, StartStatus, judge, known_optimum, search_from
+
+#: Name of the search in C as the solver that ended a start.
+SCREEN = "sqp"
+#: Starts that are screened before the first of them is confirmed: few, so that long searches show progress and answer
+#: a request to stop with what they have.
+_BLOCK = 32
+
+
+def search_each(
+    nlp: Nlp, points: FloatArray, search: Search, jobs: int | None = None, solver: Solver = ipopt
+) -> Iterator[Start]:
+    """Search a program from each of several points, with screening where the solver is Ipopt and it applies.
+
+    Args:
+        nlp: the program.
+        points: (k, n) starting points.
+        search: the solver's settings, and whether starts are screened.
+        jobs: as for :func:`~screwsynth.nlp.solver.starts.search_from`.
+        solver: the local solver.
+
+    Yields:
+        One start for each point, in their order; those that are done, where the work is requested to stop.
+
+    Raises:
+        InputError: the objective is to be compiled, and cannot be.
+    """
+    if solver is not ipopt or not search.screen or not can_screen(nlp):
+        yield from search_from(nlp, points, search, jobs, solver)
+        return
+    confirmed = _Confirmed(nlp, search, constraint_sizes(nlp, points))
+    for first in range(0, len(points), _BLOCK):
+        yield from _search_block(nlp, points[first : first + _BLOCK], search, jobs, confirmed)
+        if is_requested():
+            return
+
+
+def _search_block(
+    nlp: Nlp, points: FloatArray, search: Search, jobs: int | None, confirmed: _Confirmed
+) -> Iterator[Start]:
+    """Screen points, and yield their starts in order; those that are done, where the work is requested to stop."""
+    found = screen(nlp, points, confirmed.sizes, search.max_iterations, jobs)
+    starts: list[Start | None] = []
+    for k in range(len(points)):
+        if is_requested():
+            return
+        starts.append(confirmed.start(found, k))
+        start = starts[-1]
+        if start is not None and None not in starts:
+            yield start
+    if None not in starts:
+        return
+    left = [k for k, start in enumerate(starts) if start is None]
+    searched = search_from(nlp, points[left], search, jobs)
+    for start in starts[left[0] :]:
+        following = start or next(searched, None)
+        if following is None:  # interrupted
+            return
+        yield following
+
+
+class _Confirmed:
+    """Starts that the search in C brought to an optimum, and that Ipopt confirms.
+
+    Of points of one F, as on a connected set of optima, Ipopt confirms the first, and each that is better even by
+    rounding, so that a best one is always Ipopt's.
+
+    Args:
+        nlp: the program.
+        search: the solver's settings.
+        sizes: (c,) those of the constraints; see :func:`~screwsynth.nlp.solver.ipopt.constraint_sizes`.
+    """
+
+    def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
+        self._nlp, self._search, self.sizes = nlp, search, sizes
+        self._confirmation: Confirmation | None = None
+        self._known: list[Start] = []
+
+    def start(self, found: Screened, k: int) -> Start | None:
+        """Return the k-th start, or None where Ipopt must search from its beginning."""
+        if not found.converged[k]:
+            return None
+        n, iterations = self._nlp.n, int(found.iterations[k])
+        screened = SolverResult(
+            x=found.x[k],
+            bound_multipliers=found.multipliers[k, :n],
+            constraint_multipliers=found.multipliers[k, n:],
+            reason=StopReason.SUCCEEDED,
+            iterations=iterations,
+        )
+        same = known_optimum(self._nlp, screened.x, self._known)
+        if same is not None:
+            return replace(same, iterations=iterations, solver=SCREEN)
+        start = self._confirm(screened)
+        if start is not None:
+            self._known.append(start)
+        return start
+
+    def _confirm(self, screened: SolverResult) -> Start | None:
+        """Return the start whose search in C ended at a point; None where the program's conditions refuse it.
+
+        Ipopt's point counts unless Ipopt fails from there, or leaves for a worse one.
+        """
+        nlp = self._nlp
+        own = replace(judge(nlp, screened), solver=SCREEN)
+        is_good = own.status is StartStatus.CONVERGED
+        if is_good and self._is_of_known_value(own):
+            return own
+        if self._confirmation is None:
+            self._confirmation = Confirmation(nlp, self._search, self.sizes)
+        result = self._confirmation(screened)
+        iterations = screened.iterations + result.iterations
+        if is_good and result.reason is StopReason.SUCCEEDED and known_optimum(nlp, result.x, [own]) is not None:
+            return replace(own, iterations=iterations, solver=ipopt.__name__)
+        confirmed = replace(judge(nlp, result), iterations=iterations)
+        if confirmed.status is not StartStatus.CONVERGED:
+            return own if is_good else None
+        loss = nlp.sign * (confirmed.F - own.F)
+        return own if is_good and loss > SAME_F * nlp.objective_scale else confirmed
+
+    def _is_of_known_value(self, start: Start) -> bool:
+        """Return whether Ipopt has confirmed a point of the same F that is at least as good."""
+        tolerance, sign = same_value(self._nlp), self._nlp.sign
+        known = (sign * (start.F - each.F) for each in self._known if each.solver != SCREEN)
+        return any(0 <= worse <= tolerance for worse in known)
