@@ -4,8 +4,9 @@ The modules import each other in this order:
 
 * ``posebox`` (a box of poses in the coordinates of the search), ``machine`` (a robot with its dimensions);
 * regular poses: ``rows`` and ``regularity`` (the examination of boxes in NumPy), ``engines`` (the same in C), ``exact``
-  (signs of determinants without rounding), ``verdict`` and ``search``;
+  (signs of determinants without rounding), ``inverse`` (of the rows over boxes), ``builtrank`` (singular machines within
+  a tolerance), ``verdict`` and ``search``;
 * numbers: ``posed`` (a case as expressions of the pose), ``claims``, ``extremes`` (bounds by the certificate's search),
-  ``boundsearch``, ``clearance``, ``inverse``, ``singular`` and ``poseerror`` (searches of their own), ``ownsearches``;
+  ``boundsearch``, ``clearance``, ``singular`` and ``poseerror`` (searches of their own), ``ownsearches``;
 * ``judge`` (all claims about a machine), ``scale`` (the largest box) and ``slices`` (for pictures).
 """

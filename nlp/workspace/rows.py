@@ -8,6 +8,14 @@ leg from ``b`` on the base to ``a`` on the platform is
 It is a polynomial in the coordinates, of first order in the position. The rank is that of J where no leg has zero
 length, and is less than full where one has. Its expansion has the centre's matrix, 6 matrices of first order and 15 of
 second; all others are bounded together, entry by entry. The C kernel has the same formulas.
+
+In a machine whose joint centres are off by vectors e on the base and f on the platform, turned into the world frame, the
+row differs by
+
+    (s (f - e),  s f x (p - b) - u x e - s f x e),
+
+which is bounded entry by entry for all e and f within the tolerance: a component of ``f x d`` is at most |f| times the
+size of the two other components of d.
 """
 
 from __future__ import annotations
@@ -23,6 +31,8 @@ from .posebox import PoseBox
 
 #: Part of the sum of the sizes of all terms by which an entry may be off. A term has fewer than 100 roundings of 2^-53.
 ROUNDING = 1e-13
+#: Part of itself by which the bound of the rows' change by errors of joint centres moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-12
 #: Pairs of rotation coordinates of the monomials of second order.
 FIRST, SECOND = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
 #: Numbers of matrices of an expansion, and of monomials in three coordinates up to the second order.
@@ -35,7 +45,8 @@ class Expansion(NamedTuple):
     Attributes:
         terms: (B, 6, 22, 6) for each leg the matrices' rows: centre, first order (6), second order in the rotation (6)
             and mixed (9, position faster).
-        rest: (B, 6, 6) bound of the size of all other terms and of rounding.
+        rest: (B, 6, 6) bound of the size of all other terms, of rounding, and of the change by joint centres that are
+            off by the legs' tolerance.
     """
 
     terms: FloatArray
@@ -94,7 +105,28 @@ def expand(legs: Legs, box: PoseBox, centre: FloatArray, half: FloatArray) -> Ex
     rest[:, :, :3] += (rounding * (far + reach))[:, :, None]
     rest[:, :, 3:] = _largest_moment(rests, half[:, None, :3]) + _largest_moment(size, arm)
     rest[:, :, 3:] += (rounding * reach * far)[:, :, None]
+    if legs.tolerance > 0:
+        scales = np.abs(form.terms[:, :, 9])
+        most_scale = scales[:, 0] + (scales[:, 1:4] * wide).sum(axis=1) + (scales[:, 4:] * weight).sum(axis=1)
+        most_scale += form.rest[:, 9]
+        sizes = np.abs(u[:, :, 0]) + np.einsum("bt,blti->bli", wide, np.abs(u[:, :, 1:4])) + rests + size
+        rest += built_change(legs.tolerance, most_scale, sizes, arm)
     return Expansion(terms, rest)
+
+
+def built_change(tolerance: float, scale: FloatArray, u: FloatArray, arm: FloatArray) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows by errors of the joint centres.
+
+    Args:
+        tolerance: largest error of each joint centre, length.
+        scale: (B,) largest scale of the rotation's coordinates.
+        u: (B, 6, 3) largest sizes of the components of ``s R a``.
+        arm: (B, 6, 3) largest sizes of the components of ``p - b``.
+    """
+    s, after, last = scale[:, None, None], [1, 2, 0], [2, 0, 1]
+    moment = s * np.hypot(arm[..., after], arm[..., last]) + np.hypot(u[..., after], u[..., last]) + s * tolerance
+    force = np.broadcast_to(2 * s, moment.shape)
+    return np.concatenate([force, moment], axis=2) * (tolerance * _OUTWARDS)
 
 
 def turn_form(box: PoseBox, turn: FloatArray, wide: FloatArray) -> TurnForm:
