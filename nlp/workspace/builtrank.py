@@ -16,12 +16,10 @@ import numpy as np
 from ...models import FloatArray
 from .exact import determinant_sign
 from .inverse import inverses
-from .machine import JointErrors, Legs
+from .machine import INSIDE, JointErrors, Legs
 from .posebox import PoseBox
 from .rows import expand, turn_form
 
-#: Part of the tolerance that errors of a machine have, so that rounding leaves none outside.
-_INSIDE = 1 - 1e-12
 #: Change of the logarithm of the determinant to first order from which a change of sign is looked for, and the number
 #: of poses at which it is looked for in one call: exact determinants take a while.
 _WORTH, _POSES = 0.5, 4
@@ -54,7 +52,7 @@ def singular_machine(legs: Legs, box: PoseBox, points: FloatArray) -> SingularMa
         if not (change[k] > _WORTH and box.holds(points[k])):
             continue
         base, turned = (
-            -legs.tolerance * _INSIDE * each[k] / np.maximum(size[k], np.finfo(float).tiny)
+            -legs.tolerance * INSIDE * each[k] / np.maximum(size[k], np.finfo(float).tiny)
             for each, size in zip((along_base, along_platform), sizes, strict=True)
         )
         found = _between(exact, box, points[k], JointErrors(base, turned @ (scaled[k] / form[k, 9])))

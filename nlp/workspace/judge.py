@@ -4,28 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 from ..case.case import Case
+from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
-from .claims import claims_of
+from .builtclaims import NO_LEGS, built_claims
+from .claims import Claim, claims_of
 from .extremes import GAP, Extreme, prove_extreme
 from .machine import legs_of, workspace_of_case
-from .ownsearches import own_searches, pose_errors, strokes
+from .ownsearches import own_searches, pose_errors
 from .posebox import pose_box
 from .posed import posed_layout
 from .search import RankProgress, prove_regular
+from .strokes import with_strokes
 from .verdict import Outcome, Regularity
 
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
+#: Gap of the shortest lengths of legs that bounds of errors of joint centres rest on: they change little with it.
+_ROUGH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Verdicts on a machine over its workspace.
+    """Verdicts on a machine over its workspace; with a tolerance on joint centres, on every machine within it.
 
     Attributes:
         case: the case, its dimensions fixed.
@@ -95,27 +101,44 @@ def judge_workspace(
     box, legs = pose_box(workspace), legs_of(case)
     layout = posed_layout(case, workspace)
     claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
-    regularity = None
+    prove = partial(prove_extreme, layout, time_limit=time_limit, jobs=jobs, interrupted=is_requested, legs=legs)
+    shortest, regularity = 0.0, None
     if legs is not None:
         regularity = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=rank_progress)
     extremes: list[Extreme] = []
     if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
         return Judgement(case, workspace, regularity, ())
+    if case.joint_centre_tolerance and legs is None:
+        claims = [replace(each, uncovered=NO_LEGS) for each in claims]
+    elif legs is not None and legs.tolerance and with_limits:
+        lengths = [each for each in claims if each.leg is not None and each.sense is Sense.MIN]
+        shortest = min(prove(replace(each, limit=None), gap=_ROUGH).bound for each in lengths)
+        claims = built_claims(layout, workspace, legs, claims, shortest)
     for done, claim in enumerate(claims):
         if progress is not None:
             progress(claim.name, done, len(claims))
-        found = prove_extreme(layout, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested)
+        found = prove(claim, gap=gap)
         extremes.append(found)
         if until_fault and found.outcome is not Outcome.PROVED:
             return Judgement(case, workspace, regularity, tuple(extremes))
     if legs is not None and with_limits:
-        extremes += strokes(case, extremes)
-        for found in own_searches(case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested):
+        extremes = with_strokes(case, legs, extremes, partial(_refined, claims, prove))
+        own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
+        for found in own(case, legs, box):
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
     if legs is not None and with_limits and with_objective and eps > 0:
         shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
+        shortest += 2 * legs.tolerance  # of the exact machine
         extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
     return Judgement(case, workspace, regularity, tuple(extremes))
+
+
+def _refined(claims: Sequence[Claim], prove: Callable[..., Extreme], leg: int, sense: Sense, gap: float) -> Extreme | None:
+    """Return a length of a leg, proved more finely; None where the work is requested to stop."""
+    if is_requested():
+        return None
+    claim = next(each for each in claims if each.leg == leg and each.sense is sense)
+    return prove(claim, gap=gap)

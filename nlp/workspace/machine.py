@@ -15,6 +15,8 @@ from ..errors import CaseError
 
 #: Number of legs, as many as the platform has freedoms.
 LEGS = 6
+#: Part of a tolerance that the errors of a machine within it have, so that rounding leaves none outside.
+INSIDE = 1 - 1e-12
 
 
 class Legs(NamedTuple):
