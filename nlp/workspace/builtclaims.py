@@ -16,6 +16,7 @@ from ...models import FloatArray, matrix_from_axis_angle
 from ..case.limits.actuator_rate import ActuatorRate
 from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
+from ..case.limits.legs import Actuator
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.plates import Footprint, JointSpacing, RadiusRatio
 from ..case.limits.rate_share import RateShare
@@ -53,10 +54,11 @@ _Rule = Callable[[float], Worst]
 
 
 class _Limited(NamedTuple):
-    """A constraint of a limit with the worst machines of its number."""
+    """A constraint of a limit with the worst machines of its number, and whether the number changes with the pose."""
 
     item: BoundedConstraint
     rule: _Rule
+    changes: bool = False
 
 
 def built_claims(
@@ -78,11 +80,12 @@ def built_claims(
     context = _Context(layout, workspace, legs, shortest)
     limited = {each.item.constraint.name: each for each in context.limited()}
     found = [context.built(each, limited) for each in claims]
-    # Of limits that are the same number of the exact machine, one is a claim about it; their errors may differ.
+    # Of limits that are the same number of the exact machine, one is a claim about it. Where a number changes with the
+    # pose, those of other machines may differ.
     known = {each.name for each in claims}
-    missing = [each for name, each in limited.items() if name not in known]
+    missing = [each for name, each in limited.items() if name not in known and each.changes]
     added = [context.built(each, limited) for each in claims_of_items([each.item for each in missing])]
-    first_without = next((k for k, each in enumerate(claims) if each.name not in limited), len(claims))
+    first_without = next((k for k, each in enumerate(claims) if not each.key or each.leg is not None), len(claims))
     return [*found[:first_without], *added, *found[first_without:]]
 
 
@@ -109,7 +112,8 @@ class _Context:
     def built(self, claim: Claim, limited: dict[str, _Limited]) -> Claim:
         """Return a claim about every machine."""
         sign = 1.0 if claim.sense is Sense.MAX else -1.0
-        if claim.name in limited:
+        # A measure that is asked for has the name of the limit on it, in other terms.
+        if claim.key and claim.name in limited:
             return replace(claim, worst=limited[claim.name].rule(sign))
         if claim.name in self.of_numbers:
             return claim
@@ -141,6 +145,9 @@ class _Context:
         for limit in self.case.limits:
             if isinstance(limit, JointSpacing | Footprint):
                 yield from self._of_plates(limit)
+            elif isinstance(limit, Actuator):
+                for i, item in enumerate(limit.of_design(Design(self.case.as_limited, (robot,), {}))):
+                    yield _Limited(item, partial(worst_length, legs, i))
             elif isinstance(limit, RadiusRatio):
                 for item in limit.of_design(Design(self.case.as_limited, (robot,), {})):
                     yield _Limited(item, partial(worst_ratio, legs))
@@ -148,7 +155,7 @@ class _Context:
                 axes, on_platform = _mounting_axes(limit, legs), not isinstance(limit, BaseJointAngle)
                 for i, item in enumerate(limit.at_pose(posed)):
                     angle = LegAngle(i, axes[i], on_platform)
-                    yield _Limited(item, partial(worst_angle, legs, angle, robot, is_cosine=True))
+                    yield _Limited(item, partial(worst_angle, legs, angle, robot, is_cosine=True), changes=True)
             elif isinstance(limit, RateShare | ActuatorRate):
                 yield from self._of_rates(limit, posed)
 
@@ -169,7 +176,7 @@ class _Context:
         for item, (limb, j) in zip(limit.at_pose(posed), places, strict=True):
             i, rates, F = self.names.index(limb), self.rates[j], self.robot.F[j]
             worst = worst_share(rates, F, i) if isinstance(limit, RateShare) else worst_rate(rates, i)
-            yield _Limited(item, partial(_same, worst))
+            yield _Limited(item, partial(_same, worst), changes=True)
 
 
 def _same(worst: Worst, sign: float) -> Worst:  # noqa: ARG001 - the limit has one side
