@@ -26,6 +26,7 @@ from .wording import (
     tolerance_line,
     violation_lines,
 )
+from .workspacedigest import proof_digest
 from .workspacewording import proof_lines
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 def _task_summary(case: Case, result: SolveResult) -> Summary:
     """Yield the result of a solve of one task."""
     yield from heading_lines(case, result)
+    yield from proof_lines(result.workspace)
+    yield from proof_digest(case, result.workspace)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)
@@ -59,7 +62,6 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from singularity_lines(result.robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
-    yield from proof_lines(result.workspace)
 
 
 def _combined_summary(case: Case, result: CombinedResult) -> Summary:
