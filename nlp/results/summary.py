@@ -12,7 +12,7 @@ from .jointwording import limb_part_table
 from .robottables import jacobian_table, robot_tables
 from .rounding import listed, number, robot_size, size_of_F
 from .tables import limit_table, outcome_table, principal_table
-from .text import Line, TextTable
+from .text import Line, TextTable, Tone
 from .wording import (
     certificate_lines,
     combined_lines,
@@ -96,6 +96,8 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     """Yield the proven bounds of a case."""
     several = len(result.tasks) > 1
     yield title_line(case)
+    if result.notice is not None:
+        yield Line(result.notice, label="note", tone=Tone.CAUTION)
     for task in result.tasks:
         if several:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")
