@@ -181,7 +181,9 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
     faults: list[BindingPose | None] = []
     regular = judged.regularity
     if regular is not None and regular.outcome is not Outcome.PROVED:
-        faults.append(None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y), None, regular.errors))
+        faults.append(
+            None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y), None, regular.errors)
+        )
     by_name = {(each.name, each.sense): each for each in judged.extremes}
     for each in judged.extremes:
         if each.limit is None or each.outcome is Outcome.PROVED:

@@ -136,7 +136,9 @@ def judge_workspace(
     return Judgement(case, workspace, regularity, tuple(extremes))
 
 
-def _refined(claims: Sequence[Claim], prove: Callable[..., Extreme], leg: int, sense: Sense, gap: float) -> Extreme | None:
+def _refined(
+    claims: Sequence[Claim], prove: Callable[..., Extreme], leg: int, sense: Sense, gap: float
+) -> Extreme | None:
     """Return a length of a leg, proved more finely; None where the work is requested to stop."""
     if is_requested():
         return None

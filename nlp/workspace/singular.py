@@ -58,9 +58,7 @@ class SingularValues:
         shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance alone.
     """
 
-    def __init__(
-        self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool, shortest: float = 0.0
-    ) -> None:
+    def __init__(self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool, shortest: float = 0.0) -> None:
         self._box, self._length, self._is_condition = box, length, is_condition
         self._built, self._legs = legs, legs._replace(tolerance=0.0)
         self._change = change_of_rows(legs, length, shortest)
