@@ -249,24 +249,31 @@ def _constraints(nlp: Nlp, case: Case, binding: BindingPose, k: int) -> Iterator
         yield _regular(nlp, case, robot, where)
         return
     names = tuple(task.name for task in case.tasks)
+    if binding.longest is not None:
+        other = _robot_at(nlp, case, binding.longest)
+        other = other if binding.errors is None else machine_of(other, case, binding.errors)
+        yield from _of_stroke(case, binding, (robot, other), where)
+        return
     for limit in case.limits:
-        if binding.longest is not None:
-            other = _robot_at(nlp, case, binding.longest)
-            other = other if binding.errors is None else machine_of(other, case, binding.errors)
-            both = Design(case.as_limited, (robot, other), {})
-            for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
-                for item in family.pair(0, 1):
-                    if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
-                        yield _tightened(item, f"{binding.name}{where}")
-            continue
         # Joints are mounted as in the design.
         posed = replace(robot, legs=with_spans_of(exact, robot)) if isinstance(limit, JointAngle) else robot
-        for item in limit.at_pose(PosedRobot(case.model, posed, names, where)):
-            if item.constraint.name == f"{binding.name}{where}":
-                yield _tightened(item, item.constraint.name)
+        items = [*limit.at_pose(PosedRobot(case.model, posed, names, where))]
         if binding.errors is not None:
-            for item in on_plates(limit, case, robot):
-                if item.constraint.name == binding.name:
+            items += on_plates(limit, case, robot)
+        for item in items:
+            if item.constraint.name in (binding.name, f"{binding.name}{where}"):
+                yield _tightened(item, f"{binding.name}{where}")
+
+
+def _of_stroke(
+    case: Case, binding: BindingPose, robots: tuple[RobotInstance, RobotInstance], where: str
+) -> Iterator[BoundedConstraint]:
+    """Yield the constraints of a claim about a leg at two poses: of its shortest length, and of its longest."""
+    both = Design(case.as_limited, robots, {})
+    for limit in case.limits:
+        for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
+            for item in family.pair(0, 1):
+                if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
                     yield _tightened(item, f"{binding.name}{where}")
 
 

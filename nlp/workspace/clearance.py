@@ -72,8 +72,8 @@ class Clearance:
             (a[0] - a[1], 0, np.zeros(3)),
         )
         found = np.full(len(centre), np.inf)
-        for turned, along, fixed in choices:
-            least = n @ fixed + along * moved[0] - abs(along) * moved[1] + self._least_turned(n, form, turned, half)
+        for turned, by, fixed in choices:
+            least = n @ fixed + by * moved[0] - abs(by) * moved[1] + self._least_turned(n, form, turned, half)
             found = np.minimum(found, least)
         # How far each coordinate moves an end of a leg.
         arms = np.array([1.0, 1.0, 1.0, *[2 * np.linalg.norm(a, axis=1).max()] * 3])

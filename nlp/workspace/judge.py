@@ -6,15 +6,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from ..case.case import Case
 from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
+from ..program.layout import Layout
 from .builtclaims import NO_LEGS, built_claims
 from .claims import Claim, claims_of
 from .extremes import GAP, Extreme, prove_extreme
-from .machine import legs_of, workspace_of_case
+from .machine import Legs, legs_of, workspace_of_case
 from .ownsearches import own_searches, pose_errors
 from .posebox import pose_box
 from .posed import posed_layout
@@ -108,12 +110,7 @@ def judge_workspace(
     extremes: list[Extreme] = []
     if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
         return Judgement(case, workspace, regularity, ())
-    if case.joint_centre_tolerance and legs is None:
-        claims = [replace(each, uncovered=NO_LEGS) for each in claims]
-    elif legs is not None and legs.tolerance and with_limits:
-        lengths = [each for each in claims if each.leg is not None and each.sense is Sense.MIN]
-        shortest = min(prove(replace(each, limit=None), gap=_ROUGH).bound for each in lengths)
-        claims = built_claims(layout, workspace, legs, claims, shortest)
+    shortest, claims = _as_built(layout, workspace, legs, claims, prove)
     for done, claim in enumerate(claims):
         if progress is not None:
             progress(claim.name, done, len(claims))
@@ -123,17 +120,37 @@ def judge_workspace(
             return Judgement(case, workspace, regularity, tuple(extremes))
     if legs is not None and with_limits:
         extremes = with_strokes(case, legs, extremes, partial(_refined, claims, prove))
-        own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
-        for found in own(case, legs, box):
+        each_own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
+        for found in each_own(case, legs, box):
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
     if legs is not None and with_limits and with_objective and eps > 0:
-        shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
-        shortest += 2 * legs.tolerance  # of the exact machine
+        least = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
+        shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
         extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
     return Judgement(case, workspace, regularity, tuple(extremes))
+
+
+class _AsBuilt(NamedTuple):
+    """Claims about every machine within the tolerance, and a proven shortest length of the exact machine's legs."""
+
+    shortest: float
+    claims: list[Claim]
+
+
+def _as_built(
+    layout: Layout, workspace: Workspace, legs: Legs | None, claims: list[Claim], prove: Callable[..., Extreme]
+) -> _AsBuilt:
+    """Return claims about every machine within the case's tolerance from those about the exact one."""
+    if legs is None and layout.case.joint_centre_tolerance:
+        return _AsBuilt(0.0, [replace(each, uncovered=NO_LEGS) for each in claims])
+    if legs is None or not legs.tolerance or not claims:
+        return _AsBuilt(0.0, claims)
+    lengths = [replace(each, limit=None) for each in claims if each.leg is not None and each.sense is Sense.MIN]
+    shortest = min(prove(each, gap=_ROUGH).bound for each in lengths)
+    return _AsBuilt(shortest, built_claims(layout, workspace, legs, claims, shortest))
 
 
 def _refined(

@@ -74,5 +74,8 @@ def legs_of(case: Case) -> Legs | None:
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
     outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
     base, platform = ca.Function("legs", [symbols], outputs).call([values])
-    centres = [frozen_array(np.array(part).T, (LEGS, 3)) for part in (base, platform)]
-    return Legs(*centres, case.joint_centre_tolerance or 0.0)
+    return Legs(
+        frozen_array(np.array(base).T, (LEGS, 3)),
+        frozen_array(np.array(platform).T, (LEGS, 3)),
+        case.joint_centre_tolerance or 0.0,
+    )

@@ -9,8 +9,8 @@ It is a polynomial in the coordinates, of first order in the position. The rank 
 length, and is less than full where one has. Its expansion has the centre's matrix, 6 matrices of first order and 15 of
 second; all others are bounded together, entry by entry. The C kernel has the same formulas.
 
-In a machine whose joint centres are off by vectors e on the base and f on the platform, turned into the world frame, the
-row differs by
+In a machine whose joint centres are off by vectors e on the base and f on the platform, turned into the world frame,
+the row differs by
 
     (s (f - e),  s f x (p - b) - u x e - s f x e),
 

@@ -7,8 +7,8 @@ is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i
 divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres up to t change J by a matrix whose Frobenius norm bounds the change of every singular value
-(H. Weyl). With l the shortest length of a leg, the unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its
-moment about the platform's origin by ``|a| h + t``.
+(H. Weyl). With l the shortest length of a leg, the unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and
+its moment about the platform's origin by ``|a| h + t``.
 """
 
 from __future__ import annotations

@@ -39,8 +39,8 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
     """Return extremes, and after them those of the case's limits on telescoping legs.
 
     A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
-    lies between its bound and the value reached, the two lengths are proved more finely, and stand in the place of those
-    given.
+    lies between its bound and the value reached, the two lengths are proved more finely, and stand in the place of
+    those given.
 
     Args:
         case: the case.

@@ -1,14 +1,14 @@
 """The worst machine within a tolerance on joint centres, for each number that a workspace is judged by.
 
-A base joint centre is off by e and a platform joint centre by f, turned into the world frame, each up to the tolerance t.
+A base joint centre is off by e, and a platform joint centre by f in the world frame, each up to the tolerance t.
 With d the vector of a leg, l its length and n = d / l:
 
 * a length changes by at most 2 t, where e and f are along the leg: the triangle inequality is met;
 * the angle of a leg to a fixed axis changes by at most ``asin(2 t / l)``, where the leg turns in the plane of both;
-* the work rate ``w . n`` of a leg in a twist (omega, v) has the derivatives ``(w_b - n n.w_b) / l`` with respect to f and
-  ``-(w_a - n n.w_a) / l`` with respect to e, with w_a and w_b the velocities of the platform, extended to the base joint
-  for w_b. On the way from the exact machine l is at least l - 2 t, n is off by at most ``2 t / (l - 2 t)``, and w by
-  ``|omega| t``. So the rate changes by at most
+* the work rate ``w . n`` of a leg in a twist (omega, v) has the derivatives ``(w_b - n n.w_b) / l`` with respect to f
+  and ``-(w_a - n n.w_a) / l`` with respect to e, with w_a and w_b the velocities of the platform at the platform joint
+  and, extended, at the base joint. On the way from the exact machine l is at least l - 2 t, n is off by at most
+  ``2 t / (l - 2 t)``, and w by ``|omega| t``. So the rate changes by at most
 
       t ((|w_a x n| + |w_b x n| + (|w_a| + |w_b|) 2 t / (l - 2 t) + 2 |omega| t) / (l - 2 t).
 
@@ -62,7 +62,13 @@ class Worst:
 
 
 class Spans(NamedTuple):
-    """Legs at a pose: vectors (6, 3) from base to platform joint in the world frame, lengths (6,), directions (6, 3)."""
+    """Legs at a pose.
+
+    Attributes:
+        d: (6, 3) vectors from base to platform joint in the world frame.
+        l: (6,) their lengths.
+        n: (6, 3) their directions.
+    """
 
     d: FloatArray
     l: FloatArray  # noqa: E741 - the symbol of a length in the formulas above
@@ -140,8 +146,8 @@ def worst_angle(legs: Legs, angle: LegAngle, robot: RobotInstance, sign: float, 
     axis = robot.rotation @ axis if angle.on_platform else axis
     square, across, dot = ca.sumsqr(d), ca.norm_2(ca.cross(axis, d)), ca.dot(axis, d)
     if is_cosine:
-        # -cos(angle + asin(off / l)), and at least 1 where the sum is beyond half a turn: the first two terms are concave
-        # in the cosine there, and the third is the chord that they lack.
+        # -cos(angle + asin(off / l)), and at least 1 where the sum is beyond half a turn: the first two terms are
+        # concave in the cosine there, and the third is the chord that they lack.
         minus, level = -(dot / ca.sqrt(square)), ca.sqrt(1 - off**2 / square)
         expression = minus * level + off * across / square + ca.fmax(minus - level, 0)
     else:

@@ -265,8 +265,8 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
         if found.verdict[k] == Rank.REGULAR:
             assert (signs == signs[0]).all()
         changed += (signs != signs[0]).any()
-    # Without the tolerance boxes would be called regular that are not so for every machine: the test can fail. About one
-    # axis no pose of this machine is near a singular one.
+    # Without the tolerance boxes would be called regular that are not so for every machine: the test can fail. About
+    # one axis no pose of this machine is near a singular one.
     assert changed or kind is TurnKind.AXIS
     assert Rank.REGULAR in found.verdict
 
