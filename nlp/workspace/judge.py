@@ -9,6 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ..case.case import Case
+from ..case.limits.constraint import LENGTH
 from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
@@ -23,6 +24,7 @@ from .posed import posed_layout
 from .search import RankProgress, prove_regular
 from .strokes import with_strokes
 from .verdict import Outcome, Regularity
+from .worst import Directions, length_beside
 
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
@@ -119,7 +121,8 @@ def judge_workspace(
         if until_fault and found.outcome is not Outcome.PROVED:
             return Judgement(case, workspace, regularity, tuple(extremes))
     if legs is not None and with_limits:
-        extremes = with_strokes(case, legs, extremes, partial(_refined, claims, prove))
+        refine = partial(_refined, layout, legs, shortest, claims, prove)
+        extremes = with_strokes(case, legs, extremes, refine)
         each_own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
         for found in each_own(case, legs, box):
             extremes.append(found)
@@ -154,10 +157,24 @@ def _as_built(
 
 
 def _refined(
-    claims: Sequence[Claim], prove: Callable[..., Extreme], leg: int, sense: Sense, gap: float
+    layout: Layout,
+    legs: Legs,
+    shortest: float,
+    claims: Sequence[Claim],
+    prove: Callable[..., Extreme],
+    leg: int,
+    sense: Sense,
+    gap: float,
+    about: Directions | None,
 ) -> Extreme | None:
-    """Return a length of a leg, proved more finely; None where the work is requested to stop."""
+    """Return a length of a leg, proved more finely; None where the work is requested to stop, or none is bounded."""
     if is_requested():
         return None
     claim = next(each for each in claims if each.leg == leg and each.sense is sense)
-    return prove(claim, gap=gap)
+    if about is None:
+        return prove(claim, gap=gap)
+    if not shortest > 2 * legs.tolerance:
+        return None
+    sign = 1.0 if sense is Sense.MAX else -1.0
+    expression = length_beside(legs, leg, layout.robots[0], sign, shortest, about)
+    return prove(Claim(claim.name, sense, expression, LENGTH), gap=gap)

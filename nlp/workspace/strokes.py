@@ -16,13 +16,17 @@ from ..case.task import Sense
 from .extremes import Extreme, slack_of
 from .machine import LEGS, Legs
 from .verdict import Outcome
-from .worst import along, spans
+from .worst import Directions, along, spans
 
 #: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
 _FINEST, _SHARE = 1e-11, 0.9
 
-#: Proves the smallest or largest length of a leg, by its index, to a finer gap; None where it cannot.
-Refine = Callable[[int, Sense, float], Extreme | None]
+#: Gaps of lengths with which a limit is tried that the triangle inequality leaves open.
+_GAPS = (1e-4, 1e-6)
+
+#: Proves the smallest or largest length of a leg, by its index, to a finer gap; with directions, the length less the
+#: part of its errors that is the same at every pose. None where it cannot.
+Refine = Callable[[int, Sense, float, Directions | None], Extreme | None]
 
 
 class _Kind(NamedTuple):
@@ -64,15 +68,49 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
             name = f"{kind.key} limb {leg.name}"
             extreme = _of_lengths(name, kind, legs, i, found[short], found[long])
             while (gap := _finer_gap(kind, extreme, found[short], found[long])) is not None:
-                finer = [refine(i, sense, gap) for sense in (Sense.MIN, Sense.MAX)]
+                finer = [refine(i, sense, gap, None) for sense in (Sense.MIN, Sense.MAX)]
                 if finer[0] is None or finer[1] is None:
                     break
                 found[short], found[long] = _better(found[short], finer[0]), _better(found[long], finer[1])
                 before, extreme = extreme, _of_lengths(name, kind, legs, i, found[short], found[long])
                 if extreme.bound == before.bound:
                     break
-            added.append(extreme)
+            added.append(_of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine))
     return [*found, *added]
+
+
+def _of_one_machine(
+    kind: _Kind, legs: Legs, i: int, extreme: Extreme, ends: tuple[Extreme, Extreme], refine: Refine
+) -> Extreme:
+    """Return an extreme that is open with a bound for machines whose errors are the same at both poses.
+
+    Args:
+        kind: the number.
+        legs: joint centres, with their tolerance.
+        i: index of the leg.
+        extreme: with the bound of the triangle inequality.
+        ends: the shortest and the longest length.
+        refine: proves a length more finely.
+    """
+    poses = [each.pose for each in ends if each.pose is not None]
+    if not legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < 2:
+        return extreme
+    at = [spans(legs, pose).n[i] for pose in poses]
+    turned = [n @ pose.rotation for n, pose in zip(at, poses, strict=True)]
+    about = Directions(0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]))
+    sign = 1.0 if kind.sense is Sense.MAX else -1.0
+    # What does not cancel: nothing in a stroke.
+    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about)
+    for gap in _GAPS:
+        short, long = (refine(i, sense, gap, about) for sense in (Sense.MIN, Sense.MAX))
+        if short is None or long is None:
+            break
+        bound = kind.long * long.bound + kind.short * short.bound + sign * left
+        if math.isfinite(bound) and sign * bound < sign * extreme.bound:
+            extreme = replace(extreme, bound=bound)
+        if sign * (extreme.bound - kind.limit) <= slack_of(kind.limit):
+            return replace(extreme, outcome=Outcome.PROVED, reason="")
+    return extreme
 
 
 def _finer_gap(kind: _Kind, extreme: Extreme, short: Extreme, long: Extreme) -> float | None:

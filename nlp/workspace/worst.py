@@ -114,6 +114,36 @@ def worst_length(legs: Legs, i: int, sign: float) -> Worst:
     return Worst(errors, value, allowance=2 * legs.tolerance, least=0.0)
 
 
+class Directions(NamedTuple):
+    """Vectors that stand for a leg's direction over a workspace: (3,) in the world frame, and in the platform frame."""
+
+    base: FloatArray
+    platform: FloatArray
+
+
+def length_beside(legs: Legs, i: int, robot: RobotInstance, sign: float, shortest: float, about: Directions) -> SX:
+    """Return a bound (1, 1) of the length of a leg less ``f.c_p - e.c_b``, which is the same at every pose.
+
+    Errors change a length by ``f.(R' n) - e.n`` and by at most ``(2 t)^2 / 2 (l - 2 t)`` more, never less. In the
+    difference of two lengths of one machine the part with the fixed vectors c_p and c_b cancels, and the rest is small
+    where the direction of the leg changes little.
+
+    Args:
+        legs: joint centres, with their tolerance.
+        i: index of the leg.
+        robot: the exact machine in symbols of the pose.
+        sign: 1 for an upper bound, -1 for a lower one.
+        shortest: no leg of the exact machine is shorter over the workspace; more than twice the tolerance.
+        about: c_b and c_p.
+    """
+    d, t = robot.legs[i].span, legs.tolerance
+    length = ca.norm_2(d)
+    off = ca.norm_2(d / length - SX(about.base.tolist()))
+    off += ca.norm_2(robot.rotation.T @ d / length - SX(about.platform.tolist()))
+    bend = 2 * t**2 / (shortest - 2 * t) if sign > 0 else 0.0
+    return length + sign * (t * off + bend) * _OUTWARDS
+
+
 class LegAngle(NamedTuple):
     """The angle of a leg to an axis: index of the leg, unit axis (3,), and whether it turns with the platform."""
 
