@@ -183,7 +183,8 @@ class WorkspaceProofData(JsonObject):
         proved: whether J is regular at every pose, and every limit holds there.
         joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
             about the exact machine alone.
-        tighter: part of themselves by which the program's limits at the poses are tighter than the case's.
+        tighter: part of themselves by which the program's limits at the poses are tighter than the case's;
+            absent in results of earlier versions.
         designs: each design that was judged; the last is the answer.
         poses: of the constraints.
         regular: whether J has full rank at every pose.
@@ -192,7 +193,7 @@ class WorkspaceProofData(JsonObject):
 
     proved: bool
     joint_centre: Absent[float]
-    tighter: float
+    tighter: Absent[float]
     designs: tuple[DesignData, ...]
     poses: tuple[BindingData, ...]
     regular: RegularData | None

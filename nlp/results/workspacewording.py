@@ -86,7 +86,8 @@ def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     yield Line(f"F = {steps}", label="designs")
     count = len(proof.poses)
     words = f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints"
-    after = f", tighter than the limits by {proof.tighter:g} of the program's number" if count else ""
+    tighter = count and proof.tighter
+    after = f", tighter than the limits by {tighter:g} of the program's number" if tighter else ""
     yield Line(words, label="exchange", after=after)
 
 
