@@ -43,10 +43,12 @@ from .worst import (
     worst_sum,
 )
 
-#: Reasons for claims that are about the exact machine alone.
-NO_LEGS = "for exact joint centres only: their errors are covered for six straight legs"
-_NO_RULE = "for exact joint centres only: this number has no rule for their errors"
-_SHORT = "for exact joint centres only: no leg length above their errors is proved"
+#: Reasons for claims that are open because errors of joint centres are not covered.
+NO_LEGS = (
+    "errors of joint centres are covered for six straight legs alone; without [tolerance] the exact machine is judged"
+)
+_NO_RULE = "this number has no rule for errors of joint centres; without [tolerance] the exact machine is judged"
+_SHORT = "no length of legs above the errors of joint centres is proved"
 
 
 #: The worst machines of a number: the largest for a sign of 1, the smallest for -1.

@@ -225,8 +225,11 @@ def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
         else:
             outcome = Outcome.PROVED if sign * (bound - claim.limit) <= slack and math.isfinite(bound) else Outcome.OPEN
             reason = reason or (CLOSE if outcome is Outcome.OPEN else "")
-    if claim.uncovered and outcome is Outcome.PROVED:
-        outcome, reason = Outcome.OPEN, claim.uncovered
+    if claim.uncovered:
+        # What is proved of the exact machine is nothing about the others, and refutes all the same.
+        shown_bound = sign * math.inf
+        if outcome is not Outcome.REFUTED:
+            outcome, reason = Outcome.OPEN, claim.uncovered
     return Extreme(
         name=claim.name,
         sense=claim.sense,
