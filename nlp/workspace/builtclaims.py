@@ -35,13 +35,11 @@ from .worst import (
     spans,
     worst_angle,
     worst_length,
-    worst_radius,
     worst_rate,
-    worst_ratio,
     worst_share,
-    worst_spacing,
     worst_sum,
 )
+from .worstplates import worst_radius, worst_ratio, worst_spacing
 
 #: Reasons for claims that are open because errors of joint centres are not covered.
 NO_LEGS = (

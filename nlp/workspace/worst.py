@@ -85,16 +85,16 @@ def spans(legs: Legs, pose: PoseNumbers) -> Spans:
 def along(legs: Legs, pose: PoseNumbers, base: FloatArray, platform: FloatArray) -> JointErrors:
     """Return errors as large as the tolerance along vectors (6, 3) in the world frame, none for a vector of zero."""
     size = legs.tolerance * INSIDE
-    return JointErrors(size * _unit(base), size * _unit(platform) @ pose.rotation)
+    return JointErrors(size * unit(base), size * unit(platform) @ pose.rotation)
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit(vectors: FloatArray) -> FloatArray:
     """Return vectors (6, 3) of length 1, or zero."""
     sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(np.divide(vectors, sizes, out=np.zeros_like(vectors), where=sizes > 0))
 
 
-def _of_leg(i: int, vector: FloatArray) -> FloatArray:
+def of_leg(i: int, vector: FloatArray) -> FloatArray:
     """Return vectors (6, 3) of which only that of a leg is not zero."""
     found = np.zeros((LEGS, 3))
     found[i] = vector
@@ -105,7 +105,7 @@ def worst_length(legs: Legs, i: int, sign: float) -> Worst:
     """Return the longest (sign 1) or the shortest (sign -1) length of a leg."""
 
     def errors(pose: PoseNumbers) -> JointErrors:
-        n = _of_leg(i, sign * spans(legs, pose).n[i])
+        n = of_leg(i, sign * spans(legs, pose).n[i])
         return along(legs, pose, -n, n)
 
     def value(machine: Legs, pose: PoseNumbers) -> float:
@@ -192,7 +192,7 @@ def worst_angle(legs: Legs, angle: LegAngle, robot: RobotInstance, sign: float, 
         away = away / size if size > 0 else np.linalg.svd(n[None])[2][-1]
         sine = min(off / length, 1.0)
         moved = sign * math.sqrt(1 - sine * sine) * away - sine * n
-        return along(legs, pose, _of_leg(angle.leg, -moved), _of_leg(angle.leg, moved))
+        return along(legs, pose, of_leg(angle.leg, -moved), of_leg(angle.leg, moved))
 
     return Worst(errors, angle.value, expression, least=0.0, most=math.pi)
 
@@ -298,55 +298,3 @@ def worst_share(rates: Rates, total: SX, i: int) -> Worst:
     signs = 2 * np.eye(LEGS)[i] - 1
     expression = own / (total + rates.rises[i] - others)
     return Worst(lambda pose: rates.errors(pose, signs), value, expression, least=0.0, most=1.0)
-
-
-def worst_spacing(legs: Legs, plate: str, one: int, other: int) -> Worst:
-    """Return the smallest distance of two joint centres of a plate, ``base`` or ``platform``."""
-
-    def value(machine: Legs, pose: PoseNumbers) -> float:  # noqa: ARG001 - no pose changes it
-        centres = getattr(machine, plate)
-        return float(np.linalg.norm(centres[other] - centres[one]))
-
-    def errors(pose: PoseNumbers) -> JointErrors:  # noqa: ARG001 - no pose changes it
-        centres = getattr(legs, plate)
-        apart = centres[other] - centres[one]
-        return _of_plate(legs, plate, _of_leg(one, apart) - _of_leg(other, apart))
-
-    return Worst(errors, value, allowance=2 * legs.tolerance, least=0.0)
-
-
-def worst_radius(legs: Legs, plate: str, i: int) -> Worst:
-    """Return the largest distance of a joint centre from its plate's axis."""
-
-    def value(machine: Legs, pose: PoseNumbers) -> float:  # noqa: ARG001 - no pose changes it
-        return float(np.linalg.norm(getattr(machine, plate)[i, :2]))
-
-    def errors(pose: PoseNumbers) -> JointErrors:  # noqa: ARG001 - no pose changes it
-        return _of_plate(legs, plate, _of_leg(i, getattr(legs, plate)[i] * (1.0, 1.0, 0.0)))
-
-    return Worst(errors, value, allowance=legs.tolerance)
-
-
-def worst_ratio(legs: Legs, sign: float) -> Worst:
-    """Return the largest (sign 1) or smallest (sign -1) ratio of the platform's radius to the base's."""
-    radii = [np.linalg.norm(centres[:, :2], axis=1) for centres in (legs.platform, legs.base)]
-    t = sign * legs.tolerance * _OUTWARDS
-    squares = [float((np.maximum(r + e, 0.0) ** 2).sum()) for r, e in zip(radii, (t, -t), strict=True)]
-
-    def value(machine: Legs, pose: PoseNumbers) -> float:  # noqa: ARG001 - no pose changes it
-        return float(np.linalg.norm(machine.platform[:, :2]) / np.linalg.norm(machine.base[:, :2]))
-
-    def errors(pose: PoseNumbers) -> JointErrors:  # noqa: ARG001 - no pose changes it
-        flat = np.array([1.0, 1.0, 0.0])
-        return JointErrors(
-            _of_plate(legs, "base", -sign * legs.base * flat).base,
-            _of_plate(legs, "platform", sign * legs.platform * flat).platform,
-        )
-
-    return Worst(errors, value, SX(squares[0] / squares[1] if squares[1] > 0 else math.inf), least=0.0)
-
-
-def _of_plate(legs: Legs, plate: str, vectors: FloatArray) -> JointErrors:
-    """Return errors as large as the tolerance along vectors (6, 3) in the frame of one plate."""
-    errors, none = legs.tolerance * INSIDE * _unit(vectors), np.zeros((LEGS, 3))
-    return JointErrors(errors, none) if plate == "base" else JointErrors(none, errors)
