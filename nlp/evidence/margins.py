@@ -81,7 +81,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
         key = constraint.keys[1 if side.bound == "max" else 0]
         if not key:
             continue
-        limit = float(nlp.sides.limit[j])
+        limit = nlp.stated_limit(j)
         rows.append(
             Margin(
                 name=side.name,

@@ -154,7 +154,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
 def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
     """Return side j with its scaled multiplier converted to F per unit of the limit."""
     side = at.sides[j]
-    limit = float(nlp.sides.limit[j])
+    limit = nlp.stated_limit(j)
     multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
     if side.constraint is not None:
         reading = nlp.program.constraints[side.constraint].reading

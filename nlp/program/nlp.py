@@ -163,6 +163,12 @@ class Nlp(Whole):
         """Factor that turns the objective into one to be minimised: -1 for a maximum, 1 for a minimum."""
         return -1.0 if self.sense is Sense.MAX else 1.0
 
+    def stated_limit(self, j: int) -> float:
+        """Return the bound of side j as the case states it, in the units of its expression."""
+        side = self.sides.sides[j]
+        stated = None if side.constraint is None else self.program.constraints[side.constraint].stated
+        return float(self.sides.limit[j]) if stated is None else stated[0 if side.bound == "min" else 1]
+
     @cached_property
     def sides(self) -> Sides:
         """All sides of the variables' bounds and of the constraints."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 from ..case.task import Sense
 from .data import CertificateData
 from .evidence import certificate_data, incumbent_data
-from .jsondata import Inline, JsonObject
+from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, VersionsData
-from .point import head_data, versions
+from .point import head_data, stated_pose_notice, versions
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
@@ -38,6 +38,8 @@ class CertifiedResult(JsonObject):
         certificate: of the one task, or of the program that combines several; null where there is no such program.
         point: the best point known, by the names of the program's variables; null where there is none.
         tasks: each task by itself.
+        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
+            absent.
         versions: of the programs.
     """
 
@@ -45,6 +47,7 @@ class CertifiedResult(JsonObject):
     certificate: CertificateData | None
     point: Mapping[str, float] | None
     tasks: tuple[CertifiedTaskData, ...]
+    notice: Absent[str]
     versions: VersionsData
 
 
@@ -61,5 +64,6 @@ def certified_of(certified: "Certified") -> CertifiedResult:
             )
             for task, each in zip(case.tasks, certified.tasks, strict=True)
         ),
+        notice=stated_pose_notice(case),
         versions=versions(),
     )

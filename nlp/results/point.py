@@ -49,6 +49,11 @@ def head_data(case: Case) -> HeadData:
     return HeadData(schema=SCHEMA, case=case.name, title=case.title, model=case.model.name, units=units)
 
 
+def stated_pose_notice(case: Case) -> str | None:
+    """Return the notice that limits over the workspace are taken at the stated pose alone; None for other cases."""
+    return None if case.workspace is None else case.workspace.stated_pose_notice or None
+
+
 @cache
 def versions() -> VersionsData:
     """Return the versions of the programs that the numbers depend on."""

@@ -12,7 +12,7 @@ from .jointwording import limb_part_table
 from .robottables import jacobian_table, robot_tables
 from .rounding import listed, number, robot_size, size_of_F
 from .tables import limit_table, outcome_table, principal_table
-from .text import Line, TextTable
+from .text import Line, TextTable, Tone
 from .wording import (
     certificate_lines,
     combined_lines,
@@ -26,6 +26,7 @@ from .wording import (
     tolerance_line,
     violation_lines,
 )
+from .workspacedigest import proof_digest
 from .workspacewording import proof_lines
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 def _task_summary(case: Case, result: SolveResult) -> Summary:
     """Yield the result of a solve of one task."""
     yield from heading_lines(case, result)
+    yield from proof_lines(result.workspace)
+    yield from proof_digest(case, result.workspace)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)
@@ -59,7 +62,6 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from singularity_lines(result.robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
-    yield from proof_lines(result.workspace)
 
 
 def _combined_summary(case: Case, result: CombinedResult) -> Summary:
@@ -94,6 +96,8 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     """Yield the proven bounds of a case."""
     several = len(result.tasks) > 1
     yield title_line(case)
+    if result.notice is not None:
+        yield Line(result.notice, label="note", tone=Tone.CAUTION)
     for task in result.tasks:
         if several:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")

@@ -8,9 +8,9 @@ from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint
 from .data import CaseResult, CombinedResult, SolveResult
-from .jsondata import Inline, JsonObject, Vector, finite_or_none
+from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
 from .parts import HeadData, LimitData, PoseData, RobotData, VersionsData
-from .point import head_data, versions
+from .point import head_data, stated_pose_notice, versions
 from .result import result_of
 
 #: Stands before the dotted key of a limit.
@@ -54,6 +54,8 @@ class TradeoffResult(JsonObject):
         seed: of the starting points.
         versions: of the programs.
         seconds: wall time.
+        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
+            absent.
     """
 
     head: Inline[HeadData]
@@ -65,6 +67,7 @@ class TradeoffResult(JsonObject):
     seed: int
     versions: VersionsData
     seconds: float
+    notice: Absent[str]
 
 
 def tradeoff_result(found: Tradeoff) -> TradeoffResult:
@@ -84,6 +87,7 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
         seed=found.points[0].solution.seed,
         versions=versions(),
         seconds=found.seconds,
+        notice=stated_pose_notice(case),
     )
 
 

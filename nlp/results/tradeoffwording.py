@@ -23,6 +23,8 @@ def tradeoff_summary(case: Case, result: TradeoffResult) -> Iterator[Line | Text
     """Yield a trade-off: what is varied, then a row for each value."""
     yield title_line(case)
     yield Line(over_words(result), label="over")
+    if result.notice is not None:
+        yield Line(result.notice, label="note", tone=Tone.CAUTION)
     yield tradeoff_table(result)
     if throughout_words(result):
         yield Line(throughout_words(result), label="active throughout")

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..solver.exchange import WorkspaceProof
     from ..workspace.extremes import Extreme
     from ..workspace.judge import Judgement
+    from ..workspace.machine import JointErrors
     from ..workspace.posebox import PoseNumbers
     from ..workspace.verdict import Regularity
 
@@ -34,6 +35,18 @@ class WorkspacePose(JsonObject):
     angle: float
 
 
+class MachineData(JsonObject):
+    """Errors of the joint centres of a machine, one for each leg.
+
+    Attributes:
+        base: of the base joints, in the world frame, length.
+        platform: of the platform joints, in the platform frame, length.
+    """
+
+    base: tuple[Vector3, ...]
+    platform: tuple[Vector3, ...]
+
+
 class RegularData(JsonObject):
     """Verdict on the claim that J has full rank at every pose.
 
@@ -49,6 +62,7 @@ class RegularData(JsonObject):
         seconds: wall time.
         engine: ``c`` or ``numpy``.
         reason: for stopping early; absent without one.
+        machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
     """
 
     outcome: Outcome
@@ -60,6 +74,7 @@ class RegularData(JsonObject):
     seconds: float
     engine: str
     reason: Absent[str]
+    machine: Absent[MachineData]
 
 
 class ExtremeData(JsonObject):
@@ -78,6 +93,7 @@ class ExtremeData(JsonObject):
         boxes: number of boxes examined.
         seconds: wall time.
         reason: for an open outcome; absent without one.
+        machine: that reaches the value at the pose; absent for the exact machine.
     """
 
     name: str
@@ -92,6 +108,7 @@ class ExtremeData(JsonObject):
     boxes: int
     seconds: float
     reason: Absent[str]
+    machine: Absent[MachineData]
 
 
 class ScaleData(JsonObject):
@@ -116,6 +133,8 @@ class WorkspaceResult(JsonObject):
     Attributes:
         head: the case.
         parameters: dimensions by name; three numbers for a point or direction.
+        joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
+            about the exact machine alone.
         proved: whether J is regular at every pose, every limit holds, and every number is bounded.
         regular: whether J has full rank at every pose; null for a robot that is not six straight legs.
         extremes: smallest and largest values.
@@ -125,6 +144,7 @@ class WorkspaceResult(JsonObject):
 
     head: Inline[HeadData]
     parameters: Mapping[str, float | Vector]
+    joint_centre: Absent[float]
     proved: bool
     regular: RegularData | None
     extremes: tuple[ExtremeData, ...]
@@ -161,6 +181,10 @@ class WorkspaceProofData(JsonObject):
 
     Attributes:
         proved: whether J is regular at every pose, and every limit holds there.
+        joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
+            about the exact machine alone.
+        tighter: part of themselves by which the program's limits at the poses are tighter than the case's;
+            absent in results of earlier versions.
         designs: each design that was judged; the last is the answer.
         poses: of the constraints.
         regular: whether J has full rank at every pose.
@@ -168,6 +192,8 @@ class WorkspaceProofData(JsonObject):
     """
 
     proved: bool
+    joint_centre: Absent[float]
+    tighter: Absent[float]
     designs: tuple[DesignData, ...]
     poses: tuple[BindingData, ...]
     regular: RegularData | None
@@ -182,6 +208,8 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
     units = judged.case.units
     return WorkspaceProofData(
         proved=proof.is_proved,
+        joint_centre=judged.case.joint_centre_tolerance,
+        tighter=proof.tighter,
         designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
         regular=None if judged.regularity is None else _regular_data(judged.regularity, units),
@@ -199,6 +227,7 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
     return WorkspaceResult(
         head=head_data(case),
         parameters=parameters,
+        joint_centre=case.joint_centre_tolerance,
         proved=judged.is_proved,
         regular=None if judged.regularity is None else _regular_data(judged.regularity, case.units),
         extremes=tuple(_extreme_data(each, case.units) for each in judged.extremes),
@@ -236,7 +265,14 @@ def _regular_data(found: "Regularity", units: Units) -> RegularData:
         seconds=found.seconds,
         engine=found.engine,
         reason=found.reason or None,
+        machine=None if found.errors is None else _machine_data(found.errors),
     )
+
+
+def _machine_data(errors: "JointErrors") -> MachineData:
+    """Return the errors of a machine; lengths are in the case's unit already."""
+    base, platform = (tuple(vector(part) for part in each) for each in errors)
+    return MachineData(base=base, platform=platform)
 
 
 def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
@@ -258,4 +294,5 @@ def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
         boxes=each.boxes,
         seconds=each.seconds,
         reason=each.reason or None,
+        machine=None if each.errors is None else _machine_data(each.errors),
     )

@@ -11,6 +11,7 @@ from ..workspace.verdict import Outcome
 from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
+from .workspacedigest import TONES, refuting_machine, verdict_lines
 
 if TYPE_CHECKING:
     from .workspace import (
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
         WorkspaceResult,
     )
 
-_TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
+#: So many limits that are refuted are shown with their poses before the tables.
+_REFUTED = 3
 
 
 def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
@@ -36,18 +38,29 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
 
 
 def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine over its workspace."""
+    """Yield the verdicts on a machine over its workspace: a digest, then every number."""
     yield title_line(case)
+    yield from verdict_lines(case, result)
     if result.regular is None:
         yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
     else:
         yield from _regular_lines(case, result.regular)
-    yield from _tables(case, result.extremes)
     yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
-    words = "everything is proved for every pose" if result.proved else "not everything is proved"
-    yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield from _refuted_lines(case, result.extremes)
+    yield from _tables(case, result.extremes)
+
+
+def _refuted_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[Line | TextTable]:
+    """Yield the pose of the first limits that are refuted, and the machine of the first of them."""
+    refuted = [each for each in extremes if each.outcome is Outcome.REFUTED and each.pose is not None]
+    for k, each in enumerate(refuted[:_REFUTED]):
+        if each.pose is not None:
+            yield Line(each.name, label="refuted", tone=Tone.FAULT, after=f", at {_pose_words(case, each.pose)}")
+            yield Line(f"evaluate {case.name} {setting_words(each.pose)}", label="see it with")
+        if k == 0 and each.machine is not None:
+            yield refuting_machine(case, each.name, each.machine)
 
 
 def setting_words(pose: WorkspacePose) -> str:
@@ -72,7 +85,10 @@ def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
     yield Line(f"F = {steps}", label="designs")
     count = len(proof.poses)
-    yield Line(f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints", label="exchange")
+    words = f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints"
+    tighter = count and proof.tighter
+    after = f", tighter than the limits by {tighter:g} of the program's number" if tighter else ""
+    yield Line(words, label="exchange", after=after)
 
 
 def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
@@ -99,7 +115,7 @@ def _pose_words(case: Case, pose: WorkspacePose) -> str:
     return f"({position}), {pose.angle:.5g} {case.units.angle} about ({axis})"
 
 
-def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line]:
+def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line | TextTable]:
     """Yield the verdict on regularity."""
     share = f"{100 * regular.share:.3g} % of the box"
     words = {
@@ -107,11 +123,13 @@ def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line]:
         Outcome.REFUTED: ": J is singular at a pose",
         Outcome.OPEN: f": {regular.open:,} boxes are left, {share} ({regular.reason or ''})",
     }
-    yield Line(regular.outcome.value, label="regular", tone=_TONES[regular.outcome], after=words[regular.outcome])
+    yield Line(regular.outcome.value, label="regular", tone=TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
         yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
     if regular.outcome is Outcome.REFUTED and regular.pose is not None:
         yield Line(f"evaluate {case.name} {setting_words(regular.pose)}", label="see it with")
+    if regular.machine is not None:
+        yield refuting_machine(case, "regular", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
     yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label="search")
 
@@ -121,7 +139,7 @@ def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTa
     cells = []
     for each in rows:
         worst = "smallest" if each.sense is Sense.MIN else "largest"
-        known = [Line(each.outcome.value, tone=_TONES[each.outcome], after=f": {each.reason}" if each.reason else "")]
+        known = [Line(each.outcome.value, tone=TONES[each.outcome], after=f": {each.reason}" if each.reason else "")]
         limit = [] if name == "ranges" else ["" if each.limit is None else number(each.limit)]
         cells.append(
             (

@@ -24,6 +24,7 @@ from casadi import SX
 from ...models import FloatArray, RobotInstance, Substitution, instantiate
 from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from ..case.limits.joints import JointAngle
 from ..case.limits.limit import Design, PosedRobot
 from ..case.task import Sense
 from ..errors import CaseError
@@ -31,9 +32,10 @@ from ..interruption import is_requested
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..workspace.judge import Judgement, judge_workspace
-from ..workspace.machine import LEGS
+from ..workspace.machine import LEGS, JointErrors
 from ..workspace.posebox import PoseNumbers, pose_box
 from ..workspace.verdict import Outcome
+from .machines import machine_of, on_plates, with_spans_of
 from .multistart import ProgramSolution
 
 #: Part of a limit by which it is tighter in the constraints, and gap of the proofs: several of them fit between.
@@ -55,11 +57,19 @@ ExchangeProgress = Callable[[int, float, int], None]
 
 
 class BindingPose(NamedTuple):
-    """A pose at which a claim, by its name, is a constraint; a stroke has the pose of the longest length too."""
+    """A pose at which a claim, by its name, is a constraint.
+
+    Attributes:
+        name: of the claim.
+        pose: the pose; of a stroke that of the shortest length.
+        longest: pose of the longest length of a stroke; else None.
+        errors: of the joint centres of the machine that is meant; None for the exact one.
+    """
 
     name: str
     pose: PoseNumbers
     longest: PoseNumbers | None = None
+    errors: JointErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +81,14 @@ class WorkspaceProof:
         poses: poses of the constraints, in the order in which they were found.
         history: F, and the number of claims that were not proved, of each design in turn.
         first: the design that keeps the limits at the stated pose alone: its judgement.
+        tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
     """
 
     judgement: Judgement
     poses: tuple[BindingPose, ...]
     history: tuple[tuple[float, int], ...]
     first: Judgement
+    tighter: float = TIGHTER
 
     @property
     def is_proved(self) -> bool:
@@ -169,7 +181,9 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
     faults: list[BindingPose | None] = []
     regular = judged.regularity
     if regular is not None and regular.outcome is not Outcome.PROVED:
-        faults.append(None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y)))
+        faults.append(
+            None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y), None, regular.errors)
+        )
     by_name = {(each.name, each.sense): each for each in judged.extremes}
     for each in judged.extremes:
         if each.limit is None or each.outcome is Outcome.PROVED:
@@ -179,16 +193,19 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         elif each.key.startswith("actuator."):
             limb = each.name.partition(" limb ")[2]
             short, long = (by_name[f"leg_length limb {limb}", sense].pose for sense in (Sense.MIN, Sense.MAX))
-            faults.append(None if short is None else BindingPose(each.name, short, long))
+            faults.append(None if short is None else BindingPose(each.name, short, long, each.errors))
         else:
-            faults.append(BindingPose(each.name, each.pose))
+            faults.append(BindingPose(each.name, each.pose, None, each.errors))
     return faults
 
 
 def _is_known(one: BindingPose, others: Sequence[BindingPose]) -> bool:
-    """Return whether a pose is a constraint of the same claim already."""
+    """Return whether a pose is a constraint of the same claim already, with the same machine."""
     return any(
-        one.name == other.name and _are_same(one.pose, other.pose) and _are_same(one.longest, other.longest)
+        one.name == other.name
+        and _are_same(one.pose, other.pose)
+        and _are_same(one.longest, other.longest)
+        and (one.errors is other.errors or np.array_equal(one.errors or (), other.errors or ()))
         for other in others
     )
 
@@ -226,22 +243,38 @@ def _without_images(nlp: Nlp, case: Case, fresh: Sequence[BindingPose], x: Float
 def _constraints(nlp: Nlp, case: Case, binding: BindingPose, k: int) -> Iterator[BoundedConstraint]:
     """Yield the constraints of a claim at its pose, with limits that are a little tighter."""
     where = f" workspace pose {k + 1}"
-    robot = _robot_at(nlp, case, binding.pose)
+    exact = _robot_at(nlp, case, binding.pose)
+    robot = exact if binding.errors is None else machine_of(exact, case, binding.errors)
     if binding.name == "regular":
         yield _regular(nlp, case, robot, where)
         return
     names = tuple(task.name for task in case.tasks)
+    if binding.longest is not None:
+        other = _robot_at(nlp, case, binding.longest)
+        other = other if binding.errors is None else machine_of(other, case, binding.errors)
+        yield from _of_stroke(case, binding, (robot, other), where)
+        return
     for limit in case.limits:
-        if binding.longest is not None:
-            both = Design(case.as_limited, (robot, _robot_at(nlp, case, binding.longest)), {})
-            for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
-                for item in family.pair(0, 1):
-                    if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
-                        yield _tightened(item, f"{binding.name}{where}")
-            continue
-        for item in limit.at_pose(PosedRobot(case.model, robot, names, where)):
-            if item.constraint.name == f"{binding.name}{where}":
-                yield _tightened(item, item.constraint.name)
+        # Joints are mounted as in the design.
+        posed = replace(robot, legs=with_spans_of(exact, robot)) if isinstance(limit, JointAngle) else robot
+        items = [*limit.at_pose(PosedRobot(case.model, posed, names, where))]
+        if binding.errors is not None:
+            items += on_plates(limit, case, robot)
+        for item in items:
+            if item.constraint.name in (binding.name, f"{binding.name}{where}"):
+                yield _tightened(item, f"{binding.name}{where}")
+
+
+def _of_stroke(
+    case: Case, binding: BindingPose, robots: tuple[RobotInstance, RobotInstance], where: str
+) -> Iterator[BoundedConstraint]:
+    """Yield the constraints of a claim about a leg at two poses: of its shortest length, and of its longest."""
+    both = Design(case.as_limited, robots, {})
+    for limit in case.limits:
+        for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
+            for item in family.pair(0, 1):
+                if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
+                    yield _tightened(item, f"{binding.name}{where}")
 
 
 def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
@@ -249,7 +282,8 @@ def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
     lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
     upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
     # A measure is evaluated at the stated pose, and this is another.
-    return BoundedConstraint(replace(item.constraint, name=name, measure=None), lower, upper)
+    stated = (item.lower, item.upper)
+    return BoundedConstraint(replace(item.constraint, name=name, measure=None, stated=stated), lower, upper)
 
 
 def _robot_at(nlp: Nlp, case: Case, pose: PoseNumbers) -> RobotInstance:

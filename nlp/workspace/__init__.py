@@ -4,8 +4,11 @@ The modules import each other in this order:
 
 * ``posebox`` (a box of poses in the coordinates of the search), ``machine`` (a robot with its dimensions);
 * regular poses: ``rows`` and ``regularity`` (the examination of boxes in NumPy), ``engines`` (the same in C), ``exact``
-  (signs of determinants without rounding), ``verdict`` and ``search``;
-* numbers: ``posed`` (a case as expressions of the pose), ``claims``, ``extremes`` (bounds by the certificate's search),
-  ``boundsearch``, ``clearance``, ``inverse``, ``singular`` and ``poseerror`` (searches of their own), ``ownsearches``;
+  (signs of determinants without rounding), ``inverse`` (of the rows over boxes), ``builtrank`` (singular machines
+  within a tolerance), ``verdict`` and ``search``;
+* numbers: ``posed`` (a case as expressions of the pose), ``worst`` and ``worstplates`` (the worst machine within a
+  tolerance), ``claims``, ``builtclaims`` (about all machines), ``extremes`` (bounds by the certificate's search),
+  ``boundsearch``, ``clearance``, ``builtsingular``, ``singular`` and ``poseerror`` (searches of their own),
+  ``ownsearches`` and ``strokes``;
 * ``judge`` (all claims about a machine), ``scale`` (the largest box) and ``slices`` (for pictures).
 """

@@ -20,6 +20,7 @@
 #define ENTRIES 10    /* numbers of a scaled rotation: nine of the matrix, and the scale */
 #define TERMS 22      /* matrices of the expansion of the rows: the centre's, 6 linear, 6 and 9 of second order */
 #define ROUNDING 1e-13 /* as in rows.py */
+#define OUTWARDS (1 + 1e-12) /* as in rows.py */
 #define ULP 0x1p-51
 #define POWERS 12     /* steps of the power method, as in regularity.py */
 
@@ -33,6 +34,7 @@ typedef struct {
     const double *base, *platform; /* (6, 3) each */
     const double *axis;            /* (3) */
     double ball;                   /* largest squared size of a Cayley vector; infinite without a ball */
+    double tolerance;              /* largest error of each joint centre */
 } Robot;
 
 static inline double larger(double a, double b) { return a > b ? a : b; }
@@ -193,6 +195,24 @@ static double expand(const Robot *robot, const double *c, const double *h, doubl
             int k = (j + 1) % 3, l = (j + 2) % 3;
             rest[i][j] = thirds * h[j] + scale * arm[j] + size[j] + rounding;
             rest[i][3 + j] = rests[k] * h[l] + rests[l] * h[k] + size[k] * arm[l] + size[l] * arm[k] + moment;
+        }
+        /* The change by joint centres that are off by at most the tolerance. */
+        if (robot->tolerance > 0) {
+            double most_scale = fabs(form[0][9]) + thirds + scale, sizes[3], outwards = robot->tolerance * OUTWARDS;
+            for (int t = 1; t < 4; t++)
+                most_scale += fabs(form[t][9]) * wide[t - 1];
+            for (int j = 0; j < 3; j++) {
+                sizes[j] = fabs(u[0][j]) + rests[j] + size[j];
+                for (int t = 1; t < 4; t++)
+                    sizes[j] += wide[t - 1] * fabs(u[t][j]);
+            }
+            for (int j = 0; j < 3; j++) {
+                int k = (j + 1) % 3, l = (j + 2) % 3;
+                double turned = sqrt(sizes[k] * sizes[k] + sizes[l] * sizes[l]);
+                double arms = sqrt(arm[k] * arm[k] + arm[l] * arm[l]);
+                rest[i][j] += 2 * most_scale * outwards;
+                rest[i][3 + j] += (most_scale * arms + turned + most_scale * robot->tolerance) * outwards;
+            }
         }
         reach = larger(reach, far);
     }
@@ -378,7 +398,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     void *parts[8];
     int taken = 0, good = 1;
     (void)module;
-    if (!PyArg_ParseTuple(args, "idnOOOOOOOO", &robot.kind, &robot.ball, &count, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "iddnOOOOOOOO", &robot.kind, &robot.ball, &robot.tolerance, &count, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7]))
         return NULL;
     Py_ssize_t D = sizeof(double), sizes[8] = {18 * D, 18 * D, 3 * D, count * N * D, count * N * D, count * (Py_ssize_t)sizeof(int),
@@ -405,7 +425,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine(kind, ball, B, base, platform, axis, lower, upper, verdict, split, sign)\n\n"
+     "examine(kind, ball, tolerance, B, base, platform, axis, lower, upper, verdict, split, sign)\n\n"
      "Examine B boxes of poses (B, 6) for regular rows; the boxes are contracted in place."},
     {NULL, NULL, 0, NULL},
 };

@@ -75,6 +75,7 @@ def prove_minimum(
     *,
     gap: float,
     limit: float | None = None,
+    slack: float = 0.0,
     time_limit: float | None = None,
     interrupted: Callable[[], bool] = lambda: False,
     recorder: TreeRecord | None = None,
@@ -85,7 +86,9 @@ def prove_minimum(
         oracle: the function.
         box: the poses.
         gap: allowed distance of the bound from the best value known, in the function's unit.
-        limit: the search ends, with a wider gap, once the bound is at least this.
+        limit: the search ends, with a wider gap, once the bound is at least this, and not before, whatever the gap is,
+            while no value below it is known.
+        slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
         interrupted: whether the work is requested to stop.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
@@ -97,7 +100,8 @@ def prove_minimum(
     closed, boxes, reason = math.inf, 0, ""
     while len(bound):
         least = min(closed, float(bound.min()))
-        if least >= value - gap or (limit is not None and least >= limit):
+        target = _target(value, gap, limit, slack)
+        if least >= target:
             break
         if interrupted():
             reason = "interrupted"
@@ -128,7 +132,7 @@ def prove_minimum(
         values = oracle.values(centres)
         if len(values) and float(np.nanmin(values)) < value:
             y, value = centres[int(np.nanargmin(values))], float(np.nanmin(values))
-        done = found >= value - gap
+        done = found >= max(value - gap, _target(value, gap, limit, slack))
         if done.any():
             closed = min(closed, float(found[done].min()))
         lower = np.concatenate([lower, new_lower[~done]])
@@ -136,6 +140,13 @@ def prove_minimum(
         bound, shares = np.concatenate([bound, found[~done]]), np.concatenate([shares, at.shares[~done]])
     least = min(closed, float(bound.min()) if len(bound) else math.inf, value)
     return Minimum(least, value, y, boxes, len(bound), time.perf_counter() - began, reason)
+
+
+def _target(value: float, gap: float, limit: float | None, slack: float) -> float:
+    """Return the bound at which a search ends: that of the gap, or of the limit where no value below it is known."""
+    if limit is None or value < limit - slack:
+        return value - gap
+    return limit if value >= limit else limit - slack
 
 
 def _good_point(oracle: Oracle, box: PoseBox) -> tuple[FloatArray, float]:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import casadi as ca
 from casadi import SX
 
 from ...models import Dimension
-from ..case.limits.constraint import SQUARED_LENGTH, Reading
+from ..case.limits.constraint import SQUARED_LENGTH, BoundedConstraint, Reading
 from ..case.limits.legs import LegLength
 from ..case.task import Sense
 from ..errors import InputError, nearest
 from ..program.layout import Layout
+
+if TYPE_CHECKING:
+    from .worst import Worst
 
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
 OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
@@ -31,6 +35,11 @@ class Claim:
         reading: how the expression reads as the number.
         key: dotted key, below ``limits``, of the number in the case; empty where the number has no limit.
         limit: largest or smallest value allowed of the expression; None where the number has no limit.
+        leg, task: index of the leg whose length, or of the task whose F, the number is; None for another.
+        quantity: name of the measure of the robot that the number is; empty for another.
+        worst: how far the number goes over all machines within a tolerance; None where the exact machine is meant, or a
+            number that errors of joint centres do not change.
+        uncovered: reason for a claim about the exact machine where others are meant; else empty.
     """
 
     name: str
@@ -39,6 +48,11 @@ class Claim:
     reading: Reading
     key: str = ""
     limit: float | None = None
+    leg: int | None = None
+    task: int | None = None
+    quantity: str = ""
+    worst: Worst | None = None
+    uncovered: str = ""
 
 
 def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective: bool = True) -> list[Claim]:
@@ -60,12 +74,16 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
 
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
-    for item in (*layout.constraints, *layout.constant_limits):
+    own = (*OWN_SEARCHES, "leg_length") if layout.robots[0].legs else OWN_SEARCHES
+    items = (*layout.constraints, *layout.constant_limits)
+    yield from claims_of_items([item for item in items if not any(key.startswith(own) for key in item.constraint.keys)])
+
+
+def claims_of_items(items: Sequence[BoundedConstraint]) -> Iterator[Claim]:
+    """Yield a claim for each side of constraints that is a limit of the case."""
+    for item in items:
         constraint = item.constraint
         low, high = constraint.keys
-        own = (*OWN_SEARCHES, "leg_length") if layout.robots[0].legs else OWN_SEARCHES
-        if not (low or high) or any(key.startswith(own) for key in constraint.keys):
-            continue
         for key, sense, limit in ((low, Sense.MIN, item.lower), (high, Sense.MAX, item.upper)):
             if key and math.isfinite(limit):
                 yield Claim(constraint.name, sense, constraint.expression, constraint.reading, key, limit)
@@ -75,7 +93,7 @@ def _of_legs(layout: Layout) -> Iterator[Claim]:
     """Yield the smallest and the largest length of each leg, with their limits: the lengths that its actuator needs."""
     limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
     ends = ((Sense.MIN, "min"), (Sense.MAX, "max"))
-    for leg in layout.robots[0].legs:
+    for i, leg in enumerate(layout.robots[0].legs):
         for sense, end in ends:
             allowed = None if limit is None else getattr(limit, end)
             yield Claim(
@@ -85,6 +103,7 @@ def _of_legs(layout: Layout) -> Iterator[Claim]:
                 SQUARED_LENGTH,
                 "" if allowed is None else f"leg_length.{end}",
                 None if allowed is None else allowed**2,
+                leg=i,
             )
 
 
@@ -97,7 +116,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
         for i, owner in enumerate(quantity.owners):
             for sense in (Sense.MIN, Sense.MAX):
-                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension))
+                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension), quantity=name)
 
 
 def _of_tasks(layout: Layout) -> Iterator[Claim]:
@@ -105,4 +124,4 @@ def _of_tasks(layout: Layout) -> Iterator[Claim]:
     for j, task in enumerate(layout.case.tasks):
         name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
         for sense in (Sense.MIN, Sense.MAX):
-            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER))
+            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER), task=j)

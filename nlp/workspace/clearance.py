@@ -4,6 +4,9 @@ For a unit vector n the distance of two segments is at least the least of ``n.(x
 normal to n separates them. With n between the nearest points at the centre of a box, the bound differs from the
 distance by a term of second order in the width of the box. An end on the platform is ``p + u / s`` with the
 polynomials of :mod:`.rows`.
+
+Where every joint centre may be off by a tolerance, so may every point of a leg, and the least distance is smaller by
+twice the tolerance: that of two legs that are moved towards each other.
 """
 
 from __future__ import annotations
@@ -12,9 +15,10 @@ import numpy as np
 
 from ...models import FloatArray
 from .boundsearch import Bounds
-from .machine import Legs
+from .machine import LEGS, JointErrors, Legs
 from .posebox import PoseBox
 from .rows import FIRST, SECOND, TurnForm, turn_form
+from .worst import along
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
 _ROUNDING = 1e-13
@@ -23,7 +27,7 @@ _PARALLEL = 1e-12
 
 
 class Clearance:
-    """Distance between two legs over a workspace.
+    """Distance between two legs over a workspace, the least over all machines within the legs' tolerance.
 
     Args:
         legs: joint centres.
@@ -35,10 +39,18 @@ class Clearance:
         self._box = box
         self._base = legs.base[[one, other]]
         self._platform = legs.platform[[one, other]]
+        self._legs, self._pair, self._nearer = legs, (one, other), 2 * legs.tolerance
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the distances (K,) at points (K, 6)."""
-        return np.asarray(np.linalg.norm(self._between(points), axis=1))
+        distances = np.linalg.norm(self._between(points), axis=1)
+        return np.asarray(np.maximum(distances - self._nearer, 0.0) if self._nearer else distances)
+
+    def errors(self, y: FloatArray) -> JointErrors:
+        """Return the errors of the machine whose legs are nearest at a point (6,)."""
+        moved = np.zeros((LEGS, 3))
+        moved[list(self._pair)] = np.array([[-1.0], [1.0]]) * self._between(y[None])
+        return along(self._legs, self._box.pose(y), moved, moved)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
@@ -60,12 +72,13 @@ class Clearance:
             (a[0] - a[1], 0, np.zeros(3)),
         )
         found = np.full(len(centre), np.inf)
-        for turned, along, fixed in choices:
-            least = n @ fixed + along * moved[0] - abs(along) * moved[1] + self._least_turned(n, form, turned, half)
+        for turned, by, fixed in choices:
+            least = n @ fixed + by * moved[0] - abs(by) * moved[1] + self._least_turned(n, form, turned, half)
             found = np.minimum(found, least)
         # How far each coordinate moves an end of a leg.
         arms = np.array([1.0, 1.0, 1.0, *[2 * np.linalg.norm(a, axis=1).max()] * 3])
-        return Bounds(np.maximum(found - _ROUNDING * form.most * far, 0.0), arms * half)
+        found -= _ROUNDING * form.most * far
+        return Bounds(np.maximum(found - self._nearer if self._nearer else found, 0.0), arms * half)
 
     def _least_turned(self, n: FloatArray, form: TurnForm, a: FloatArray, half: FloatArray) -> FloatArray:
         """Return the least of ``n.R a`` over each box, (B,)."""

@@ -6,11 +6,13 @@ Every claim is a program over the numbers of the pose, which :mod:`screwsynth.nl
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from casadi import SX
 
 from ...models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
 from ..case.task import Sense
@@ -21,6 +23,7 @@ from ..errors import UncoveredError
 from ..program.layout import Layout
 from ..program.nlp import Nlp
 from .claims import Claim
+from .machine import JointErrors, Legs
 from .posebox import PoseNumbers
 from .posed import extreme_program, varies
 from .verdict import Outcome
@@ -30,10 +33,16 @@ if TYPE_CHECKING:
 
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
-#: Gap that is tried once more where a limit lies between a bound and the best value known.
-_FINE = 1e-7
+#: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
+_FINEST = 1e-10
+#: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
+_SHARE = 0.9
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
 _ON_LIMIT = 1e-9
+#: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
+_NEAR_ZERO = 1e-6
+#: Reason for a limit that stays open between a bound and a value although the search ended.
+CLOSE = "the limit is closer to the value reached than bounds can tell"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +62,7 @@ class Extreme:
         boxes: number of boxes examined.
         seconds: wall time.
         reason: for an open outcome; else empty.
+        errors: of the joint centres of the machine that reaches the value; None for the exact machine.
     """
 
     name: str
@@ -67,6 +77,7 @@ class Extreme:
     boxes: int
     seconds: float
     reason: str
+    errors: JointErrors | None = None
 
 
 def prove_extreme(
@@ -77,9 +88,13 @@ def prove_extreme(
     time_limit: float | None = None,
     jobs: int | None = None,
     interrupted: Callable[[], bool] = lambda: False,
+    legs: Legs | None = None,
     paper: PaperRecord | None = None,
+    again: bool = False,
 ) -> Extreme:
     """Prove the smallest or the largest value of a number over a workspace.
+
+    A search whose bound is beyond the number's limit, with a value within it, goes on until the limit is decided.
 
     Args:
         layout: the case as symbols of the pose.
@@ -88,82 +103,173 @@ def prove_extreme(
         time_limit: seconds after which the search stops with the bound reached.
         jobs: threads.
         interrupted: whether the work is requested to stop.
+        legs: joint centres with their tolerance, for a claim about every machine within it.
         paper: records the search for a proof.
+        again: whether the record takes the place of an earlier one of the same number.
     """
     if interrupted():
-        return _extreme(claim, math.inf, math.nan, None, 0, 0.0, "interrupted", gap_met=False)
-    nlp = extreme_program(layout, claim.expression, claim.sense)
-    if not varies(layout, [claim.expression])[0]:
+        return _extreme(claim, _Found(reason="interrupted"), legs)
+    expression = claim.expression if claim.worst is None or claim.worst.expression is None else claim.worst.expression
+    nlp = extreme_program(layout, expression, claim.sense)
+    if not varies(layout, [expression])[0]:
         value = nlp.evaluate(nlp.start).F
         if paper is not None:
             paper.constant(claim, nlp, value)
-        return _extreme(claim, value, value, _pose(nlp, nlp.start), 0, 0.0, "", gap_met=True)
-    # A program of a claim has one function, and its search is that of certify with or without a record.
-    writer = None if paper is None else ProofWriter(1)
+        return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), legs)
+    record = None if paper is None else _Record(paper, again)
     try:
-        found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs, recorder=writer)
-        if _is_between(claim, found) and not interrupted():
-            writer = None if paper is None else ProofWriter(1)
-            found = certify_program(nlp, found.x, gap=_FINE, time_limit=time_limit, jobs=jobs, recorder=writer)
+        return _extreme(claim, _search(nlp, claim, gap, time_limit, jobs, interrupted, record), legs)
     except UncoveredError as error:
-        return _extreme(claim, math.inf, math.nan, None, 0, 0.0, str(error), gap_met=False)
+        return _extreme(claim, _Found(reason=str(error)), legs)
+
+
+class _Record(NamedTuple):
+    """Where a search is recorded, and whether in the place of an earlier one of the same number."""
+
+    paper: PaperRecord
+    again: bool
+
+
+class _Found(NamedTuple):
+    """Result of a search in terms of its expression.
+
+    Attributes:
+        bound, reached, pose, boxes, seconds, reason: as for :class:`Extreme`.
+        is_met: whether the gap asked for is met.
+    """
+
+    bound: float = math.inf
+    reached: float = math.nan
+    pose: PoseNumbers | None = None
+    boxes: int = 0
+    seconds: float = 0.0
+    reason: str = ""
+    is_met: bool = False
+
+
+def _search(
+    nlp: Nlp,
+    claim: Claim,
+    gap: float,
+    time_limit: float | None,
+    jobs: int | None,
+    interrupted: Callable[[], bool],
+    record: _Record | None,
+) -> _Found:
+    """Return the bound of an expression, to the gap or, where that leaves its limit open, as fine as the limit needs.
+
+    Raises:
+        UncoveredError: the expression holds an operation without a rule.
+    """
+    began = time.perf_counter()
+    # A program of a claim has one function, and its search is that of certify with or without a record.
+    writer = None if record is None else ProofWriter(1)
+    found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs, recorder=writer)
+    boxes = found.boxes
+    while (finer := _finer_gap(nlp, claim, found)) is not None and not interrupted():
+        left = None if time_limit is None else time_limit - (time.perf_counter() - began)
+        if left is not None and left <= 0:
+            break
+        finer_writer = None if record is None else ProofWriter(1)
+        again = certify_program(nlp, found.x, gap=finer, time_limit=left, jobs=jobs, recorder=finer_writer)
+        boxes += again.boxes
+        sign = 1.0 if claim.sense is Sense.MAX else -1.0
+        if sign * again.bound <= sign * found.bound:
+            writer = finer_writer
+        else:
+            again = replace(again, bound=found.bound)
+        found = again
+    if record is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
+        record.paper.program(claim, found, writer, again=record.again)
     if found.status is CertificateStatus.INFEASIBLE:
-        return _extreme(
-            claim, math.inf, math.nan, None, found.boxes, found.seconds, "the robot has no pose there", gap_met=False
-        )
-    if paper is not None and writer is not None:
-        paper.program(claim, found, writer)
+        return _Found(boxes=boxes, seconds=found.seconds, reason="the robot has no pose there")
     # A search that ends early has a bound too, which may be as good as asked for.
     met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     pose = None if found.x is None else _pose(nlp, found.x)
-    return _extreme(claim, found.bound, found.incumbent, pose, found.boxes, found.seconds, found.reason, gap_met=met)
+    seconds = time.perf_counter() - began
+    return _Found(found.bound, found.incumbent, pose, boxes, seconds, found.reason, met)
 
 
-def _is_between(claim: Claim, found: Certificate) -> bool:
-    """Return whether a limit is beyond the best value known, and not beyond the bound."""
+def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
+    """Return the gap that decides a claim's limit; None where it is decided, or the search did not end by itself."""
     if claim.limit is None or found.status is not CertificateStatus.PROVED:
-        return False
+        return None
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    return sign * found.incumbent <= sign * claim.limit < sign * found.bound
+    limit = _limit_of_search(claim)
+    slack = slack_of(limit)
+    room = sign * (limit - found.incumbent) + slack / 2
+    if not (room > 0 and sign * (found.bound - limit) > slack):
+        return None
+    finer = _SHARE * room / max(abs(found.incumbent), _NEAR_ZERO * nlp.objective_size)
+    return finer if finer >= _FINEST else None
 
 
-def _extreme(
-    claim: Claim,
-    bound: float,
-    reached: float,
-    pose: PoseNumbers | None,
-    boxes: int,
-    seconds: float,
-    reason: str,
-    *,
-    gap_met: bool,
-) -> Extreme:
-    """Return the extreme of a claim from numbers of its expression; the gap asked for is met or not."""
-    outcome = Outcome.PROVED if gap_met else Outcome.OPEN
+def _limit_of_search(claim: Claim) -> float:
+    """Return the limit of a claim's expression, which may leave an allowance for errors of joint centres."""
+    if claim.limit is None:
+        raise TypeError("the claim has a limit")
+    if claim.worst is None or not claim.worst.allowance:
+        return claim.limit
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    return _program_value(claim, claim.reading.from_value(claim.limit) - sign * claim.worst.allowance)
+
+
+def _program_value(claim: Claim, number: float) -> float:
+    """Return the program's value of a number as people read it."""
+    return float(claim.reading.to_value(SX(number)))
+
+
+def slack_of(limit: float) -> float:
+    """Return how far a value may be beyond a limit and still count as on it: a part of the limit, for rounding.
+
+    It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
+    """
+    return _ON_LIMIT * abs(limit)
+
+
+def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
+    """Return the extreme of a claim from numbers of its expression."""
+    sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
+    bound, reached, pose = found.bound, found.reached, found.pose
+    shown_bound = read(bound) if math.isfinite(bound) else sign * math.inf
+    shown_reached = read(reached) if math.isfinite(reached) else math.nan
+    errors = None
+    if claim.worst is not None and legs is not None:
+        worst = claim.worst
+        if math.isfinite(bound):
+            shown_bound = min(max(shown_bound + sign * worst.allowance, worst.least), worst.most)
+            bound = _program_value(claim, shown_bound)
+        if pose is not None:
+            errors = worst.errors(pose)
+            shown_reached = worst.value(errors.applied(legs), pose)
+            reached = _program_value(claim, shown_reached)
+    outcome, reason = Outcome.PROVED if found.is_met else Outcome.OPEN, found.reason
     if claim.limit is not None:
-        slack = _ON_LIMIT * max(abs(claim.limit), abs(reached) if math.isfinite(reached) else 0.0)
+        slack = slack_of(claim.limit)
         if sign * (reached - claim.limit) > slack:
             outcome = Outcome.REFUTED
         else:
             outcome = Outcome.PROVED if sign * (bound - claim.limit) <= slack and math.isfinite(bound) else Outcome.OPEN
-            reason = reason or (
-                "the limit is closer than the gap: a smaller --gap may decide" if outcome is Outcome.OPEN else ""
-            )
-    read = claim.reading.from_value
+            reason = reason or (CLOSE if outcome is Outcome.OPEN else "")
+    if claim.uncovered:
+        # What is proved of the exact machine is nothing about the others, and refutes all the same.
+        shown_bound = sign * math.inf
+        if outcome is not Outcome.REFUTED:
+            outcome, reason = Outcome.OPEN, claim.uncovered
     return Extreme(
         name=claim.name,
         sense=claim.sense,
         dimension=claim.reading.dimension,
         key=claim.key,
         limit=None if claim.limit is None else read(claim.limit),
-        bound=read(bound) if math.isfinite(bound) else sign * math.inf,
-        reached=read(reached) if math.isfinite(reached) else math.nan,
+        bound=shown_bound,
+        reached=shown_reached,
         pose=pose,
         outcome=outcome,
-        boxes=boxes,
-        seconds=seconds,
+        boxes=found.boxes,
+        seconds=found.seconds,
         reason="" if outcome is not Outcome.OPEN else reason,
+        errors=errors,
     )
 
 

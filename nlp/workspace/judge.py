@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
+from ..case.limits.constraint import LENGTH
+from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
-from .claims import claims_of
+from ..program.layout import Layout
+from .builtclaims import NO_LEGS, built_claims
+from .claims import Claim, claims_of
 from .extremes import GAP, Extreme, prove_extreme
-from .machine import legs_of, workspace_of_case
-from .ownsearches import own_searches, pose_errors, strokes
+from .machine import Legs, legs_of, workspace_of_case
+from .ownsearches import own_searches, pose_errors
 from .posebox import pose_box
 from .posed import posed_layout
 from .search import RankProgress, prove_regular
+from .strokes import with_strokes
 from .verdict import Outcome, Regularity
+from .worst import Directions, length_beside
 
 if TYPE_CHECKING:
     from .paper.record import PaperRecord
@@ -25,11 +32,13 @@ if TYPE_CHECKING:
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
+#: Gap of the shortest lengths of legs that bounds of errors of joint centres rest on: they change little with it.
+_ROUGH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Verdicts on a machine over its workspace.
+    """Verdicts on a machine over its workspace; with a tolerance on joint centres, on every machine within it.
 
     Attributes:
         case: the case, its dimensions fixed.
@@ -101,7 +110,8 @@ def judge_workspace(
     box, legs = pose_box(workspace), legs_of(case)
     layout = posed_layout(case, workspace)
     claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
-    regularity = None
+    prove = partial(prove_extreme, layout, time_limit=time_limit, jobs=jobs, interrupted=is_requested, legs=legs)
+    shortest, regularity = 0.0, None
     if legs is not None:
         recorder = None if paper is None else paper.rank
         regularity = prove_regular(
@@ -110,25 +120,69 @@ def judge_workspace(
     extremes: list[Extreme] = []
     if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
         return Judgement(case, workspace, regularity, ())
+    shortest, claims = _as_built(layout, workspace, legs, claims, prove)
     for done, claim in enumerate(claims):
         if progress is not None:
             progress(claim.name, done, len(claims))
-        found = prove_extreme(
-            layout, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested, paper=paper
-        )
+        found = prove(claim, gap=gap, paper=paper)
         extremes.append(found)
         if until_fault and found.outcome is not Outcome.PROVED:
             return Judgement(case, workspace, regularity, tuple(extremes))
     if legs is not None and with_limits:
-        extremes += strokes(case, extremes)
-        for found in own_searches(
-            case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested, paper=paper
-        ):
+        refine = partial(_refined, layout, legs, shortest, claims, partial(prove, paper=paper, again=True))
+        extremes = with_strokes(case, legs, extremes, refine)
+        each_own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
+        for found in each_own(case, legs, box, paper=paper):
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
     if legs is not None and with_limits and with_objective and eps > 0:
-        shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
+        least = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
+        shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
         extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested, paper=paper)
     return Judgement(case, workspace, regularity, tuple(extremes))
+
+
+class _AsBuilt(NamedTuple):
+    """Claims about every machine within the tolerance, and a proven shortest length of the exact machine's legs."""
+
+    shortest: float
+    claims: list[Claim]
+
+
+def _as_built(
+    layout: Layout, workspace: Workspace, legs: Legs | None, claims: list[Claim], prove: Callable[..., Extreme]
+) -> _AsBuilt:
+    """Return claims about every machine within the case's tolerance from those about the exact one."""
+    if legs is None and layout.case.joint_centre_tolerance:
+        return _AsBuilt(0.0, [replace(each, uncovered=NO_LEGS) for each in claims])
+    if legs is None or not legs.tolerance or not claims:
+        return _AsBuilt(0.0, claims)
+    lengths = [replace(each, limit=None) for each in claims if each.leg is not None and each.sense is Sense.MIN]
+    shortest = min(prove(each, gap=_ROUGH).bound for each in lengths)
+    return _AsBuilt(shortest, built_claims(layout, workspace, legs, claims, shortest))
+
+
+def _refined(
+    layout: Layout,
+    legs: Legs,
+    shortest: float,
+    claims: Sequence[Claim],
+    prove: Callable[..., Extreme],
+    leg: int,
+    sense: Sense,
+    gap: float,
+    about: Directions | None,
+) -> Extreme | None:
+    """Return a length of a leg, proved more finely; None where the work is requested to stop, or none is bounded."""
+    if is_requested():
+        return None
+    claim = next(each for each in claims if each.leg == leg and each.sense is sense)
+    if about is None:
+        return prove(claim, gap=gap)
+    if not shortest > 2 * legs.tolerance:
+        return None
+    sign = 1.0 if sense is Sense.MAX else -1.0
+    expression = length_beside(legs, leg, layout.robots[0], sign, shortest, about)
+    return prove(Claim(claim.name, sense, expression, LENGTH), gap=gap)

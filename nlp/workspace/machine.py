@@ -15,13 +15,33 @@ from ..errors import CaseError
 
 #: Number of legs, as many as the platform has freedoms.
 LEGS = 6
+#: Part of a tolerance that the errors of a machine within it have, so that rounding leaves none outside.
+INSIDE = 1 - 1e-12
 
 
 class Legs(NamedTuple):
-    """Joint centres of a robot's six legs, (6, 3) each: in the base, and in the platform frame, length."""
+    """Joint centres of a robot's six legs.
+
+    Attributes:
+        base: (6, 3) in the world frame, length.
+        platform: (6, 3) in the platform frame, length.
+        tolerance: largest error of each centre in the machines that are meant, length; 0 for the exact machine.
+    """
 
     base: FloatArray
     platform: FloatArray
+    tolerance: float = 0.0
+
+
+class JointErrors(NamedTuple):
+    """Errors of the joint centres of one machine, (6, 3) each: base in the world frame, platform in its own, length."""
+
+    base: FloatArray
+    platform: FloatArray
+
+    def applied(self, legs: Legs) -> Legs:
+        """Return the exact legs of the machine with these errors."""
+        return Legs(legs.base + self.base, legs.platform + self.platform)
 
 
 def workspace_of_case(case: Case) -> Workspace:
@@ -42,7 +62,10 @@ def workspace_of_case(case: Case) -> Workspace:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs."""
+    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
+
+    Their tolerance is the case's.
+    """
     model = case.model
     if len(model.legs) != LEGS or len(model.wrenches) != LEGS or model.members or model.unknowns:
         return None
@@ -51,4 +74,8 @@ def legs_of(case: Case) -> Legs | None:
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
     outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
     base, platform = ca.Function("legs", [symbols], outputs).call([values])
-    return Legs(frozen_array(np.array(base).T, (LEGS, 3)), frozen_array(np.array(platform).T, (LEGS, 3)))
+    return Legs(
+        frozen_array(np.array(base).T, (LEGS, 3)),
+        frozen_array(np.array(platform).T, (LEGS, 3)),
+        case.joint_centre_tolerance or 0.0,
+    )

@@ -1,10 +1,11 @@
-"""Claims that have searches of their own: singular values, distances between legs, strokes, errors of the pose."""
+"""Claims that have searches of their own: singular values, distances between legs, errors of the pose."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,11 @@ import numpy as np
 from ...models import Dimension
 from ..case.case import Case
 from ..case.limits.clearance import LegClearance
-from ..case.limits.legs import Actuator
 from ..case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ..case.task import Sense
 from .boundsearch import Minimum, Oracle, prove_minimum
 from .clearance import Clearance
-from .extremes import Extreme
+from .extremes import CLOSE, Extreme, slack_of
 from .machine import Legs
 from .posebox import PoseBox
 from .poseerror import PoseErrors, WorstError, displaced, with_rest
@@ -27,8 +27,6 @@ from .verdict import Outcome
 if TYPE_CHECKING:
     from .paper.record import PaperRecord, TreeRecord
 
-#: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in extremes.
-_ON_LIMIT = 1e-9
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
 _NEAR_ZERO = 0.1
 #: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
@@ -43,6 +41,7 @@ def own_searches(
     gap: float,
     time_limit: float | None,
     interrupted: Callable[[], bool],
+    shortest: float = 0.0,
     paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the extremes of the case's limits that have searches of their own.
@@ -54,28 +53,39 @@ def own_searches(
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
+        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of the legs alone.
         paper: records the searches for a proof.
     """
 
-    def search(oracle: Oracle, least: float, name: str) -> Minimum:
+    def search(oracle: SingularValues | Clearance, least: float, name: str) -> Minimum:
         recorder = None if paper is None else paper.own(name)
         return _minimum(oracle, box, least, gap, time_limit, interrupted, recorder)
 
+    def with_errors(oracle: SingularValues | Clearance, found: Minimum, extreme: Extreme) -> Extreme:
+        """Return an extreme with the errors of the machine that reaches it."""
+        return replace(extreme, errors=oracle.errors(found.y)) if legs.tolerance else extreme
+
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
-            oracle = SingularValues(legs, box, limit.length, is_condition=False)
+            oracle = SingularValues(legs, box, limit.length, is_condition=False, shortest=shortest)
             found = search(oracle, limit.min, "smallest_singular_value")
-            yield _from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
+            extreme = _from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
+            yield with_errors(oracle, found, extreme)
         elif isinstance(limit, ConditionNumber):
-            oracle = SingularValues(legs, box, limit.length, is_condition=True)
+            oracle = SingularValues(legs, box, limit.length, is_condition=True, shortest=shortest)
             found = search(oracle, -limit.max, "condition_number")
-            yield _from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
+            extreme = _from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
+            yield with_errors(oracle, found, extreme)
         elif isinstance(limit, LegClearance):
             names = [leg.name for leg in case.model.legs]
             for one, other in itertools.combinations(range(len(names)), 2):
-                name = f"leg_clearance limbs {names[one]} and {names[other]}"
-                found = search(Clearance(legs, box, one, other), limit.min, name)
-                yield _from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
+                name, clearance = (
+                    f"leg_clearance limbs {names[one]} and {names[other]}",
+                    Clearance(legs, box, one, other),
+                )
+                found = search(clearance, limit.min, name)
+                extreme = _from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
+                yield with_errors(clearance, found, extreme)
 
 
 def _minimum(
@@ -88,9 +98,16 @@ def _minimum(
     recorder: TreeRecord | None,
 ) -> Minimum:
     """Return the smallest value of a function, only as accurately as its limit needs."""
-    allowed = gap * max(abs(limit), _NEAR_ZERO)
+    allowed, slack = gap * max(abs(limit), _NEAR_ZERO), slack_of(limit)
     return prove_minimum(
-        oracle, box, gap=allowed, limit=limit, time_limit=time_limit, interrupted=interrupted, recorder=recorder
+        oracle,
+        box,
+        gap=allowed,
+        limit=limit,
+        slack=slack,
+        time_limit=time_limit,
+        interrupted=interrupted,
+        recorder=recorder,
     )
 
 
@@ -104,13 +121,13 @@ def _from_minimum(
     sign: float = 1.0,
 ) -> Extreme:
     """Return the extreme of a number that is a search's value times a sign."""
-    slack = _ON_LIMIT * abs(limit)
+    slack = slack_of(limit)
     outcome = Outcome.OPEN
     if found.value < limit - slack:
         outcome = Outcome.REFUTED
     elif found.bound >= limit - slack:
         outcome = Outcome.PROVED
-    reason = found.reason or "the limit is closer than the gap: a smaller --gap may decide"
+    reason = found.reason or CLOSE
     return Extreme(
         name=name,
         sense=Sense.MIN if sign > 0 else Sense.MAX,
@@ -123,59 +140,6 @@ def _from_minimum(
         outcome=outcome,
         boxes=found.boxes,
         seconds=found.seconds,
-        reason=reason if outcome is Outcome.OPEN else "",
-    )
-
-
-def strokes(case: Case, extremes: Sequence[Extreme]) -> Iterator[Extreme]:
-    """Yield the limits of the case on telescoping legs, from the proven lengths of each leg.
-
-    A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace.
-
-    Args:
-        case: the case.
-        extremes: among them the smallest and the largest length of each leg.
-    """
-    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
-    if limit is None:
-        return
-    by_name = {(each.name, each.sense): each for each in extremes}
-    for leg in case.model.legs:
-        short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in (Sense.MIN, Sense.MAX))
-        if limit.stroke_max is not None:
-            bound, reached = long.bound - short.bound, long.reached - short.reached
-            yield _of_stroke(f"actuator.stroke_max limb {leg.name}", Sense.MAX, limit.stroke_max, bound, reached, long)
-        if limit.dead_length is not None:
-            bound, reached = 2 * short.bound - long.bound, 2 * short.reached - long.reached
-            yield _of_stroke(
-                f"actuator.dead_length limb {leg.name}", Sense.MIN, limit.dead_length, bound, reached, short
-            )
-
-
-def _of_stroke(name: str, sense: Sense, limit: float, bound: float, reached: float, at: Extreme) -> Extreme:
-    """Return the extreme of a number made from two lengths, with the pose of one of them."""
-    sign = 1.0 if sense is Sense.MAX else -1.0
-    slack = _ON_LIMIT * limit
-    outcome = Outcome.OPEN
-    if sign * (reached - limit) > slack:
-        outcome = Outcome.REFUTED
-    elif math.isfinite(bound) and sign * (bound - limit) <= slack:
-        outcome = Outcome.PROVED
-    reason = "the limit is closer than the gap of the lengths: a smaller --gap may decide"
-    if not math.isfinite(bound):
-        reason = "the leg's lengths are not bounded"
-    return Extreme(
-        name=name,
-        sense=sense,
-        dimension=Dimension.LENGTH,
-        key=name.partition(" ")[0],
-        limit=limit,
-        bound=bound,
-        reached=reached,
-        pose=at.pose,
-        outcome=outcome,
-        boxes=0,
-        seconds=0.0,
         reason=reason if outcome is Outcome.OPEN else "",
     )
 
@@ -202,6 +166,7 @@ def pose_errors(
         paper: records the searches for a proof.
     """
     names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
+    legs = legs._replace(tolerance=0.0)  # eps has it
     searches = [WorstError(legs, box, is_rotation=is_rotation) for is_rotation in (False, True)]
     found = []
     for each, (name, _) in zip(searches, names, strict=True):

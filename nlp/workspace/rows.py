@@ -8,6 +8,14 @@ leg from ``b`` on the base to ``a`` on the platform is
 It is a polynomial in the coordinates, of first order in the position. The rank is that of J where no leg has zero
 length, and is less than full where one has. Its expansion has the centre's matrix, 6 matrices of first order and 15 of
 second; all others are bounded together, entry by entry. The C kernel has the same formulas.
+
+In a machine whose joint centres are off by vectors e on the base and f on the platform, turned into the world frame,
+the row differs by
+
+    (s (f - e),  s f x (p - b) - u x e - s f x e),
+
+which is bounded entry by entry for all e and f within the tolerance: a component of ``f x d`` is at most |f| times the
+size of the two other components of d.
 """
 
 from __future__ import annotations
@@ -23,10 +31,16 @@ from .posebox import PoseBox
 
 #: Part of the sum of the sizes of all terms by which an entry may be off. A term has fewer than 100 roundings of 2^-53.
 ROUNDING = 1e-13
+#: Part of itself by which the bound of the rows' change by errors of joint centres moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-12
 #: Pairs of rotation coordinates of the monomials of second order.
 FIRST, SECOND = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
 #: Numbers of matrices of an expansion, and of monomials in three coordinates up to the second order.
 TERMS, _TURNS = 22, 10
+#: Factor of each monomial of the scaled rotation: 1 for the constant and for squares, else 2.
+_TWICE = np.array([1.0, 2.0, 2.0, 2.0, *np.where(FIRST == SECOND, 1.0, 2.0)])
+#: Indices of the components of a vector after each one: the next, and the last.
+_AFTER, _LAST = [1, 2, 0], [2, 0, 1]
 
 
 class Expansion(NamedTuple):
@@ -35,7 +49,8 @@ class Expansion(NamedTuple):
     Attributes:
         terms: (B, 6, 22, 6) for each leg the matrices' rows: centre, first order (6), second order in the rotation (6)
             and mixed (9, position faster).
-        rest: (B, 6, 6) bound of the size of all other terms and of rounding.
+        rest: (B, 6, 6) bound of the size of all other terms, of rounding, and of the change by joint centres that are
+            off by the legs' tolerance.
     """
 
     terms: FloatArray
@@ -76,12 +91,12 @@ def expand(legs: Legs, box: PoseBox, centre: FloatArray, half: FloatArray) -> Ex
     scale = form.terms[:, None, :, 9, None]
     places = [0, *range(4, 13)]
     terms[:, :, places, :3] = scale * d[:, :, None] + u
-    terms[:, :, places, 3:] = np.cross(u, d[:, :, None])
+    terms[:, :, places, 3:] = _cross(u, d[:, :, None])
     unit = np.eye(3)
     for t in range(4):
         first = 1 if t == 0 else 10 + 3 * t
         terms[:, :, first : first + 3, :3] = form.terms[:, t, 9, None, None, None] * unit
-        terms[:, :, first : first + 3, 3:] = np.cross(u[:, :, t, None], unit)
+        terms[:, :, first : first + 3, 3:] = _cross(u[:, :, t, None], unit)
     weight = wide[:, FIRST] * wide[:, SECOND]
     thirds = (weight * np.abs(form.terms[:, 4:, 9])).sum(axis=1)[:, None, None]
     rests = np.einsum("bt,blti->bli", weight, np.abs(u[:, :, 4:]))
@@ -94,7 +109,28 @@ def expand(legs: Legs, box: PoseBox, centre: FloatArray, half: FloatArray) -> Ex
     rest[:, :, :3] += (rounding * (far + reach))[:, :, None]
     rest[:, :, 3:] = _largest_moment(rests, half[:, None, :3]) + _largest_moment(size, arm)
     rest[:, :, 3:] += (rounding * reach * far)[:, :, None]
+    if legs.tolerance > 0:
+        scales = np.abs(form.terms[:, :, 9])
+        most_scale = scales[:, 0] + (scales[:, 1:4] * wide).sum(axis=1) + (scales[:, 4:] * weight).sum(axis=1)
+        most_scale += form.rest[:, 9]
+        sizes = np.abs(u[:, :, 0]) + np.einsum("bt,blti->bli", wide, np.abs(u[:, :, 1:4])) + rests + size
+        rest += built_change(legs.tolerance, most_scale, sizes, arm)
     return Expansion(terms, rest)
+
+
+def built_change(tolerance: float, scale: FloatArray, u: FloatArray, arm: FloatArray) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows by errors of the joint centres.
+
+    Args:
+        tolerance: largest error of each joint centre, length.
+        scale: (B,) largest scale of the rotation's coordinates.
+        u: (B, 6, 3) largest sizes of the components of ``s R a``.
+        arm: (B, 6, 3) largest sizes of the components of ``p - b``.
+    """
+    s = scale[:, None, None]
+    moment = s * (np.hypot(arm[..., _AFTER], arm[..., _LAST]) + tolerance) + np.hypot(u[..., _AFTER], u[..., _LAST])
+    force = np.broadcast_to(2 * s, moment.shape)
+    return np.concatenate([force, moment], axis=2) * (tolerance * _OUTWARDS)
 
 
 def turn_form(box: PoseBox, turn: FloatArray, wide: FloatArray) -> TurnForm:
@@ -110,8 +146,12 @@ def turn_form(box: PoseBox, turn: FloatArray, wide: FloatArray) -> TurnForm:
 
 def _largest_moment(u: FloatArray, arm: FloatArray) -> FloatArray:
     """Return the largest sizes of the components of a cross product of vectors with components up to these sizes."""
-    after, last = [1, 2, 0], [2, 0, 1]
-    return np.asarray(u[..., after] * arm[..., last] + u[..., last] * arm[..., after])
+    return np.asarray(u[..., _AFTER] * arm[..., _LAST] + u[..., _LAST] * arm[..., _AFTER])
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return cross products of vectors; NumPy's own function takes several times as long for few vectors."""
+    return np.asarray(a[..., _AFTER] * b[..., _LAST] - a[..., _LAST] * b[..., _AFTER])
 
 
 def _cayley(box: PoseBox, turn: FloatArray, wide: FloatArray) -> TurnForm:
@@ -121,30 +161,26 @@ def _cayley(box: PoseBox, turn: FloatArray, wide: FloatArray) -> TurnForm:
     if box.kind is TurnKind.ANY_AXIS:
         D = np.eye(3)
     count = len(turn)
-    r = turn @ D
-    a = [r, *(np.broadcast_to(D[k], r.shape) for k in (0, 1, 2, *FIRST))]
-    b = [r, r, r, r, *(np.broadcast_to(D[k], r.shape) for k in SECOND)]
-    terms = np.empty((count, _TURNS, 10))
-    for t in range(_TURNS):
-        twice = 1.0 if t == 0 or (t > 3 and FIRST[t - 4] == SECOND[t - 4]) else 2.0
-        product = twice * (a[t] * b[t]).sum(axis=1)
-        outer = a[t][:, :, None] * b[t][:, None, :]
-        matrix = twice * (outer + outer.transpose(0, 2, 1)) - product[:, None, None] * np.eye(3)
-        if t == 0:
-            matrix = matrix + np.eye(3)
-        if t < 4:
-            matrix = matrix + 2 * _cross_matrix(a[t])
-        terms[:, t, :9] = matrix.reshape(count, 9)
-        terms[:, t, 9] = product + (t == 0)
+    a, b = np.empty((count, _TURNS, 3)), np.empty((count, _TURNS, 3))
+    a[:, 0] = turn @ D
+    b[:, :4] = a[:, :1]
+    a[:, 1:4], a[:, 4:], b[:, 4:] = D, D[FIRST], D[SECOND]
+    product = _TWICE * (a * b).sum(axis=2)
+    outer = a[:, :, :, None] * b[:, :, None, :]
+    matrix = _TWICE[:, None, None] * (outer + outer.transpose(0, 1, 3, 2)) - product[:, :, None, None] * np.eye(3)
+    matrix[:, 0] += np.eye(3)
+    matrix[:, :4] += 2 * _cross_matrices(a[:, :4])
+    product[:, 0] += 1
+    terms = np.concatenate([matrix.reshape(count, _TURNS, 9), product[:, :, None]], axis=2)
     size = 1 + ((np.abs(turn) + wide) @ np.abs(D)).sum(axis=1)
     return TurnForm(terms, np.zeros((count, 10)), 2 * size * size)
 
 
-def _cross_matrix(v: FloatArray) -> FloatArray:
-    """Return ``[v]x``, (B, 3, 3), of vectors (B, 3)."""
-    found = np.zeros((len(v), 3, 3))
-    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return found - found.transpose(0, 2, 1)
+def _cross_matrices(v: FloatArray) -> FloatArray:
+    """Return ``[v]x``, (B, T, 3, 3), of vectors (B, T, 3)."""
+    found = np.zeros((*v.shape, 3))
+    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return found - found.transpose(0, 1, 3, 2)
 
 
 def _roll_pitch_yaw(turn: FloatArray, wide: FloatArray) -> TurnForm:

@@ -4,6 +4,10 @@ Boxes are searched depth first, in blocks. Where the determinant of the rows has
 other at that of another, both signs are computed again without rounding. The workspace is connected, and convex in its
 coordinates: on the segment between the two poses the determinant is 0, and the claim is refuted.
 
+With a tolerance on joint centres a box is closed only if every machine within it is regular at every pose of the box. A
+machine whose determinant at a pose has the other sign than that of the exact machine refutes the claim
+(:mod:`.builtrank`).
+
 Where the determinant is 0 without a change of sign, no box that holds the place is ever closed, and the claim stays
 open.
 """
@@ -19,6 +23,7 @@ import numpy as np
 
 from ...models import FloatArray, frozen_array
 from ..interruption import Milestone, is_requested, reached
+from .builtrank import SingularMachine, singular_machine
 from .engines import RankEngine, rank_engine
 from .exact import determinant_sign, singular_between
 from .machine import Legs
@@ -89,6 +94,7 @@ class _Search:
         self._boxes = 0
         self._points: dict[int, FloatArray] = {}
         self._sides: FloatArray | None = None
+        self._built: SingularMachine | None = None
 
     @property
     def _open(self) -> int:
@@ -121,7 +127,7 @@ class _Search:
                 self._recorder.ranks(lower[:block], upper[:block], found)
             self._branch(found)
             del self._stack[place]
-            if self._is_refuted(found):
+            if self._is_refuted(found) or self._is_refuted_as_built(found):
                 return ""
         return "boxes are left that are too small to bisect" if self._small else ""
 
@@ -160,12 +166,21 @@ class _Search:
         self._sides = frozen_array([self._points[1], self._points[-1]], (2, 6))
         return True
 
+    def _is_refuted_as_built(self, found: RankExamination) -> bool:
+        """Return whether a machine within the tolerance is known that is singular in an open box of this block."""
+        if self._legs.tolerance > 0:
+            rows = found.verdict == Rank.OPEN
+            self._built = singular_machine(self._legs, self._box, 0.5 * found.lower[rows] + 0.5 * found.upper[rows])
+        return self._built is not None
+
     def verdict(self, reason: str) -> Regularity:
         """Return the verdict at this state of the search."""
         outcome, y = Outcome.PROVED, None
         if self._sides is not None:
             outcome = Outcome.REFUTED
             y = singular_between(self._legs, self._box, *self._sides)
+        elif self._built is not None:
+            outcome, y = Outcome.REFUTED, self._built.y
         elif self._open:
             outcome = Outcome.OPEN
             lower, upper = max((*self._stack, *self._small), key=lambda each: float((each[1] - each[0]).max()))
@@ -188,4 +203,5 @@ class _Search:
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,
+            errors=None if self._built is None else self._built.errors,
         )

@@ -5,6 +5,10 @@ The smallest singular value is 1 over the largest of the inverse, which is affin
 it, so that its largest value over the affine part is that at a corner of a box. The largest singular value of J itself
 is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i| <= 1``, the rows of :mod:`.rows`
 divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
+
+Errors of joint centres up to t change J by a matrix whose Frobenius norm bounds the change of every singular value
+(H. Weyl). With l the shortest length of a leg, the unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and
+its moment about the platform's origin by ``|a| h + t``.
 """
 
 from __future__ import annotations
@@ -15,8 +19,9 @@ import numpy as np
 
 from ...models import FloatArray
 from .boundsearch import Bounds
+from .builtsingular import change_of_rows, worst_rows
 from .inverse import CORNERS, Inverse, inverse_over
-from .machine import Legs
+from .machine import JointErrors, Legs
 from .posebox import PoseBox
 from .rows import FIRST, SECOND, expand
 
@@ -42,24 +47,39 @@ class _Affine(NamedTuple):
 class SingularValues:
     """Smallest singular value, or minus the condition number, of J over a workspace.
 
+    With a tolerance of the legs the bounds are those of all machines within it, and values those of the machine that is
+    worst to first order at each point.
+
     Args:
         legs: joint centres.
         box: the poses.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
+        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance alone.
     """
 
-    def __init__(self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool) -> None:
-        self._legs, self._box, self._length, self._is_condition = legs, box, length, is_condition
+    def __init__(self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool, shortest: float = 0.0) -> None:
+        self._box, self._length, self._is_condition = box, length, is_condition
+        self._built, self._legs = legs, legs._replace(tolerance=0.0)
+        self._change = change_of_rows(legs, length, shortest)
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the values (K,) at points (K, 6)."""
-        rows = expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0]
         with np.errstate(all="ignore"):
-            J = rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True)
-            J[:, :, 3:] /= self._length
-            values = np.linalg.svd(np.nan_to_num(J), compute_uv=False)
-            return np.asarray(-values[:, 0] / values[:, -1] if self._is_condition else values[:, -1])
+            if self._change:
+                return self._of(worst_rows(self._built, self._box, points, self._length, self._is_condition).rows)
+            return self._of(expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0])
+
+    def errors(self, y: FloatArray) -> JointErrors:
+        """Return the errors of the machine that is worst at a point (6,) to first order."""
+        return worst_rows(self._built, self._box, y[None], self._length, self._is_condition).errors(0)
+
+    def _of(self, rows: FloatArray) -> FloatArray:
+        """Return the values (K,) of rows (K, 6, 6) of any length."""
+        J = rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True)
+        J[:, :, 3:] /= self._length
+        values = np.linalg.svd(np.nan_to_num(J), compute_uv=False)
+        return np.asarray(-values[:, 0] / values[:, -1] if self._is_condition else values[:, -1])
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
@@ -67,7 +87,12 @@ class SingularValues:
             J = self._unit_rows(lower, upper)
             inverse = inverse_over(self._legs, self._box, lower, upper)
             norm = _norm_of_inverse(inverse, self._length)
-            found = -_largest(J) * norm if self._is_condition else 1 / norm
+            if self._change:
+                # The largest singular value may be larger, and the smallest one smaller, by the change of J.
+                least = np.maximum(1 / norm - self._change, 0.0)
+                found = -(_largest(J) + self._change) / least if self._is_condition else least
+            else:
+                found = -_largest(J) * norm if self._is_condition else 1 / norm
         bound = np.where(np.isnan(found), -np.inf, found)
         return Bounds(bound if self._is_condition else np.maximum(bound, 0.0), inverse.shares)
 

@@ -6,6 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from ...models import FloatArray
+from .machine import JointErrors
 from .posebox import PoseBox
 
 
@@ -34,6 +35,8 @@ class Regularity:
         share: part of the box's volume, that of its coordinates, in boxes that are left.
         seconds: wall time.
         reason: for stopping before every box was closed; else empty.
+        errors: of the joint centres of the machine that is singular at ``y``, where that is not the exact machine; else
+            None.
     """
 
     outcome: Outcome
@@ -46,3 +49,4 @@ class Regularity:
     share: float
     seconds: float
     reason: str
+    errors: JointErrors | None = None

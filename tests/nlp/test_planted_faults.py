@@ -141,7 +141,7 @@ def finds_on_paper(kernel: Kernel) -> bool:
         root = pose_root(workspace)
         for i in range(int(closed.sum())):
             try:
-                show(RankClaim(root, Joints(*legs)), root, Leaves(*(part[i : i + 1] for part in leaves)))
+                show(RankClaim(root, Joints(*legs[:2])), root, Leaves(*(part[i : i + 1] for part in leaves)))
             except ProofError:
                 return True
     return False

@@ -431,6 +431,11 @@ def test_limits_over_a_workspace_end_with_a_proof() -> None:
     assert np.ptp(lengths, axis=0).max() > 0.9 * 17 or lengths.min() < 1.01 * 20
     result = json_data(result_of(solution))
     assert result["workspace"]["proved"] is True  # type: ignore[index, call-overload]
+    # Rows of limits have the numbers of the case, although those of the constraints are tighter.
+    stated = {"leg_length.min": 20, "leg_length.max": 38, "actuator.stroke_max": 17}
+    rows = {row.key: row for row in result_of(solution).limits}  # type: ignore[union-attr]
+    assert {key: rows[key].limit for key in rows if key in stated} == pytest.approx({k: stated[k] for k in rows})
+    assert any(rows[key].active and rows[key].margin != 0 for key in rows)
     jsonschema.validate(result, result_schema())
     assert "[workspace]" in design.to_toml()
 

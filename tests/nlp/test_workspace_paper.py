@@ -59,8 +59,6 @@ layout = "octahedral"
 parameters = { x1 = 26.5, x2 = 11.543, x3 = 1, x4 = 5 }
 [pose]
 position = [0, 0, 20]
-[tolerance]
-joint_centre = 0.002
 [[task]]
 sense = "max"
 axis = [0, 0, 1]
@@ -88,13 +86,13 @@ def case_of(text: str = TEXT) -> Case:
 def judged() -> tuple[Judgement, PaperRecord]:
     record = PaperRecord()
     # Lengths of legs are asked for once more, without their limit.
-    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.004, paper=record)
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.008, paper=record)
     return found, record
 
 
 @pytest.fixture(scope="module")
 def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
-    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.004)
+    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.008)
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +227,7 @@ def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
 
 
 def rank(root: PoseRoot, robot: Legs) -> RankClaim:
-    return RankClaim(root, ballrows.Joints(*robot))
+    return RankClaim(root, ballrows.Joints(*robot[:2]))
 
 
 def test_a_refuted_workspace_carries_two_poses() -> None:
@@ -321,7 +319,7 @@ def test_balls_with_slopes_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
     root = pose_root(workspace)
     lower, upper = random_boxes(root, 12, 0.3, rng)
     lower[6:], upper[6:] = lower[6:], lower[6:] + (upper[6:] - lower[6:]) * 1e-13
-    rows = ballrows.ball_rows(root, ballrows.Joints(*robot), lower, upper).rows
+    rows = ballrows.ball_rows(root, ballrows.Joints(*robot[:2]), lower, upper).rows
     y = coordinates(lower, upper)
     rounded, bent = 0, 0
     for k in range(12):
@@ -420,7 +418,7 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
     """Boxes against the values of the search's oracles at samples, which the check does not use."""
     rng = np.random.default_rng(4)
     workspace = turned(kind, 20)
-    root, box, joints = pose_root(workspace), pose_box(workspace), ballrows.Joints(*robot)
+    root, box, joints = pose_root(workspace), pose_box(workspace), ballrows.Joints(*robot[:2])
     lower, upper = random_boxes(root, 120, 0.03, rng)
     points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
     flat = points.reshape(-1, 6)
@@ -449,7 +447,7 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
 def test_inverses_hold_those_at_samples(robot: Legs) -> None:
     rng = np.random.default_rng(8)
     workspace = turned(TurnKind.ANY_AXIS, 20)
-    root, joints = pose_root(workspace), ballrows.Joints(*robot)
+    root, joints = pose_root(workspace), ballrows.Joints(*robot[:2])
     lower, upper = random_boxes(root, 60, 0.1, rng)
     found = inverse_rows(ballrows.ball_rows(root, joints, lower, upper).rows)
     assert found.known.mean() > 0.5
@@ -526,3 +524,11 @@ def test_the_shipped_workspace_is_accepted(cli: Run, tmp_path: Path) -> None:
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
     assert out.startswith("holds: 57 of 57 claims")
+
+
+def test_machines_within_a_tolerance_have_no_proof(judged: tuple[Judgement, PaperRecord]) -> None:
+    """The claims are then about other machines too, of which the checker knows nothing."""
+    text = TEXT + "[tolerance]\njoint_centre = 0.002\n"
+    proof = paper_of(replace(judged[0], case=case_of(text)), judged[1], text)
+    assert not proof.claims
+    assert all("tolerance" in each.reason for each in proof.unproved)

@@ -112,6 +112,7 @@ class Constraint:
         measure: the measured number itself, where the expression only estimates it.
         spectral: the matrix that the expression is made from, where it estimates eigenvalues.
         call: the call whose value the expression is, where it repeats for several legs, joints, tasks or poses.
+        stated: lower and upper bound as the case states them, where those of the program are tighter; else None.
     """
 
     name: str
@@ -123,6 +124,7 @@ class Constraint:
     measure: JacobianMeasure | None = None
     spectral: Spectral | None = None
     call: Call | None = None
+    stated: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

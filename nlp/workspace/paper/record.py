@@ -151,14 +151,18 @@ class PaperRecord:
         tree = bytes([Node.BOUNDED])
         self._keep(claim, ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree))
 
-    def program(self, claim: Claim, found: Certificate, writer: ProofWriter) -> None:
-        """Record a search of a number."""
+    def program(self, claim: Claim, found: Certificate, writer: ProofWriter, *, again: bool = False) -> None:
+        """Record a search of a number, or a finer one again."""
         has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(
             found.bound
         )
         tree = writer.tree(with_open=True) if has_bound else None
         bound = -found.nlp.sign * found.bound
-        self._keep(claim, ProgramRecord(found.nlp, bound, tree))
+        record = ProgramRecord(found.nlp, bound, tree)
+        if again:
+            self.programs[claim.name, claim.sense.value] = record
+        else:
+            self._keep(claim, record)
 
     def _keep(self, claim: Claim, record: ProgramRecord) -> None:
         """Keep the record of a number; of two of one name that of the first, as in :mod:`.expected`."""

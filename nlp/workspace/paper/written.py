@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
+#: Reason of every claim about a case with a tolerance for joint centres.
+_AS_BUILT = "it is about every machine within the tolerance of joint centres, and proofs are about the exact machine"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
@@ -43,6 +45,9 @@ def paper_of(
     proved: dict[tuple[str, str], PaperClaim] = {}
     unproved = []
     for each in expected_claims(judged.case, layout, legs, quantities, leg_error):
+        if judged.case.joint_centre_tolerance:
+            unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
+            continue
         extremes = first if each.kind == "number" else last
         found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
         if isinstance(found, PaperClaim):

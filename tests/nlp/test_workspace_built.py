@@ -1,0 +1,457 @@
+"""Workspaces of machines as they are built: every claim, for every machine within a tolerance on joint centres."""
+
+import itertools
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, Free, Limits, load_case, load_result, solve
+from screwsynth.nlp.case.limits.joints import JointAngle
+from screwsynth.nlp.case.limits.legs import Actuator, LegLength
+from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.workspace import WorkspaceResult
+from screwsynth.nlp.workspace import rows
+from screwsynth.nlp.workspace.boundsearch import prove_minimum
+from screwsynth.nlp.workspace.builtclaims import built_claims
+from screwsynth.nlp.workspace.claims import claims_of
+from screwsynth.nlp.workspace.clearance import Clearance
+from screwsynth.nlp.workspace.engines import kernel, rank_engine
+from screwsynth.nlp.workspace.extremes import Extreme, prove_extreme
+from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
+from screwsynth.nlp.workspace.posed import posed_layout
+from screwsynth.nlp.workspace.regularity import Rank
+from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.verdict import Outcome
+
+#: The machine of LinuxCNC's hexapod kinematics, joints apart, with every limit that errors of joint centres change. The
+#: limits are wide: the numbers that are proved are compared.
+TEXT = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 4, x4 = 5 }
+[pose]
+position = [0, 0, 20]
+[tolerance]
+joint_centre = 0.02
+[[task]]
+sense = "max"
+axis = [1, 2, 6]
+point = [3, 1, 12]
+pitch = 0.1
+[limits]
+leg_length = { min = 10, max = 60 }
+actuator = { stroke_max = 30, dead_length = 1 }
+base_joint_angle = 80
+platform_joint_angle = { max = 60, about = "home" }
+home = { position = [0, 0, 20] }
+joint_spacing = { min = 1 }
+footprint = { base = 40, platform = 20 }
+radius_ratio = { min = 0.1, max = 0.9 }
+leg_clearance = { min = 0.5 }
+smallest_singular_value = { min = 0.1, length = 11.5 }
+condition_number = { max = 30, length = 11.5 }
+rate_share = { max = 0.9 }
+actuator_rate = { max = 60 }
+custom = ["x1 - 2*x2 >= 0"]
+[workspace]
+position = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]
+rotation = { angle = { min = -6, max = 6 } }
+"""
+HOME = np.array([0.0, 0.0, 20.0])
+TOLERANCE = 0.02
+LENGTH = 11.5
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return case_from_tables(tomllib.loads(TEXT), name="built", source="built.toml")
+
+
+def legs(case: Case) -> Legs:
+    found = legs_of(case)
+    assert found is not None
+    return found
+
+
+class Machines:
+    """Machines within a tolerance, each at a pose of a box: random ones, and every second with errors at their largest.
+
+    Those have errors along or across the legs, or along axes, and are at faces and corners of the box.
+    """
+
+    def __init__(self, robot: Legs, box: PoseBox, count: int, seed: int = 0) -> None:
+        rng = np.random.default_rng(seed)
+        points = box.random(count, rng)
+        ends = np.where(rng.uniform(size=points.shape) < 0.5, box.upper, box.lower)
+        points[::2] = box.clipped(np.where(rng.uniform(size=points.shape) < 0.9, ends, points)[::2])
+        form = rows.turn_form(box, points[:, 3:], np.zeros((count, 3))).terms[:, 0]
+        self.turn = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+        self.position = points[:, :3]
+        span = self.position[:, None] + np.einsum("kij,lj->kli", self.turn, robot.platform) - robot.base
+        unit = span / np.linalg.norm(span, axis=2, keepdims=True)
+        errors = rng.normal(size=(2, count, 6, 3))
+        errors /= np.linalg.norm(errors, axis=3, keepdims=True)
+        errors[:, 1::2] *= rng.uniform(size=(2, count // 2, 6, 1)) ** (1 / 3)
+        # Opposite errors of both ends, along the leg or across it.
+        sign = rng.choice([-1.0, 1.0], (count, 6, 1))
+        across = np.cross(unit, errors[0])
+        across /= np.linalg.norm(across, axis=2, keepdims=True)
+        kind = rng.integers(4, size=(count, 1, 1))
+        moved = np.where(kind == 0, sign * unit, np.where(kind == 1, across, errors[0]))
+        errors[0, ::2], errors[1, ::2] = -moved[::2], moved[::2]
+        errors *= robot.tolerance
+        self.base = robot.base + errors[0]
+        self.platform = robot.platform + np.einsum("kji,klj->kli", self.turn, errors[1])
+        self.arm = np.einsum("kij,klj->kli", self.turn, self.platform)
+        self.d = self.position[:, None] + self.arm - self.base
+        self.length = np.linalg.norm(self.d, axis=2)
+        self.n = self.d / self.length[:, :, None]
+        self.J = np.concatenate([self.n, np.cross(self.arm, self.n)], axis=2)
+
+    def rates(self, twist: FloatArray) -> FloatArray:
+        """Work rates (K, 6)."""
+        return np.asarray(((twist[3:] + np.cross(twist[:3], self.base)) * self.n).sum(axis=2))
+
+    def clearance(self, i: int, j: int) -> FloatArray:
+        """Distances (K,) of two legs as segments, the least of those between a point of one and the other's ends and
+        of the lines where they cross."""
+        p, q, d, e = self.base[:, i], self.base[:, j], self.d[:, i], self.d[:, j]
+        found = np.full(len(p), np.inf)
+        for a, b, c in ((p, q, e), (p + d, q, e), (q, p, d), (q + e, p, d)):
+            t = np.clip(((a - b) * c).sum(axis=1) / (c * c).sum(axis=1), 0, 1)
+            found = np.minimum(found, np.linalg.norm(a - b - t[:, None] * c, axis=1))
+        normal = np.cross(d, e)
+        system = np.stack([d, -e, normal], axis=2)
+        s, t, _ = np.linalg.solve(system, (q - p)[:, :, None])[:, :, 0].T
+        lines = np.abs((normal * (q - p)).sum(axis=1)) / np.linalg.norm(normal, axis=1)
+        inside = (s > 0) & (s < 1) & (t > 0) & (t < 1)
+        return np.where(inside, np.minimum(found, lines), found)
+
+
+def angles(d: FloatArray, axes: FloatArray) -> FloatArray:
+    """Angles (K, 6) of vectors (K, 6, 3) to axes (K, 6, 3) or (6, 3)."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(axes, d), axis=2), (axes * d).sum(axis=2)))
+
+
+def numbers(case: Case, robot: Legs, machines: Machines) -> Iterator[tuple[str, FloatArray]]:
+    """Each number that is judged, by the name of its claims, of machines (K,)."""
+    names = [leg.name for leg in case.model.legs]
+    home = HOME + robot.platform - robot.base
+    home /= np.linalg.norm(home, axis=1, keepdims=True)
+    twist = np.asarray(case.tasks[0].twist)
+    squares = machines.rates(twist) ** 2
+    F = squares.sum(axis=1)
+    base = angles(machines.d, np.tile([0.0, 0.0, 1.0], (6, 1)))
+    platform = angles(machines.d, np.einsum("kij,lj->kli", machines.turn, home))
+    for i, name in enumerate(names):
+        yield f"leg_length limb {name}", machines.length[:, i]
+        yield f"base_joint_angle limb {name}", base[:, i]
+        yield f"platform_joint_angle limb {name}", platform[:, i]
+        yield f"rate_share limb {name}", squares[:, i] / F
+        yield f"actuator_rate actuator {name}", np.sqrt(squares[:, i])
+        yield f"footprint base joint {name}", np.linalg.norm(machines.base[:, i, :2], axis=1)
+        yield f"footprint platform joint {name}", np.linalg.norm(machines.platform[:, i, :2], axis=1)
+    for i, j in itertools.combinations(range(6), 2):
+        one, other = names[i], names[j]
+        for plate in ("base", "platform"):
+            centres = getattr(machines, plate)
+            apart = np.linalg.norm(centres[:, i] - centres[:, j], axis=1)
+            yield f"joint_spacing {plate} joints {one} and {other}", apart
+    for i, j in ((0, 1), (0, 2), (1, 4)):
+        yield f"leg_clearance limbs {names[i]} and {names[j]}", machines.clearance(i, j)
+    yield "F", F
+    ratio = np.linalg.norm(machines.platform[..., :2], axis=(1, 2)) / np.linalg.norm(
+        machines.base[..., :2], axis=(1, 2)
+    )
+    yield "radius_ratio", ratio
+
+
+def beyond(each: Extreme, values: FloatArray) -> float:
+    """Distance of the worst of some values beyond a proven bound; negative within it."""
+    return float(values.max() - each.bound if each.sense is Sense.MAX else each.bound - values.min())
+
+
+@pytest.fixture(scope="module")
+def machines(case: Case) -> Machines:
+    return Machines(legs(case), pose_box(workspace_of_case(case)), 30_000)
+
+
+def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
+    workspace, robot = workspace_of_case(case), legs(case)
+    layout = posed_layout(case, workspace)
+    # No leg is shorter than 20 in: the platform is at least 19 in above the base.
+    claims = built_claims(layout, workspace, robot, claims_of(layout, ["base_joint_angle"]), 15.0)
+    assert machines.length.min() > 15
+    picked = [each for each in claims if " 1-" in each.name or " 2+" in each.name or " " not in each.name]
+    sampled, seen = dict(numbers(case, robot, machines)), set()
+    for each in (prove_extreme(layout, claim, legs=robot, gap=1e-3) for claim in picked):
+        if each.name.startswith("actuator.dead_length"):
+            continue
+        seen.add((each.name.partition(" ")[0], each.key == ""))
+        assert beyond(each, sampled[each.name]) <= 0, each.name
+        # Proven bounds are near: a hundredth of the largest number of the exact machine, with the gap.
+        assert beyond(each, sampled[each.name]) > -0.03 * np.abs(sampled[each.name]).max(), each.name
+        # The errors that come with a value are those of a machine within the tolerance which has that value.
+        assert each.errors is not None
+        assert each.pose is not None
+        assert max(np.linalg.norm(part, axis=1).max() for part in each.errors) <= TOLERANCE
+        assert beyond(each, np.array([each.reached])) <= 1e-9 * abs(each.reached), each.name
+    assert len(seen) == 10
+    determinants = np.linalg.det(machines.J)
+    assert (determinants > 0).all() or (determinants < 0).all()
+    assert prove_regular(robot, pose_box(workspace)).outcome is Outcome.PROVED
+
+
+def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_tolerance(
+    case: Case, machines: Machines
+) -> None:
+    robot, box = legs(case), pose_box(workspace_of_case(case))
+    values = np.linalg.svd(machines.J[:20_000] / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
+    checks = [
+        (Clearance(robot, box, 0, 1), machines.clearance(0, 1)),
+        (Clearance(robot, box, 0, 2), machines.clearance(0, 2)),
+        (SingularValues(robot, box, LENGTH, is_condition=False, shortest=15.0), values[:, -1]),
+        (SingularValues(robot, box, LENGTH, is_condition=True, shortest=15.0), -values[:, 0] / values[:, -1]),
+    ]
+    rng = np.random.default_rng(1)
+    for oracle, sampled in checks:
+        assert oracle.bounds(box.lower[None], box.upper[None]).lower[0] <= sampled.min()
+        # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
+        points = box.random(50, rng)
+        at = oracle.bounds(points, points).lower
+        exact = type(oracle).values(oracle, points)
+        assert (at <= exact + 1e-12).all()
+        assert (at >= exact - 0.05 * np.abs(exact)).all()
+        assert max(np.linalg.norm(part, axis=1).max() for part in oracle.errors(points[0])) <= TOLERANCE
+
+
+@pytest.mark.parametrize("kind", list(TurnKind))
+def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: TurnKind) -> None:
+    rng = np.random.default_rng(2)
+    angle = Free(-math.radians(45), math.radians(45))
+    turns = Turns(kind, (angle,) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1), (0.6, 0.0, 0.8))
+    box = pose_box(Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), turns))
+    robot = legs(case)._replace(tolerance=0.3)
+    lower = box.random(300, rng)
+    upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.05, (300, 1)), box.upper)
+    found = rank_engine(robot, box, "numpy").examine(lower, upper)
+    exact = rank_engine(robot._replace(tolerance=0.0), box, "numpy").examine(lower, upper)
+    if kernel() is not None:
+        other = rank_engine(robot, box, "c").examine(lower, upper)
+        assert (found.verdict == other.verdict).mean() > 0.999
+    changed = 0
+    for k in np.flatnonzero(exact.verdict == Rank.REGULAR):
+        inside = replace(box, lower=found.lower[k], upper=found.upper[k])
+        signs = np.sign(np.linalg.det(Machines(robot, inside, 60, seed=int(k)).J))
+        if found.verdict[k] == Rank.REGULAR:
+            assert (signs == signs[0]).all()
+        changed += (signs != signs[0]).any()
+    # Without the tolerance boxes would be called regular that are not so for every machine: the test can fail. About
+    # one axis no pose of this machine is near a singular one.
+    assert changed or kind is TurnKind.AXIS
+    assert Rank.REGULAR in found.verdict
+
+
+def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> None:
+    angle = Free(-math.radians(30), math.radians(30))
+    box = pose_box(Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), Turns(TurnKind.ANY_AXIS, (angle,))))
+    robot = legs(case)._replace(tolerance=0.8)
+    assert prove_regular(robot._replace(tolerance=0.0), box).outcome is Outcome.PROVED
+    found = prove_regular(robot, box)
+    assert found.outcome is Outcome.REFUTED
+    assert found.errors is not None
+    assert found.y is not None
+    assert max(np.linalg.norm(part, axis=1).max() for part in found.errors) <= 0.8
+    machine, pose = found.errors.applied(robot), box.pose(found.y)
+    assert box.holds(found.y)
+    arm = machine.platform @ pose.rotation.T
+    span = pose.position + arm - machine.base
+    J = np.hstack([span, np.cross(arm, span)]) / np.linalg.norm(span, axis=1, keepdims=True)
+    values = np.linalg.svd(J, compute_uv=False)
+    assert values[-1] < 1e-12 * values[0]
+
+
+def test_closed_forms_of_the_worst_machine(case: Case) -> None:
+    robot, tolerance = legs(case), TOLERANCE
+    kept = [each for each in case.limits if isinstance(each, LegLength | JointAngle)]
+    judged = judge_workspace(replace(on_a_line(case), limits=Limits(*kept)), gap=1e-6, with_objective=False)
+    by_name = {(each.name, each.sense): each for each in judged.extremes if each.limit is not None}
+    for i, leg in enumerate(case.model.legs):
+        spans = [np.array([0.0, 0.0, z]) + robot.platform[i] - robot.base[i] for z in (18.0, 20.0)]
+        short, long = (float(np.linalg.norm(each)) for each in spans)
+        tilt = math.acos(18.0 / short)
+        home = spans[1] / long
+        swing = math.acos(min(float(home @ spans[0]) / short, 1.0))
+        expected = {
+            (f"leg_length limb {leg.name}", Sense.MIN): short - 2 * tolerance,
+            (f"leg_length limb {leg.name}", Sense.MAX): long + 2 * tolerance,
+            (f"base_joint_angle limb {leg.name}", Sense.MAX): tilt + math.asin(2 * tolerance / short),
+            (f"platform_joint_angle limb {leg.name}", Sense.MAX): swing + math.asin(2 * tolerance / short),
+        }
+        for key, value in expected.items():
+            sign = 1 if key[1] is Sense.MAX else -1
+            assert 0 <= sign * (by_name[key].bound - value) < 1e-4, key
+            assert by_name[key].reached == pytest.approx(value, abs=1e-6), key
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [TOLERANCE, 0.2])
+def test_every_claim_holds_for_a_hundred_thousand_machines(case: Case, tolerance: float) -> None:
+    built = replace(case, joint_centre_tolerance=tolerance)
+    judged = judge_workspace(built, gap=1e-3, quantities=["base_joint_angle"])
+    # Errors of the pose of the larger tolerance are too large for a bound of their terms of second order.
+    left = [each for each in judged.extremes if each.outcome is not Outcome.PROVED]
+    assert all(each.name.endswith(" error") for each in left), [(each.name, each.reason) for each in left]
+    assert not left or tolerance > TOLERANCE
+    robot = legs(built)
+    machines = Machines(robot, pose_box(judged.workspace), 100_000)
+    sampled = dict(numbers(built, robot, machines))
+    values = np.linalg.svd(machines.J / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
+    sampled["smallest_singular_value"], sampled["condition_number"] = values[:, -1], values[:, 0] / values[:, -1]
+    determinants = np.linalg.det(machines.J)
+    assert (determinants > 0).all() or (determinants < 0).all()
+    for each in judged.extremes:
+        if each.name in sampled:
+            assert beyond(each, sampled[each.name]) <= 0, each.name
+        else:
+            others = ("actuator.", "leg_clearance ", "position error", "rotation error", "custom: ")
+            assert each.name.startswith(others), each.name
+
+
+def test_strokes_are_those_of_one_machine_at_two_poses(case: Case) -> None:
+    """Bounds of strokes against random machines, each at many poses."""
+    # The triangle inequality does not decide this limit on a stroke, nor this dead length.
+    moved = replace(case, limits=Limits(Actuator(stroke_max=5.85, dead_length=20.4)))
+    judged = judge_workspace(moved, with_objective=False)
+    robot, box = legs(case), pose_box(judged.workspace)
+    strokes = [each for each in judged.extremes if each.key == "actuator.stroke_max"]
+    rng = np.random.default_rng(3)
+    corners = box.clipped(np.where(rng.uniform(size=(200, 6)) < 0.5, box.upper, box.lower))
+    form = rows.turn_form(box, corners[:, 3:], np.zeros((200, 3))).terms[:, 0]
+    turn = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    errors = rng.normal(size=(2, 300, 6, 3))
+    errors *= TOLERANCE / np.linalg.norm(errors, axis=3, keepdims=True)
+    arms = np.einsum("kij,mlj->kmli", turn, robot.platform + errors[0])
+    lengths = np.linalg.norm(corners[:, None, None, :3] + arms - robot.base - errors[1], axis=3)
+    stroke = np.ptp(lengths, axis=0).max(axis=0)
+    for each, sampled in zip(strokes, stroke, strict=True):
+        assert max(sampled, each.reached) <= each.bound < 1.03 * each.reached
+    dead = [each for each in judged.extremes if each.key == "actuator.dead_length" and each.boxes == 0]
+    least = (2 * lengths.min(axis=0) - lengths.max(axis=0)).min(axis=0)
+    for each, sampled in zip(dead, least, strict=True):
+        assert min(sampled, each.reached) >= each.bound > 0.99 * each.reached
+    assert judged.is_proved, [(each.name, each.bound, each.reached, each.reason) for each in judged.extremes]
+
+
+def on_a_line(case: Case) -> Case:
+    """The case with positions on a line, and no rotation: lengths of legs are largest and smallest at its ends."""
+    return replace(case, workspace=Workspace((0.0, 0.0, Free(18.0, 20.0)), Turns(TurnKind.AXIS, (0.0,))))
+
+
+def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) -> None:
+    exact = on_a_line(replace(case, joint_centre_tolerance=None))
+    robot = legs(exact)
+    ends = [np.linalg.norm(np.array([0.0, 0.0, z]) + robot.platform - robot.base, axis=1) for z in (18.0, 20.0)]
+    stroke, longest = float((ends[1] - ends[0]).max()), float(ends[1].max())
+    for near, outcome in ((1 + 2e-6, Outcome.PROVED), (1 + 1e-10, Outcome.PROVED), (1 - 2e-6, Outcome.REFUTED)):
+        limits = Limits(LegLength(min=10.0, max=longest * near), Actuator(stroke_max=stroke * near))
+        judged = judge_workspace(replace(exact, limits=limits), gap=0.05, with_objective=False)
+        limited = [each for each in judged.extremes if each.key in ("leg_length.max", "actuator.stroke_max")]
+        assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
+    # The searches that are not those of certificates go on too, and end at a value that meets its limit.
+    box = pose_box(workspace_of_case(case))
+    oracle = Clearance(robot, box, 0, 1)
+    least = prove_minimum(oracle, box, gap=1e-4).value
+    for limit, slack in ((least - 1e-6, 0.0), (least + 1e-10, 1e-9)):
+        found = prove_minimum(oracle, box, gap=1.0, limit=limit, slack=slack, time_limit=20)
+        assert found.bound >= limit - slack, found
+
+
+def test_the_command_shows_the_machine_that_refutes(tmp_path: Path) -> None:
+    file, target = tmp_path / "built.toml", tmp_path / "result.json"
+    keep = ("leg_length = { min = 10, max = 60 }", "leg_length = { min = 10, max = 32 }")
+    head, _, tail = TEXT.replace(*keep).partition("actuator =")
+    file.write_text(head + tail[tail.index("[workspace]") :], encoding="utf-8")
+    run = CliRunner().invoke(app, ["workspace", str(file), "--gap", "0.01", "--json", str(target)])
+    assert run.exit_code == 1, run.output
+    result = load_result(target)
+    jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
+    assert isinstance(result, WorkspaceResult)
+    assert result.joint_centre == TOLERANCE
+    refuted = [each for each in result.extremes if each.outcome is Outcome.REFUTED]
+    assert refuted
+    for each in refuted:
+        assert each.machine is not None
+        assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
+    shown = run.output
+    # The digest comes first.
+    assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
+    assert "every one whose joint centres are off by at most 0.02 in" in shown
+    assert f"the machine that refutes: {refuted[0].name}" in shown
+    assert "see it with" in shown
+
+
+def test_robots_without_a_rule_stay_open(case: Case) -> None:
+    layout = posed_layout(case, workspace_of_case(case))
+    claim = replace(claims_of(layout)[-1], uncovered="not covered")
+    found = prove_extreme(layout, claim)
+    assert (found.outcome, found.reason) == (Outcome.OPEN, "not covered")
+    assert not math.isfinite(found.bound)
+    # The exact machine is one of those within the tolerance: it refutes.
+    refuted = prove_extreme(layout, replace(claim, limit=1.0, key="F.max"))
+    assert refuted.outcome is Outcome.REFUTED
+
+
+@pytest.mark.slow
+def test_a_design_is_found_that_keeps_its_limits_for_every_machine() -> None:
+    case = replace(load_case("hexapod-workspace"), joint_centre_tolerance=0.002)
+    solution = solve(case, starts=4)
+    proof = solution.workspace
+    assert proof is not None
+    assert proof.is_proved
+    # The tolerance costs something.
+    assert solution.F < 422.402
+    robot = legs(proof.judgement.case)
+    machines = Machines(robot, pose_box(proof.judgement.workspace), 100_000)
+    assert machines.length.min() >= 20
+    assert machines.length.max() <= 38
+    assert np.linalg.norm(machines.base[:, 0] - machines.base[:, 1], axis=1).min() >= 4
+
+
+def test_what_takes_the_limits_at_the_stated_pose_says_so(tmp_path: Path) -> None:
+    target = tmp_path / "certificate.json"
+    run = CliRunner().invoke(
+        app, ["certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target)]
+    )
+    assert run.exit_code in (0, 1)
+    result = json.loads(target.read_text(encoding="utf-8"))
+    notice = "the limits are taken at the stated pose alone, not over the workspace"
+    assert result["notice"] == notice
+    jsonschema.validate(result, result_schema())
+    assert notice in " ".join(run.output.split())
+    assert workspace_of_case_notice("hexapod-machining") == ""
+
+
+def workspace_of_case_notice(name: str) -> str:
+    """Notice of a shipped case."""
+    workspace = load_case(name).workspace
+    return "" if workspace is None else workspace.stated_pose_notice
