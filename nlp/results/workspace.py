@@ -42,13 +42,13 @@ class RegularData(JsonObject):
             left.
         pose: that pose; absent where the claim is proved.
         between: two poses at which the determinant of the rows has opposite signs, without rounding; absent where the
-            claim is not refuted.
+            claim is not refuted so.
         boxes: number of boxes examined.
         open: number of boxes left.
         share: part of the box of poses in boxes that are left.
         seconds: wall time.
         engine: ``c`` or ``numpy``.
-        reason: for stopping early; absent without one.
+        reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
     """
 
     outcome: Outcome
@@ -117,7 +117,8 @@ class WorkspaceResult(JsonObject):
         head: the case.
         parameters: dimensions by name; three numbers for a point or direction.
         proved: whether J is regular at every pose, every limit holds, and every number is bounded.
-        regular: whether J has full rank at every pose; null for a robot that is not six straight legs.
+        regular: whether J has full rank at every pose.
+        constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without any.
         extremes: smallest and largest values.
         scale: the largest box; absent where it was not asked for.
         versions: of the programs.
@@ -126,7 +127,8 @@ class WorkspaceResult(JsonObject):
     head: Inline[HeadData]
     parameters: Mapping[str, float | Vector]
     proved: bool
-    regular: RegularData | None
+    regular: RegularData
+    constraints: Absent[RegularData]
     extremes: tuple[ExtremeData, ...]
     scale: Absent[ScaleData]
     versions: VersionsData
@@ -170,7 +172,7 @@ class WorkspaceProofData(JsonObject):
     proved: bool
     designs: tuple[DesignData, ...]
     poses: tuple[BindingData, ...]
-    regular: RegularData | None
+    regular: RegularData
     extremes: tuple[ExtremeData, ...]
 
 
@@ -184,7 +186,7 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
         proved=proof.is_proved,
         designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
-        regular=None if judged.regularity is None else _regular_data(judged.regularity, units),
+        regular=_regular_data(judged.regularity, units),
         extremes=tuple(_extreme_data(each, units) for each in judged.extremes),
     )
 
@@ -200,7 +202,8 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         head=head_data(case),
         parameters=parameters,
         proved=judged.is_proved,
-        regular=None if judged.regularity is None else _regular_data(judged.regularity, case.units),
+        regular=_regular_data(judged.regularity, case.units),
+        constraints=None if judged.constraints is None else _regular_data(judged.constraints, case.units),
         extremes=tuple(_extreme_data(each, case.units) for each in judged.extremes),
         scale=scale,
         versions=versions(),

@@ -38,10 +38,9 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
 def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
     """Yield the verdicts on a machine over its workspace."""
     yield title_line(case)
-    if result.regular is None:
-        yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
-    else:
-        yield from _regular_lines(case, result.regular)
+    yield from _regular_lines(case, result.regular)
+    if result.constraints is not None:
+        yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
     yield from _tables(case, result.extremes)
     yield from _needs_line(case, result)
     if result.scale is not None:
@@ -99,15 +98,18 @@ def _pose_words(case: Case, pose: WorkspacePose) -> str:
     return f"({position}), {pose.angle:.5g} {case.units.angle} about ({axis})"
 
 
-def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line]:
-    """Yield the verdict on regularity."""
+def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of: str = "") -> Iterator[Line]:
+    """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
     share = f"{100 * regular.share:.3g} % of the box"
+    found = f", {regular.reason}" if regular.reason and regular.between is None else ""
     words = {
-        Outcome.PROVED: ": J has full rank at every pose",
-        Outcome.REFUTED: ": J is singular at a pose",
+        Outcome.PROVED: ": the constraint wrenches keep their rank at every pose"
+        if of
+        else ": J has full rank at every pose",
+        Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at a pose{found}",
         Outcome.OPEN: f": {regular.open:,} boxes are left, {share} ({regular.reason or ''})",
     }
-    yield Line(regular.outcome.value, label="regular", tone=_TONES[regular.outcome], after=words[regular.outcome])
+    yield Line(regular.outcome.value, label=label, tone=_TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
         yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
     if regular.outcome is Outcome.REFUTED and regular.pose is not None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..case.case import Case
 from ..case.workspace import Workspace
 from ..interruption import is_requested
-from .claims import claims_of
+from ..program.layout import Layout
+from .anyrobot import prove_ranks, reach_claims, touched
+from .claims import Claim, claims_of
+from .closedform import closed_form
 from .extremes import GAP, Extreme, prove_extreme
 from .machine import legs_of, workspace_of_case
 from .ownsearches import own_searches, pose_errors, strokes
@@ -30,26 +33,36 @@ class Judgement:
     Attributes:
         case: the case, its dimensions fixed.
         workspace: the poses.
-        regularity: whether J has full rank at every pose; None for a robot that is not six straight legs.
-        extremes: of the limits, lengths of legs, measures and tasks, in this order.
+        regularity: whether J has full rank at every pose.
+        extremes: of the reach of limbs, limits, lengths of legs, measures and tasks, in this order.
+        constraints: whether the constraint wrenches alone keep their rank; None for a robot without any.
     """
 
     case: Case
     workspace: Workspace
-    regularity: Regularity | None
+    regularity: Regularity
     extremes: tuple[Extreme, ...]
+    constraints: Regularity | None = None
+
+    @property
+    def ranks(self) -> tuple[Regularity, ...]:
+        """Verdicts on ranks."""
+        return (self.regularity,) if self.constraints is None else (self.regularity, self.constraints)
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether all ranks are proved to be full."""
+        return all(each.outcome is Outcome.PROVED for each in self.ranks)
 
     @property
     def is_proved(self) -> bool:
-        """Whether J is proved to have full rank, every limit holds, and every other number is bounded to the gap."""
-        regular = self.regularity is not None and self.regularity.outcome is Outcome.PROVED
-        return regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
+        """Whether all ranks are proved to be full, every limit holds, and every other number is bounded to the gap."""
+        return self.is_regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
 
     @property
     def is_refuted(self) -> bool:
         """Whether a pose is known that is singular or outside of a limit."""
-        outcomes = [] if self.regularity is None else [self.regularity.outcome]
-        return Outcome.REFUTED in (*outcomes, *(each.outcome for each in self.extremes))
+        return Outcome.REFUTED in [each.outcome for each in (*self.ranks, *self.extremes)]
 
 
 def judge_workspace(
@@ -93,21 +106,40 @@ def judge_workspace(
     own = workspace_of_case(case)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
-    layout = posed_layout(case, workspace)
-    claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
-    regularity = None
+    extremes: list[Extreme] = []
+    constraints = None
+    closed, layout = closed_form(case.model), posed_layout(case, workspace)
     if legs is not None:
         regularity = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=rank_progress)
-    extremes: list[Extreme] = []
-    if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
-        return Judgement(case, workspace, regularity, ())
-    for done, claim in enumerate(claims):
-        if progress is not None:
-            progress(claim.name, done, len(claims))
-        found = prove_extreme(layout, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested)
-        extremes.append(found)
-        if until_fault and found.outcome is not Outcome.PROVED:
-            return Judgement(case, workspace, regularity, tuple(extremes))
+        regularity = touched(case, box, regularity)
+    else:
+        options = {"engine": engine, "time_limit": time_limit, "progress": rank_progress}
+        regularity, constraints = prove_ranks(case, closed.model, box, **options)
+    judged = Judgement(case, workspace, regularity, (), constraints)
+    if until_fault and not judged.is_regular:
+        return judged
+
+    def proved(at: Layout, claims: Sequence[Claim]) -> bool:
+        """Add the extremes of claims; return whether the work goes on."""
+        for done, claim in enumerate(claims):
+            if progress is not None:
+                progress(claim.name, done, len(claims))
+            found = prove_extreme(at, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested)
+            extremes.append(found)
+            if until_fault and found.outcome is not Outcome.PROVED:
+                return False
+        return True
+
+    if closed.reaches and with_limits:
+        solved = posed_layout(replace(case, model=closed.model), workspace)
+        if not proved(solved, reach_claims(solved, closed)):
+            return replace(judged, extremes=tuple(extremes))
+        if all(each.outcome is Outcome.PROVED for each in extremes):
+            # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+            layout = solved
+    claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
+    if not proved(layout, claims):
+        return replace(judged, extremes=tuple(extremes))
     if legs is not None and with_limits:
         extremes += strokes(case, extremes)
         for found in own_searches(case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested):
@@ -118,4 +150,4 @@ def judge_workspace(
     if legs is not None and with_limits and with_objective and eps > 0:
         shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
         extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
-    return Judgement(case, workspace, regularity, tuple(extremes))
+    return replace(judged, extremes=tuple(extremes))

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
 from .assembled import Loops
-from .enclosing import Encloser
+from .enclosing import Encloser, Forms
 from .problem import Problem
 from .rank import RankTest
 from .relation import Relation, are_contractions, inverses, relation_of
@@ -90,14 +91,14 @@ class Examiner:
     """
 
     def __init__(self, problem: Problem, test: RankTest, engine: str | None) -> None:
-        import casadi as ca
-
         self.problem, self._test = problem, test
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)
         slopes = [ca.jacobian(problem.equations, problem.z)[:, k] for k in self._dependent]
         own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
-        self._encloser = Encloser(problem.z, ca.vertcat(problem.equations, own, test.entries), engine)
+        # A last entry that is not used, for a matrix that is constant.
+        entries = ca.vertcat(problem.equations, own, test.entries, problem.z[0])
+        self._encloser = Encloser(problem.z, entries, engine)
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
     @property
@@ -131,17 +132,16 @@ class Examiner:
                 self._widen(again, own.reach[~good], lower, upper)
                 keep = np.flatnonzero(good)
                 rows = rows[good]
-                forms = type(forms)(*(each[keep] for each in forms))
+                forms = Forms(*(each[keep] for each in forms))
                 own = Relation(*(each[keep] for each in own))
             if not rows.size:
                 continue
             for whole, part in zip(relation, own, strict=True):
                 whole[rows] = part
             found = self._test.examine(
-                forms.part(slice(k + k * k, None)), own, self._independent, self._dependent
+                forms.part(slice(k + k * k, -1)), own, self._independent, self._dependent
             )
             regular[rows], shares[rows], smallest[rows] = found.is_regular, found.shares, found.smallest
-        lower[~known][:, self._dependent] = np.nan
         for j in self._dependent:
             lower[~known, j] = upper[~known, j] = np.nan
         finite = np.isfinite(near).all(axis=1)
@@ -170,13 +170,9 @@ class Examiner:
         return np.asarray(np.where(shares.any(axis=1, keepdims=True), shares, half / size[I]))
 
     def _is_single(
-        self, forms: object, relation: Relation, lower: FloatArray, upper: FloatArray
+        self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray
     ) -> NDArray[np.bool_]:
         """Return whether each pose of a box surely has one closed point between the ends, and only one."""
-        from .enclosing import Forms
-
-        if not isinstance(forms, Forms):
-            raise TypeError("forms are expected")
         k = self.count
         stays = (relation.reach < 1).all(axis=1)
         c, a, r = forms.part(slice(k, k + k * k))
