@@ -12,6 +12,7 @@ from casadi import SX
 from ...models import Dimension, Model, Substitution, frozen_array
 from ..case.case import Case
 from ..case.limits.constraint import Reading
+from ..case.pose import Free
 from ..case.task import Sense
 from ..errors import UncoveredError
 from ..program.layout import Layout
@@ -27,6 +28,8 @@ from .verdict import Outcome, Regularity
 
 #: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
 _POSES, _WORST = 2048, 8
+#: Random poses at which an equation is tested, and its largest residual, of order 1, where it holds by itself.
+_TESTS, _IDENTITY = 32, 1e-11
 _SEED = 0
 
 
@@ -75,6 +78,31 @@ def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
         return found
     problem = build_problem(case, case.model, box)
     return _after_newton(found, problem, problem.locked)
+
+
+def without_identities(case: Case, model: Model, box: PoseBox) -> Model:
+    """Return a robot without the loop equations that hold at every pose of a box by themselves.
+
+    A Delta that is held without rotation is such a robot: the second rod of a limb closes with the first.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot; with unknowns all equations are kept.
+        box: the poses.
+    """
+    if model.unknowns or not model.closure:
+        return model
+    own = Substitution.identity(model)
+    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+    scaled = ca.vertcat(*[each.scaled for each in model.closure])
+    function = ca.Function("closure", own.all, [ca.densify(scaled)])
+    poses = [box.pose(y) for y in box.random(_TESTS, np.random.default_rng(_SEED))]
+    found = [function(np.array(values), 0, pose.rotation, pose.position).full().ravel() for pose in poses]
+    # A limb that does not reach a pose has no value there.
+    largest = np.nanmax(np.abs(found), axis=0, initial=0.0)
+    known = np.isfinite(found).sum(axis=0) >= _TESTS // 2
+    holds = known & (largest <= _IDENTITY)
+    return replace(model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity))
 
 
 def reach_claims(layout: Layout, closed: ClosedForm) -> list[Claim]:

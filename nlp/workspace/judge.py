@@ -10,7 +10,7 @@ from ..case.case import Case
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
-from .anyrobot import prove_ranks, reach_claims, touched
+from .anyrobot import prove_ranks, reach_claims, touched, without_identities
 from .claims import Claim, claims_of
 from .closedform import closed_form
 from .extremes import GAP, Extreme, prove_extreme
@@ -131,7 +131,7 @@ def judge_workspace(
         return True
 
     if closed.reaches and with_limits:
-        solved = posed_layout(replace(case, model=closed.model), workspace)
+        solved = posed_layout(replace(case, model=without_identities(case, closed.model, box)), workspace)
         if not proved(solved, reach_claims(solved, closed)):
             return replace(judged, extremes=tuple(extremes))
         if all(each.outcome is Outcome.PROVED for each in extremes):
