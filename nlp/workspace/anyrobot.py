@@ -12,9 +12,11 @@ from casadi import SX
 from ...models import Dimension, Model, Substitution, frozen_array
 from ..case.case import Case
 from ..case.limits.constraint import Reading
+from ..case.limits.limits import Limits
 from ..case.pose import Free
 from ..case.task import Sense
 from ..errors import UncoveredError
+from ..case.workspace import Workspace
 from ..program.layout import Layout
 from .claims import Claim
 from .closedform import ClosedForm
@@ -23,6 +25,7 @@ from .general.problem import Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
+from .posed import posed_layout
 from .search import RankProgress
 from .verdict import Outcome, Regularity
 
@@ -105,24 +108,29 @@ def without_identities(case: Case, model: Model, box: PoseBox) -> Model:
     return replace(model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity))
 
 
-def reach_claims(layout: Layout, closed: ClosedForm) -> list[Claim]:
-    """Return the claims that limbs reach every pose.
+def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, list[Claim]]:
+    """Return the claims that limbs reach every pose, and the case as symbols of the pose.
 
     Args:
-        layout: the case without unknowns in closed form, as symbols of the pose.
-        closed: their edges of reach, as expressions of the model's symbols.
+        case: with fixed dimensions.
+        closed: its robot without unknowns in closed form.
+        workspace: the poses.
     """
-    robot, own = layout.robots[0], Substitution.identity(closed.model)
+    # No condition is left on a pose: where a limb does not reach it, its loop and its signs have no values.
+    bare = replace(closed.model, closure=(), loops=(), distances=(), signs=())
+    layout = posed_layout(replace(case, model=bare, limits=Limits()), workspace)
+    robot, own = layout.robots[0], Substitution.identity(bare)
     unknowns = ca.vertcat(
         SX(0, 1), *[layout.table.variables_vector[k] for at_pose in layout.places.unknowns for k in at_pose]
     )
     given = Substitution(robot.parameters, unknowns, robot.rotation, robot.position)
     values = ca.Function("reach", own.all, [each.value for each in closed.reaches]).call(given.all)
     reading = Reading(Dimension.NUMBER)
-    return [
+    claims = [
         Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, "reach", 0.0)
         for each, value in zip(closed.reaches, values, strict=True)
     ]
+    return layout, claims
 
 
 def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix) -> Regularity:

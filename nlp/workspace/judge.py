@@ -131,12 +131,11 @@ def judge_workspace(
         return True
 
     if closed.reaches and with_limits:
-        solved = posed_layout(replace(case, model=without_identities(case, closed.model, box)), workspace)
-        if not proved(solved, reach_claims(solved, closed)):
+        if not proved(*reach_claims(case, closed, workspace)):
             return replace(judged, extremes=tuple(extremes))
         if all(each.outcome is Outcome.PROVED for each in extremes):
             # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
-            layout = solved
+            layout = posed_layout(replace(case, model=without_identities(case, closed.model, box)), workspace)
     claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
     if not proved(layout, claims):
         return replace(judged, extremes=tuple(extremes))
