@@ -11,6 +11,7 @@ from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
 from .anyrobot import prove_ranks, reach_claims, touched, without_identities
+from .askedvalues import SPECTRAL, spectral_extremes
 from .claims import Claim, claims_of
 from .closedform import closed_form
 from .extremes import GAP, Extreme, prove_extreme
@@ -113,8 +114,9 @@ def judge_workspace(
         regularity = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=rank_progress)
         regularity = touched(case, box, regularity)
     else:
-        options = {"engine": engine, "time_limit": time_limit, "progress": rank_progress}
-        regularity, constraints = prove_ranks(case, closed.model, box, **options)
+        regularity, constraints = prove_ranks(
+            case, closed.model, box, engine=engine, time_limit=time_limit, progress=rank_progress
+        )
     judged = Judgement(case, workspace, regularity, (), constraints)
     if until_fault and not judged.is_regular:
         return judged
@@ -136,7 +138,9 @@ def judge_workspace(
         if all(each.outcome is Outcome.PROVED for each in extremes):
             # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
             layout = posed_layout(replace(case, model=without_identities(case, closed.model, box)), workspace)
-    claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
+    asked = [name for name in quantities if name in SPECTRAL]
+    own_names = [name for name in quantities if name not in SPECTRAL]
+    claims = claims_of(layout, own_names, with_objective=with_objective) if with_limits else []
     if not proved(layout, claims):
         return replace(judged, extremes=tuple(extremes))
     if legs is not None and with_limits:
@@ -145,6 +149,10 @@ def judge_workspace(
             extremes.append(found)
             if until_fault and found.outcome is not Outcome.PROVED:
                 break
+    if with_limits:
+        extremes += spectral_extremes(
+            case, closed.model, box, asked, gap=gap, time_limit=time_limit, interrupted=is_requested
+        )
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
     if legs is not None and with_limits and with_objective and eps > 0:
         shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)

@@ -27,6 +27,10 @@ _ATTEMPTS = 3
 _LEAST = 1e-10
 #: Largest one: beyond it, the box of the pose is divided first.
 _MOST = 1.0
+#: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
+_ROUNDING = 1e-14
+#: Contractions of the closed point at the common face of two boxes: each one squares its width.
+_CONTRACTIONS = 3
 
 
 class Cells(NamedTuple):
@@ -36,14 +40,12 @@ class Cells(NamedTuple):
         lower, upper: (B, n) ends of all coordinates; those of dependent ones are NaN until they are known.
         near: (B, n) a closed point in or near the box.
         is_known: (B,) whether each pose of the box surely has one, and only one, closed point between the ends.
-        root: (B,) index of the box in which that was proved; -1 before.
     """
 
     lower: FloatArray
     upper: FloatArray
     near: FloatArray
     is_known: NDArray[np.bool_]
-    root: NDArray[np.int64]
 
     def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Cells:
         """Return some of the boxes."""
@@ -111,7 +113,7 @@ class Examiner:
         f, k, n = len(self._independent), self.count, len(self.problem.start)
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
-        known, near, root = cells.is_known.copy(), cells.near.copy(), cells.root
+        known, near = cells.is_known.copy(), cells.near.copy()
         relation = Relation(np.zeros((B, k)), np.zeros((B, k, f)), np.full((B, k), np.inf))
         shares, smallest, regular = np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=bool)
         if k and not known.all():
@@ -146,7 +148,7 @@ class Examiner:
             lower[~known, j] = upper[~known, j] = np.nan
         finite = np.isfinite(near).all(axis=1)
         near = np.where(finite[:, None], near, cells.near)
-        return Examined(Cells(lower, upper, near, known, root), relation, regular, shares, smallest)
+        return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
 
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
         """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
@@ -195,6 +197,26 @@ class Examiner:
         width = np.where(width <= _MOST * size[D], width, np.nan)
         lower[np.ix_(rows, D)], upper[np.ix_(rows, D)] = middle - width, middle + width
 
+    def tied(self, one: Cells, other: Cells) -> NDArray[np.bool_]:
+        """Return whether neighbours have the same closed point somewhere on their common face.
+
+        Args:
+            one, other: (B,) boxes each, with known dependent coordinates, whose independent ones overlap in pairs.
+        """
+        I, D = self._independent, self._dependent
+        lower, upper = one.lower.copy(), one.upper.copy()
+        place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
+        lower[:, I] = upper[:, I] = place[:, I]
+        for _ in range(_CONTRACTIONS):
+            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, self.count)), I, D)
+            middle, half = 0.5 * (lower + upper)[:, D], 0.5 * (upper - lower)[:, D] * (1 + _ROUNDING)
+            slack = _ROUNDING * np.abs(middle)
+            with np.errstate(all="ignore"):
+                low = middle + half * np.maximum(relation.off - relation.rho, -1.0) - slack
+                high = middle + half * np.minimum(relation.off + relation.rho, 1.0) + slack
+            lower[:, D], upper[:, D] = np.minimum(low, high), np.maximum(low, high)
+        return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
+
     def halves(self, found: Examined, split: NDArray[np.int64]) -> Cells:
         """Return the halves of boxes along independent coordinates, first the lower ones.
 
@@ -217,10 +239,10 @@ class Examiner:
                 centre = off - 0.5 * side * own
                 for place, j in enumerate(self._dependent):
                     mid = 0.5 * cells.lower[:, j] + 0.5 * cells.upper[:, j]
-                    half = 0.5 * (cells.upper[:, j] - cells.lower[:, j]) * (1 + 1e-14)
-                    low = mid + half * np.maximum(centre[:, place] - reach[:, place], -1.0) - 1e-15 * np.abs(mid)
-                    high = mid + half * np.minimum(centre[:, place] + reach[:, place], 1.0) + 1e-15 * np.abs(mid)
+                    half = 0.5 * (cells.upper[:, j] - cells.lower[:, j]) * (1 + _ROUNDING)
+                    low = mid + half * np.maximum(centre[:, place] - reach[:, place], -1.0) - _ROUNDING * np.abs(mid)
+                    high = mid + half * np.minimum(centre[:, place] + reach[:, place], 1.0) + _ROUNDING * np.abs(mid)
                     lower[:, j] = np.where(cells.is_known, np.minimum(low, high), np.nan)
                     upper[:, j] = np.where(cells.is_known, np.maximum(low, high), np.nan)
-            parts.append(Cells(lower, upper, cells.near, cells.is_known, cells.root))
+            parts.append(Cells(lower, upper, cells.near, cells.is_known))
         return joined(parts)

@@ -12,6 +12,7 @@ from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, is_requested, reached
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
+from .connected import is_connected
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
@@ -83,10 +84,13 @@ class _Search:
         lower[0, dependent] = upper[0, dependent] = np.nan
         self._whole = (upper - lower)[0, self._independent]
         is_known = np.full(1, not dependent)
-        self._stack = [Cells(lower, upper, problem.start[None].copy(), is_known, np.full(1, -1))]
+        self._stack = [Cells(lower, upper, problem.start[None].copy(), is_known)]
         self._small: list[Cells] = []
+        # The boxes in which dependent coordinates became known.
+        self._roots: list[Cells] = []
         self._boxes, self._attempts, self._last = 0, 0, _SMALL
         self._singular: FloatArray | None = None
+        self._is_one = True
 
     @property
     def _open(self) -> int:
@@ -116,10 +120,16 @@ class _Search:
                 continue
             self._boxes += len(cells.lower)
             found = self._examiner.examine(cells)
+            new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
+            if new.size:
+                self._roots.append(found.cells.some(new))
             if self._is_refuted(found):
                 return ""
             self._branch(found)
-        return "the boxes that are left are too small to be divided" if self._small else ""
+        if self._small:
+            return "the boxes that are left are too small to be divided"
+        self._is_one = not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
+        return "" if self._is_one else "the assemblies in two neighbouring boxes are not proved to be the same"
 
     def _in_workspace(self, cells: Cells) -> Cells:
         """Return the boxes that hold poses of the workspace, contracted to them."""
@@ -203,6 +213,8 @@ class _Search:
             widest = int(np.argmax(widths.max(axis=1, initial=0.0)))
             z = np.where(np.isfinite(cells.centre[widest]), cells.centre[widest], cells.near[widest])
             y = problem.pose_of(z)
+        elif not self._is_one:
+            outcome, y = Outcome.OPEN, problem.pose_of(problem.start)
         return Regularity(
             outcome=outcome,
             box=problem.box,
