@@ -118,7 +118,7 @@ class WorkspaceResult(JsonObject):
         parameters: dimensions by name; three numbers for a point or direction.
         proved: whether J is regular at every pose, every limit holds, and every number is bounded.
         regular: whether J has full rank at every pose.
-        constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without any.
+        constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
         extremes: smallest and largest values.
         scale: the largest box; absent where it was not asked for.
         versions: of the programs.

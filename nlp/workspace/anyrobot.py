@@ -15,8 +15,8 @@ from ..case.limits.constraint import Reading
 from ..case.limits.limits import Limits
 from ..case.pose import Free
 from ..case.task import Sense
-from ..errors import UncoveredError
 from ..case.workspace import Workspace
+from ..errors import UncoveredError
 from ..program.layout import Layout
 from .claims import Claim
 from .closedform import ClosedForm
@@ -105,7 +105,9 @@ def without_identities(case: Case, model: Model, box: PoseBox) -> Model:
     largest = np.nanmax(np.abs(found), axis=0, initial=0.0)
     known = np.isfinite(found).sum(axis=0) >= _TESTS // 2
     holds = known & (largest <= _IDENTITY)
-    return replace(model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity))
+    return replace(
+        model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity)
+    )
 
 
 def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, list[Claim]]:
@@ -134,7 +136,7 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[
 
 
 def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix) -> Regularity:
-    """Return a verdict that is refuted where it was open, and Newton's method finds a singular pose from random ones."""
+    """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
     newton, free = SingularPose(problem, matrix), list(problem.free)

@@ -57,14 +57,10 @@ def spectral_extremes(
             yield Extreme(name, sense, Dimension.NUMBER, "", None, *nothing)
             continue
         middle = abs(float(oracle.values((0.5 * (box.lower + box.upper))[None])[0]))
-        found = prove_minimum(
-            oracle, box, gap=gap * (middle or 1.0), time_limit=time_limit, interrupted=interrupted
-        )
+        found = prove_minimum(oracle, box, gap=gap * (middle or 1.0), time_limit=time_limit, interrupted=interrupted)
         outcome = Outcome.OPEN if found.reason else Outcome.PROVED
         reached = (sign * found.bound, sign * found.value, box.pose(found.y), outcome)
-        yield Extreme(
-            name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, found.reason
-        )
+        yield Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, found.reason)
 
 
 def _oracle(case: Case, model: Model, box: PoseBox, *, is_condition: bool) -> Oracle:

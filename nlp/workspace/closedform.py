@@ -252,9 +252,7 @@ def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure,
     actuators = tuple(replace(each, screw=next(following)) for each in model.actuators)
     signs = tuple(replace(each, value=next(following)) for each in model.signs)
     quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
-    members = tuple(
-        replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
-    )
+    members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)
     screws = tuple(replace(each, all=next(following)) for each in model.joint_screws)
     return replace(
         model,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from ..case.case import Case
@@ -13,7 +13,7 @@ from ..program.layout import Layout
 from .anyrobot import prove_ranks, reach_claims, touched, without_identities
 from .askedvalues import SPECTRAL, spectral_extremes
 from .claims import Claim, claims_of
-from .closedform import closed_form
+from .closedform import ClosedForm, closed_form
 from .extremes import GAP, Extreme, prove_extreme
 from .machine import legs_of, workspace_of_case
 from .ownsearches import own_searches, pose_errors, strokes
@@ -63,7 +63,7 @@ class Judgement:
     @property
     def is_refuted(self) -> bool:
         """Whether a pose is known that is singular or outside of a limit."""
-        return Outcome.REFUTED in [each.outcome for each in (*self.ranks, *self.extremes)]
+        return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
 def judge_workspace(
@@ -107,9 +107,7 @@ def judge_workspace(
     own = workspace_of_case(case)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
-    extremes: list[Extreme] = []
-    constraints = None
-    closed, layout = closed_form(case.model), posed_layout(case, workspace)
+    closed, constraints = closed_form(case.model), None
     if legs is not None:
         regularity = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=rank_progress)
         regularity = touched(case, box, regularity)
@@ -118,43 +116,83 @@ def judge_workspace(
             case, closed.model, box, engine=engine, time_limit=time_limit, progress=rank_progress
         )
     judged = Judgement(case, workspace, regularity, (), constraints)
-    if until_fault and not judged.is_regular:
+    if not with_limits or (until_fault and not judged.is_regular):
         return judged
-
-    def proved(at: Layout, claims: Sequence[Claim]) -> bool:
-        """Add the extremes of claims; return whether the work goes on."""
-        for done, claim in enumerate(claims):
-            if progress is not None:
-                progress(claim.name, done, len(claims))
-            found = prove_extreme(at, claim, gap=gap, time_limit=time_limit, jobs=jobs, interrupted=is_requested)
-            extremes.append(found)
-            if until_fault and found.outcome is not Outcome.PROVED:
-                return False
-        return True
-
-    if closed.reaches and with_limits:
-        if not proved(*reach_claims(case, closed, workspace)):
-            return replace(judged, extremes=tuple(extremes))
-        if all(each.outcome is Outcome.PROVED for each in extremes):
-            # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
-            layout = posed_layout(replace(case, model=without_identities(case, closed.model, box)), workspace)
-    asked = [name for name in quantities if name in SPECTRAL]
-    own_names = [name for name in quantities if name not in SPECTRAL]
-    claims = claims_of(layout, own_names, with_objective=with_objective) if with_limits else []
-    if not proved(layout, claims):
-        return replace(judged, extremes=tuple(extremes))
-    if legs is not None and with_limits:
-        extremes += strokes(case, extremes)
-        for found in own_searches(case, legs, box, gap=gap, time_limit=time_limit, interrupted=is_requested):
-            extremes.append(found)
-            if until_fault and found.outcome is not Outcome.PROVED:
-                break
-    if with_limits:
-        extremes += spectral_extremes(
-            case, closed.model, box, asked, gap=gap, time_limit=time_limit, interrupted=is_requested
-        )
+    numbers = _Numbers(case, workspace, closed, gap, time_limit, jobs, progress)
+    found: list[Extreme] = []
     eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
-    if legs is not None and with_limits and with_objective and eps > 0:
-        shortest = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
-        extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested)
-    return replace(judged, extremes=tuple(extremes))
+    for extreme in numbers.extremes(quantities, eps, with_objective=with_objective):
+        found.append(extreme)
+        if until_fault and extreme.outcome is not Outcome.PROVED:
+            break
+    return replace(judged, extremes=tuple(found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """The numbers of a machine over its workspace.
+
+    Attributes:
+        case: with fixed dimensions.
+        workspace: the poses.
+        closed: its robot without unknowns in closed form.
+        gap, time_limit, jobs, progress: as in :func:`judge_workspace`.
+    """
+
+    case: Case
+    workspace: Workspace
+    closed: ClosedForm
+    gap: float
+    time_limit: float | None
+    jobs: int | None
+    progress: Callable[[str, int, int], None] | None
+
+    def extremes(self, quantities: Sequence[str], eps: float, *, with_objective: bool) -> Iterator[Extreme]:
+        """Yield the extremes of the reach of limbs, limits, lengths of legs, measures and tasks.
+
+        Args:
+            quantities: names of measures.
+            eps: largest error of a leg's length, those of its joint centres included, length; 0 without errors.
+            with_objective: whether F of each task, and errors of the pose, are bounded.
+
+        Raises:
+            InputError: the robot has no measure of a name.
+        """
+        case, box, legs = self.case, pose_box(self.workspace), legs_of(self.case)
+        names = [name for name in quantities if name not in SPECTRAL]
+        asked = [name for name in quantities if name in SPECTRAL]
+        layout = posed_layout(case, self.workspace)
+        claims = claims_of(layout, names, with_objective=with_objective)
+        if self.closed.reaches:
+            reached = []
+            for each in self._proved(*reach_claims(case, self.closed, self.workspace)):
+                reached.append(each.outcome)
+                yield each
+            if all(outcome is Outcome.PROVED for outcome in reached):
+                # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+                model = without_identities(case, self.closed.model, box)
+                layout = posed_layout(replace(case, model=model), self.workspace)
+                claims = claims_of(layout, names, with_objective=with_objective)
+        found = []
+        for each in self._proved(layout, claims):
+            found.append(each)
+            yield each
+        if legs is not None:
+            yield from strokes(case, found)
+            yield from own_searches(case, legs, box, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+        yield from spectral_extremes(
+            case, self.closed.model, box, asked, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested
+        )
+        if legs is not None and with_objective and eps > 0:
+            lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
+            shortest = min(lengths, default=-math.inf)
+            yield from pose_errors(legs, box, eps, shortest, time_limit=self.time_limit, interrupted=is_requested)
+
+    def _proved(self, layout: Layout, claims: Sequence[Claim]) -> Iterator[Extreme]:
+        """Yield the extremes of claims."""
+        for done, claim in enumerate(claims):
+            if self.progress is not None:
+                self.progress(claim.name, done, len(claims))
+            yield prove_extreme(
+                layout, claim, gap=self.gap, time_limit=self.time_limit, jobs=self.jobs, interrupted=is_requested
+            )

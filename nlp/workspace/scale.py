@@ -85,7 +85,9 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
 
 def judged_holds(judged: Judgement) -> bool:
     """Return whether J is regular and every limit holds; numbers without a limit do not count."""
-    return judged.is_regular and all(each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None)
+    return judged.is_regular and all(
+        each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None
+    )
 
 
 def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:

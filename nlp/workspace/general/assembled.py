@@ -76,7 +76,7 @@ class Loops:
         with np.errstate(all="ignore"):
             for _ in range(_STEPS):
                 residual, slopes = self.values(z), self.slopes(z)[:, :, moving] * self.size[moving]
-                known = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
+                known = np.asarray(np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1))
                 known &= np.abs(np.linalg.det(np.where(known[:, None, None], slopes, np.eye(len(moving))))) > 0
                 step = np.linalg.solve(
                     np.where(known[:, None, None], slopes, np.eye(len(moving))),

@@ -18,8 +18,8 @@ from .relation import Relation, are_contractions, inverses, relation_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Factors by which the first guess of the widths of dependent coordinates, from their slopes at the middle of a box, and
-#: later ones, from the relation found with them, are made wider.
+#: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
+#: and later ones, from the relation that was found with the guess before.
 _WIDER, _AGAIN = 1.1, 1.05
 #: Attempts to find widths of dependent coordinates in which they surely stay.
 _ATTEMPTS = 3
@@ -49,7 +49,7 @@ class Cells(NamedTuple):
 
     def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Cells:
         """Return some of the boxes."""
-        return Cells(*(each[which] for each in self))
+        return Cells(self.lower[which], self.upper[which], self.near[which], self.is_known[which])
 
     @property
     def centre(self) -> FloatArray:
@@ -59,7 +59,8 @@ class Cells(NamedTuple):
 
 def joined(parts: Sequence[Cells]) -> Cells:
     """Return boxes one after the other."""
-    return Cells(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+    lower, upper, near, is_known = zip(*parts, strict=True)
+    return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
 
 
 class Examined(NamedTuple):
@@ -110,7 +111,7 @@ class Examiner:
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""
-        f, k, n = len(self._independent), self.count, len(self.problem.start)
+        f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
         known, near = cells.is_known.copy(), cells.near.copy()
@@ -140,40 +141,36 @@ class Examiner:
                 continue
             for whole, part in zip(relation, own, strict=True):
                 whole[rows] = part
-            found = self._test.examine(
-                forms.part(slice(k + k * k, -1)), own, self._independent, self._dependent
-            )
+            found = self._test.examine(forms.part(slice(k + k * k, -1)), own, self._independent, self._dependent)
             regular[rows], shares[rows], smallest[rows] = found.is_regular, found.shares, found.smallest
         for j in self._dependent:
             lower[~known, j] = upper[~known, j] = np.nan
-        finite = np.isfinite(near).all(axis=1)
+        finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
         return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
 
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
         """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
-        I, D, size = self._independent, self._dependent, self.problem.size
+        own, D, size = self._independent, self._dependent, self.problem.size
         z = near[rows].copy()
-        half = 0.5 * (upper[rows] - lower[rows])[:, I]
+        half = 0.5 * (upper[rows] - lower[rows])[:, own]
         with np.errstate(all="ignore"):
             before = self.loops.slopes(z.T) * size
-            step = (0.5 * (lower[rows] + upper[rows])[:, I] - z[:, I]) / size[I]
-            z[:, I] = 0.5 * (lower[rows] + upper[rows])[:, I]
-            z[:, D] -= size[D] * (inverses(before[:, :, D]) @ before[:, :, I] @ step[:, :, None])[:, :, 0]
+            step = (0.5 * (lower[rows] + upper[rows])[:, own] - z[:, own]) / size[own]
+            z[:, own] = 0.5 * (lower[rows] + upper[rows])[:, own]
+            z[:, D] -= size[D] * (inverses(before[:, :, D]) @ before[:, :, own] @ step[:, :, None])[:, :, 0]
             z = self.loops.all_closed(z.T, D).T
             slopes = self.loops.slopes(z.T) * size
-            T = inverses(slopes[:, :, D]) @ slopes[:, :, I]
-            reach = np.abs(T) * (half / size[I])[:, None, :]
+            T = inverses(slopes[:, :, D]) @ slopes[:, :, own]
+            reach = np.abs(T) * (half / size[own])[:, None, :]
         width = np.maximum(_WIDER * reach.sum(axis=2), _LEAST)
         width = np.where(width <= _MOST, width, np.nan) * size[D]
         near[rows] = z
-        lower[np.ix_(rows, D)], upper[np.ix_(rows, D)] = z[:, D] - width, z[:, D] + width
+        lower[rows[:, None], D], upper[rows[:, None], D] = z[:, D] - width, z[:, D] + width
         shares = np.nan_to_num(reach.sum(axis=1))
-        return np.asarray(np.where(shares.any(axis=1, keepdims=True), shares, half / size[I]))
+        return np.asarray(np.where(shares.any(axis=1, keepdims=True), shares, half / size[own]))
 
-    def _is_single(
-        self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray
-    ) -> NDArray[np.bool_]:
+    def _is_single(self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
         """Return whether each pose of a box surely has one closed point between the ends, and only one."""
         k = self.count
         stays = (relation.reach < 1).all(axis=1)
@@ -195,20 +192,21 @@ class Examiner:
         half = 0.5 * (upper[rows] - lower[rows])[:, D]
         width = np.maximum(half * np.maximum(_AGAIN * reach, 0.5), _LEAST * size[D])
         width = np.where(width <= _MOST * size[D], width, np.nan)
-        lower[np.ix_(rows, D)], upper[np.ix_(rows, D)] = middle - width, middle + width
+        lower[rows[:, None], D], upper[rows[:, None], D] = middle - width, middle + width
 
     def tied(self, one: Cells, other: Cells) -> NDArray[np.bool_]:
         """Return whether neighbours have the same closed point somewhere on their common face.
 
         Args:
-            one, other: (B,) boxes each, with known dependent coordinates, whose independent ones overlap in pairs.
+            one: (B,) boxes with known dependent coordinates.
+            other: as many, whose independent coordinates overlap those of the first in pairs.
         """
-        I, D = self._independent, self._dependent
+        own, D = self._independent, self._dependent
         lower, upper = one.lower.copy(), one.upper.copy()
         place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
-        lower[:, I] = upper[:, I] = place[:, I]
+        lower[:, own] = upper[:, own] = place[:, own]
         for _ in range(_CONTRACTIONS):
-            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, self.count)), I, D)
+            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, self.count)), own, D)
             middle, half = 0.5 * (lower + upper)[:, D], 0.5 * (upper - lower)[:, D] * (1 + _ROUNDING)
             slack = _ROUNDING * np.abs(middle)
             with np.errstate(all="ignore"):

@@ -14,12 +14,12 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray, Model, Substitution, frozen_array, jacobian
+from ....models.instance import sizes_at
 from ....models.rows import independent_rows
 from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import TurnKind
 from ...errors import UncoveredError
-from ....models.instance import sizes_at
 from ..posebox import PoseBox
 from .assembled import Loops, closed_from_home
 from .matrices import Limbs, RankMatrix, free_matrix, locked_matrix
@@ -135,7 +135,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     start = closed_from_home(loops, middle, count)
     if start is None:
         raise UncoveredError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
-    needed = _needed(loops, start, count, box, posed)
+    needed = _needed(loops, start, count, posed)
     equations = posed.closure[needed] if needed else SX(0, 1)
     dependent = _dependent(Loops(posed.z, equations, posed.every, posed.signs, posed.size), start, count)
     independent = tuple(k for k in range(posed.z.numel()) if k not in dependent)
@@ -203,7 +203,7 @@ def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
     )
 
 
-def _needed(loops: Loops, start: FloatArray, count: int, box: PoseBox, posed: _Posed) -> list[int]:
+def _needed(loops: Loops, start: FloatArray, count: int, posed: _Posed) -> list[int]:
     """Return the indices of the equations that do not follow from others in the workspace."""
     if not loops.count:
         return []
@@ -287,4 +287,3 @@ def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMat
     if model.generic is not None:
         nullity = 6 - model.generic.constraints
     return RankMatrix(matrix, nullity) if 0 < nullity < 6 else None
-

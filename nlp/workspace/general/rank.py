@@ -79,7 +79,8 @@ class RankTest:
         Args:
             forms: of the entries.
             relation: of the dependent coordinates.
-            independent, dependent: indices of the coordinates.
+            independent: indices of the coordinates that are free.
+            dependent: indices of the others.
         """
         c, a, r = forms
         own, others = a[:, :, dependent], a[:, :, independent]
@@ -98,7 +99,8 @@ class RankTest:
         R[:, at[0], at[1]] = rest * scale
         M = np.zeros((count, f, *self._constant.shape))
         M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
-        known = np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)) & np.isfinite(M).all(axis=(1, 2, 3))
+        known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
+        known &= np.isfinite(M).all(axis=(1, 2, 3))
         M0[~known], M[~known] = 0.0, 0.0
         return self._judged(M0, M, np.where(known[:, None, None], R, np.inf))
 
@@ -113,7 +115,9 @@ class RankTest:
             M = np.concatenate([M, np.zeros((*M.shape[:2], *extra.shape[1:]))], axis=2)
             R = np.concatenate([R, np.zeros_like(extra)], axis=1)
         with np.errstate(all="ignore"):
-            smallest = np.nan_to_num(values[:, rank - 1] / values[:, 0]) if values.shape[1] >= rank else np.zeros(len(M0))
+            smallest = (
+                np.nan_to_num(values[:, rank - 1] / values[:, 0]) if values.shape[1] >= rank else np.zeros(len(M0))
+            )
             C = np.linalg.pinv(M0, rcond=1e-14)
             size = np.abs(C)
             linear = np.abs(C[:, None] @ M)

@@ -69,7 +69,7 @@ def relation_of(equations: Forms, independent: list[int], dependent: list[int]) 
 
 def inverses(matrices: FloatArray) -> FloatArray:
     """Return the inverses of matrices (B, k, k); NaN for singular ones."""
-    good = np.isfinite(matrices).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
     found: FloatArray = np.full_like(matrices, np.nan)
     found[good] = np.linalg.inv(matrices[good])

@@ -102,20 +102,13 @@ class _Search:
         reached(Milestone.BOUND)
         while self._stack:
             seconds = time.perf_counter() - self._began
-            if is_requested():
-                return "interrupted"
-            if time_limit is not None and seconds >= time_limit:
-                return f"stopped after {seconds:.3g} s"
-            if most_boxes is not None and self._boxes >= most_boxes:
-                return f"stopped after {self._boxes:,} boxes"
+            reason = self._reason_to_stop(seconds, time_limit, most_boxes)
+            if reason:
+                return reason
             if progress is not None and seconds - reported >= _REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            cells = self._stack.pop()
-            if len(cells.lower) > _BLOCK:
-                self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
-                cells = cells.some(np.arange(_BLOCK))
-            cells = self._in_workspace(cells)
+            cells = self._in_workspace(self._next())
             if not len(cells.lower):
                 continue
             self._boxes += len(cells.lower)
@@ -130,6 +123,24 @@ class _Search:
             return "the boxes that are left are too small to be divided"
         self._is_one = not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
         return "" if self._is_one else "the assemblies in two neighbouring boxes are not proved to be the same"
+
+    def _reason_to_stop(self, seconds: float, time_limit: float | None, most_boxes: int | None) -> str:
+        """Return the reason for stopping now; empty for none."""
+        if is_requested():
+            return "interrupted"
+        if time_limit is not None and seconds >= time_limit:
+            return f"stopped after {seconds:.3g} s"
+        if most_boxes is not None and self._boxes >= most_boxes:
+            return f"stopped after {self._boxes:,} boxes"
+        return ""
+
+    def _next(self) -> Cells:
+        """Return the next boxes, and take them off the stack."""
+        cells = self._stack.pop()
+        if len(cells.lower) > _BLOCK:
+            self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
+            cells = cells.some(np.arange(_BLOCK))
+        return cells
 
     def _in_workspace(self, cells: Cells) -> Cells:
         """Return the boxes that hold poses of the workspace, contracted to them."""

@@ -64,7 +64,7 @@ class Spectrum:
         J0 = c.reshape(count, 6, m).transpose(0, 2, 1)
         R = r.reshape(count, 6, m).transpose(0, 2, 1)
         J = a.transpose(0, 2, 1).reshape(count, f, 6, m).transpose(0, 1, 3, 2)
-        known = np.isfinite(J0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(J0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
         J0 = np.where(known[:, None, None], J0, np.eye(m, 6))
         with np.errstate(all="ignore"):
             C = np.linalg.pinv(J0, rcond=1e-14)
