@@ -28,6 +28,7 @@ from screwsynth.nlp.workspace.general.problem import Problem, build_problem
 from screwsynth.nlp.workspace.general.search import BY_NEWTON, prove_rank
 from screwsynth.nlp.workspace.general.spectrum import Spectrum
 from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.machine import legs_of
 from screwsynth.nlp.workspace.posebox import pose_box
 from screwsynth.nlp.workspace.verdict import Outcome
 
@@ -73,14 +74,14 @@ def wrong_boxes(problem: Problem, matrix: RankMatrix, width: float, seed: int) -
     """
     rng = np.random.default_rng(seed)
     examiner = Examiner(problem, rank.RankTest(matrix, problem.z, problem.start), None)
-    found = examiner.examine(random_cells(problem, 96, width, rng))
+    found = examiner.examine(random_cells(problem, 64, width, rng))
     own, dependent = list(problem.independent), list(problem.dependent)
     function = ca.Function("M", [problem.z], [ca.densify(matrix.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
         low, high = found.cells.lower[k], found.cells.upper[k]
-        z = np.broadcast_to(0.5 * low + 0.5 * high, (24, len(low))).copy()
-        corners = rng.choice([0.0, 1.0], (24, len(own)))
+        z = np.broadcast_to(0.5 * low + 0.5 * high, (12, len(low))).copy()
+        corners = rng.choice([0.0, 1.0], (12, len(own)))
         z[1:, own] = (low + corners * (high - low))[1:, own] if len(own) == len(low) else low[own] + corners[1:] * (
             high - low
         )[own]
@@ -101,12 +102,14 @@ def matrices(problem: Problem) -> Iterator[RankMatrix]:
         yield problem.unactuated
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    "name", [each if each in ROBOTS[:4] else pytest.param(each, marks=pytest.mark.slow) for each in ROBOTS]
+)
 def test_no_box_is_regular_in_which_a_closed_point_is_not(name: str) -> None:
     problem = problem_of(name, 0.1, 20)
     for matrix in matrices(problem):
         counted = [wrong_boxes(problem, matrix, width, seed) for seed, width in enumerate((0.05, 0.4))]
-        assert sum(regular for regular, _ in counted) > 20
+        assert sum(regular for regular, _ in counted) > 10
         assert not any(wrong for _, wrong in counted)
 
 
@@ -114,12 +117,28 @@ def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) 
     judged = rank.RankTest._judged
 
     def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray) -> rank.Tested:
-        return judged(self, M0, 0 * M, 0 * R)
+        return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R))
 
-    problem = problem_of("6-rus", 0.5, 80)
+    problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
     monkeypatch.setattr(rank.RankTest, "_judged", without)
     assert wrong_boxes(problem, problem.locked, 1.0, 1)[1]
+
+
+@pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
+def test_the_kernel_has_the_forms_of_numpy_and_is_undefined_where_they_are() -> None:
+    x = ca.SX.sym("x", 3)
+    values = [f(x[0] * x[1] + 0.3 * x[2]) for f in (ca.sqrt, ca.log, ca.atan, ca.sin, ca.fabs, lambda v: 1 / v)]
+    expressions = ca.vertcat(*values, ca.sqrt(x[0] - x[1]) * x[2])
+    rng = np.random.default_rng(4)
+    centre, half = rng.uniform(-2, 2, (3, 400)), 10.0 ** rng.uniform(-3, 0.3, (3, 400))
+    c, numpy = (Encloser(x, expressions, engine)(centre - half, centre + half) for engine in ("c", "numpy"))
+    assert (np.isfinite(c.r) == np.isfinite(numpy.r)).all()
+    known = np.isfinite(c.r)
+    assert 0.1 < known.mean() < 0.9
+    np.testing.assert_allclose(c.c[known], numpy.c[known], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(c.r[known], numpy.r[known], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(c.a[known], numpy.a[known], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("engine", ["numpy", *([] if kernel() is None else ["c"])])
@@ -162,7 +181,7 @@ def test_unknowns_in_closed_form_close_their_loops_where_the_limb_reaches(name: 
     equation = ca.Function("g", own.all, [ca.vertcat(*first), signs])
     rng, seen = np.random.default_rng(1), set()
     for _ in range(40):
-        place = np.array(model.home) + rng.uniform(-0.9, 0.9, 3)
+        place = np.array(model.home) + rng.uniform(-1.5, 1.5, 3) * max(0.1, *map(abs, model.home))
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         turn = turn * np.linalg.det(turn) if name == "spherical-3-rrr" else np.eye(3)
         q, reach = (each.full().ravel() for each in solved(typical, [], turn, place))
@@ -183,7 +202,7 @@ def test_unknowns_in_closed_form_close_their_loops_where_the_limb_reaches(name: 
     assert True in seen
 
 
-@pytest.mark.parametrize("name", ["6-rus", "3-rps", "delta", "4-upu"])
+@pytest.mark.parametrize("name", ["6-pus", "3-rps", "planar-3-rrr"])
 def test_a_small_envelope_is_proved_by_both_engines(name: str) -> None:
     problem = problem_of(name, 0.02, 4)
     boxes = set()
@@ -231,7 +250,13 @@ def test_a_determinant_that_touches_zero_is_refuted_with_the_pose() -> None:
     assert found.outcome is Outcome.REFUTED
     assert (found.sides, found.reason) == (None, BY_NEWTON)
     assert found.y is not None
-    assert abs(found.y[1]) < 1e-3
+    pose = found.box.pose(found.y)
+    legs = legs_of(case)
+    assert legs is not None
+    arm = legs.platform @ pose.rotation.T
+    span = pose.position + arm - legs.base
+    values = np.linalg.svd(np.hstack([span, np.cross(arm, span) / 11.5]), compute_uv=False)
+    assert values[-1] <= 1e-10 * values[0]
     assert judged.is_refuted
 
 
