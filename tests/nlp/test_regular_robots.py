@@ -82,9 +82,11 @@ def wrong_boxes(problem: Problem, matrix: RankMatrix, width: float, seed: int) -
         low, high = found.cells.lower[k], found.cells.upper[k]
         z = np.broadcast_to(0.5 * low + 0.5 * high, (12, len(low))).copy()
         corners = rng.choice([0.0, 1.0], (12, len(own)))
-        z[1:, own] = (low + corners * (high - low))[1:, own] if len(own) == len(low) else low[own] + corners[1:] * (
-            high - low
-        )[own]
+        z[1:, own] = (
+            (low + corners * (high - low))[1:, own]
+            if len(own) == len(low)
+            else low[own] + corners[1:] * (high - low)[own]
+        )
         if dependent:
             z = examiner.loops.all_closed(z.T, dependent).T
             inside = (z[:, dependent] >= low[dependent]) & (z[:, dependent] <= high[dependent])
@@ -173,10 +175,14 @@ def test_unknowns_in_closed_form_close_their_loops_where_the_limb_reaches(name: 
     assert not closed.model.unknowns
     typical = [value for item in model.parameters for value in item.typical]
     own = Substitution.identity(model)
-    first = [[e for e in model.closure if ca.depends_on(e.expression, q)][0].scaled for q in ca.vertsplit(own.unknowns)]
+    first = [
+        next(e for e in model.closure if ca.depends_on(e.expression, q)).scaled for q in ca.vertsplit(own.unknowns)
+    ]
     values = [each.values for each in closed.model.quantities if each.name == "actuator_angle"]
     q = ca.vertcat(*values) if values else closed.model.quantities[0].values
-    solved = ca.Function("q", Substitution.identity(closed.model).all, [q, ca.vertcat(*[e.value for e in closed.reaches])])
+    solved = ca.Function(
+        "q", Substitution.identity(closed.model).all, [q, ca.vertcat(*[e.value for e in closed.reaches])]
+    )
     signs = ca.vertcat(ca.SX(0, 1), *[each.value for each in model.signs if each.is_mode])
     equation = ca.Function("g", own.all, [ca.vertcat(*first), signs])
     rng, seen = np.random.default_rng(1), set()
