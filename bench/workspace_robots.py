@@ -14,9 +14,8 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.workspace.closedform import closed_form
-from screwsynth.nlp.workspace.general.problem import build_problem
+from screwsynth.nlp.workspace.general.problem import NotJudgedError, build_problem
 from screwsynth.nlp.workspace.general.search import prove_rank
 from screwsynth.nlp.workspace.posebox import pose_box
 
@@ -34,7 +33,7 @@ def measure(name: str) -> str:
     case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])])
     try:
         problem = build_problem(case, closed_form(model).model, box)
-    except UncoveredError as error:
+    except NotJudgedError as error:
         return f"| `{name}` | | open: {error} | | | |"
     cells = []
     for matrix in (problem.locked, problem.unactuated):

@@ -102,12 +102,13 @@ def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of:
     """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
     share = f"{100 * regular.share:.3g} % of the box"
     found = f", {regular.reason}" if regular.reason and regular.between is None else ""
+    boxes = "box is" if regular.open == 1 else "boxes are"
     words = {
         Outcome.PROVED: ": the constraint wrenches keep their rank at every pose"
         if of
         else ": J has full rank at every pose",
         Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at a pose{found}",
-        Outcome.OPEN: f": {regular.open:,} boxes are left, {share} ({regular.reason or ''})",
+        Outcome.OPEN: f": {regular.open:,} {boxes} left, {share} ({regular.reason or ''})",
     }
     yield Line(regular.outcome.value, label=label, tone=_TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:

@@ -21,7 +21,7 @@ from ..program.layout import Layout
 from .claims import Claim
 from .closedform import ClosedForm
 from .general.matrices import RankMatrix
-from .general.problem import Problem, build_problem
+from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
@@ -70,7 +70,7 @@ def prove_ranks(
             constraints = prove_rank(
                 problem, problem.unactuated, engine=engine, time_limit=time_limit, progress=progress
             )
-    except UncoveredError as error:
+    except (UncoveredError, NotJudgedError) as error:
         return Ranks(_open(box, str(error)), None)
     return Ranks(_after_newton(regular, problem, problem.locked), constraints)
 

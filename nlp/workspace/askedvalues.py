@@ -12,7 +12,7 @@ from ..case.task import Sense
 from ..errors import UncoveredError
 from .boundsearch import Oracle, prove_minimum
 from .extremes import Extreme
-from .general.problem import build_problem
+from .general.problem import NotJudgedError, build_problem
 from .general.spectrum import Spectrum
 from .machine import legs_of
 from .posebox import PoseBox
@@ -52,7 +52,7 @@ def spectral_extremes(
         sign = -1.0 if is_condition else 1.0
         try:
             oracle = _oracle(case, model, box, is_condition=is_condition)
-        except UncoveredError as error:
+        except (UncoveredError, NotJudgedError) as error:
             nothing = (sign * -math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, str(error))
             yield Extreme(name, sense, Dimension.NUMBER, "", None, *nothing)
             continue
@@ -67,12 +67,12 @@ def _oracle(case: Case, model: Model, box: PoseBox, *, is_condition: bool) -> Or
     """Return bounds of a number over boxes.
 
     Raises:
-        UncoveredError: the robot has loops without a closed form.
+        NotJudgedError: the robot has loops without a closed form.
     """
     legs, length = legs_of(case), case.characteristic_length
     if legs is not None:
         return SingularValues(legs, box, length, is_condition=is_condition)
     problem = build_problem(case, model, box)
     if problem.dependent:
-        raise UncoveredError("the robot has loops that are not solved in closed form")
+        raise NotJudgedError("the robot has loops that are not solved in closed form")
     return Spectrum(problem, length, is_condition=is_condition)

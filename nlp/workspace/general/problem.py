@@ -13,13 +13,13 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, Substitution, frozen_array, jacobian
+from ....models import FloatArray, Member, Model, Substitution, frozen_array, jacobian
 from ....models.instance import sizes_at
+from ....models.member import scaled_twists
 from ....models.rows import independent_rows
 from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import TurnKind
-from ...errors import UncoveredError
 from ..posebox import PoseBox
 from .assembled import Loops, closed_from_home
 from .matrices import Limbs, RankMatrix, free_matrix, locked_matrix
@@ -32,6 +32,10 @@ _ZERO = 1e-9
 #: Residual up to which a loop is closed; equations are of order 1.
 CLOSED = 1e-9
 _SEED = 0
+
+
+class NotJudgedError(ValueError):
+    """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +130,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         box: the poses.
 
     Raises:
-        UncoveredError: no closed loops are found in the middle of the workspace, or they leave a joint free.
+        NotJudgedError: no closed loops are found in the middle of the workspace, or they leave a joint free.
     """
     posed = _posed(case, model, box)
     count = len(posed.free)
@@ -134,13 +138,14 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(posed.z.numel() - count)])
     start = closed_from_home(loops, middle, count)
     if start is None:
-        raise UncoveredError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
+        raise NotJudgedError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
     needed = _needed(loops, start, count, posed)
     equations = posed.closure[needed] if needed else SX(0, 1)
     dependent = _dependent(Loops(posed.z, equations, posed.every, posed.signs, posed.size), start, count)
     independent = tuple(k for k in range(posed.z.numel()) if k not in dependent)
     length = _length(posed, start, case, model)
-    limbs = replace(posed.limbs, length=length)
+    members = [_with_independent_screws(each, posed, start, length) for each in posed.limbs.members]
+    limbs = replace(posed.limbs, members=members, length=length)
     locked = RankMatrix(locked_matrix(limbs), 0)
     return Problem(
         box=box,
@@ -182,9 +187,6 @@ def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
         replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
     ]
     members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-    for member in members:
-        if member.rank != member.screws.shape[1]:
-            raise UncoveredError(f"the passive screws of limb {member.label} are dependent at every pose")
     actuators = [(each.limb, next(following)) for each in model.actuators]
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
     sizes = sizes_at(model, (*every, *model.unknowns), tuple(values), SX.ones(len(every) + len(model.unknowns)))
@@ -226,12 +228,12 @@ def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     """Return the coordinates that the equations determine: all unknowns, then numbers of the pose.
 
     Raises:
-        UncoveredError: the equations leave an unknown free.
+        NotJudgedError: the equations leave an unknown free.
     """
     n, k = len(start), loops.count
     unknowns = list(range(count, n))
     if k < len(unknowns):
-        raise UncoveredError("the loops leave a passive joint free")
+        raise NotJudgedError("the loops leave a passive joint free")
     if not k:
         return ()
     slopes = loops.slopes(start[:, None])[0] * loops.size
@@ -240,11 +242,11 @@ def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     if own is not None:
         basis, values, _ = own
         if not values[-1] > _ZERO * values[0]:
-            raise UncoveredError("the loops leave a passive joint free in the middle of the workspace")
+            raise NotJudgedError("the loops leave a passive joint free in the middle of the workspace")
         left = basis[:, len(unknowns) :].T @ left
     order = sorted(independent_rows([left.T])) if k > len(unknowns) else []
     if len(order) != k - len(unknowns):
-        raise UncoveredError("the loops are singular in the middle of the workspace")
+        raise NotJudgedError("the loops are singular in the middle of the workspace")
     return (*order, *unknowns)
 
 
@@ -261,6 +263,22 @@ def _length(posed: _Posed, start: FloatArray, case: Case, model: Model) -> float
     arms = [a / b for a, b in values.T if a > _ZERO and b > _ZERO]
     home = float(np.linalg.norm(model.home))
     return float(np.median(arms)) if arms else home or case.characteristic_length
+
+
+def _with_independent_screws(member: Member, posed: _Posed, start: FloatArray, length: float) -> Member:
+    """Return a member with as many of its screws as have its rank: they span the others where they are independent.
+
+    Raises:
+        NotJudgedError: its screws have another rank in the middle of the workspace.
+    """
+    if member.rank == member.screws.shape[1]:
+        return member
+    columns = scaled_twists(member.screws, member.centre, SX(length), member.size)
+    values = ca.Function("screws", [posed.z], [ca.densify(columns)])(start).full()
+    chosen = independent_rows([values.T])
+    if len(chosen) != member.rank:
+        raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
+    return replace(member, screws=member.screws[:, sorted(chosen)])
 
 
 def _about_platform(rows: SX, position: SX, length: float) -> SX:
