@@ -91,7 +91,7 @@ static Rule rule_of(int op, double c, double lo, double hi)
 {
     Rule r = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
     lo = smaller(lo, c), hi = larger(hi, c);
-    if (op == SQRT) {
+    if (op == SQRT && lo >= 0) { /* below 0 it stays NaN: smaller and larger would lose a NaN of least alone */
         double root = sqrt(c), low = sqrt(lo), high = sqrt(hi), slope = 0.5 / root;
         r.value = root, r.slope = slope, r.error = OFF * root;
         r.least = -slope / ((low + root) * (low + root)), r.most = -slope / ((high + root) * (high + root));
@@ -974,7 +974,89 @@ static PyObject *examine(PyObject *module, PyObject *args)
     Py_RETURN_NONE;
 }
 
+/* Enclosures of a tape's results over the boxes begin <= i < finish of B: enclosure.py. */
+typedef struct {
+    const double *lower, *upper;  /* (n, B) */
+    double *c, *p, *q, *s, *a;    /* (R, B), a: (R, n, B) */
+    Py_ssize_t B;
+} Enclosed;
+
+static void enclose_all(const Tape *tape, int n, Enclosed *found, double *memory)
+{
+    Py_ssize_t B = found->B;
+    Store work = {memory, sizeof(Value) / sizeof(double) + (size_t)n * LANES}, out = work;
+    double *rest = memory;
+    carve(&rest, (size_t)tape->registers * work.stride);
+    out.memory = carve(&rest, (size_t)tape->outputs * out.stride);
+    Lane *lanes[5];
+    for (int i = 0; i < 5; i++)
+        lanes[i] = (Lane *)carve(&rest, (size_t)n * LANES);
+    Lane *centre = lanes[0], *radius = lanes[1], *lower = lanes[2], *upper = lanes[3];
+    for (Py_ssize_t start = 0; start < B; start += LANES) {
+        EACH
+        {
+            Py_ssize_t at = start + l < B ? start + l : B - 1;
+            for (int i = 0; i < n; i++, at += B) {
+                double lo = found->lower[at], hi = found->upper[at], middle = 0.5 * lo + 0.5 * hi;
+                middle = smaller(larger(middle, lo), hi);
+                double half = larger(hi - middle, middle - lo);
+                lower[i][l] = lo, upper[i][l] = hi, centre[i][l] = middle;
+                radius[i][l] = half > 0 ? half * (1 + ULP) + TINY : 0.0;
+            }
+        }
+        run(tape, n, work, out, centre, radius, lower, upper, lanes[4]);
+        Py_ssize_t lanes_used = B - start < LANES ? B - start : LANES;
+        for (int k = 0; k < tape->outputs; k++) {
+            Value *v = value_of(out, k);
+            size_t at = (size_t)(k * B + start), bytes = (size_t)lanes_used * sizeof(double);
+            memcpy(found->c + at, v->c, bytes), memcpy(found->p + at, v->p, bytes);
+            memcpy(found->q + at, v->q, bytes), memcpy(found->s + at, v->s, bytes);
+            for (int i = 0; i < n; i++)
+                memcpy(found->a + ((size_t)k * (size_t)n + (size_t)i) * (size_t)B + start, terms_of(v)[i], bytes);
+        }
+    }
+}
+
+static PyObject *enclose(PyObject *module, PyObject *args)
+{
+    PyObject *tuple, *arrays[7];
+    Tape tape = {0};
+    Enclosed found = {0};
+    int n;
+    Borrowed all = {.count = 0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
+                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B))
+        return NULL;
+    int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
+    Py_ssize_t R = tape.outputs, B = found.B, D = sizeof(double);
+    good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
+    good = good && (found.c = borrow(&all, arrays[2], R * B, D, 1)) && (found.p = borrow(&all, arrays[3], R * B, D, 1));
+    good = good && (found.q = borrow(&all, arrays[4], R * B, D, 1)) && (found.s = borrow(&all, arrays[5], R * B, D, 1));
+    good = good && (found.a = borrow(&all, arrays[6], R * n * B, D, 1));
+    double *memory = NULL;
+    size_t stride = sizeof(Value) / sizeof(double) + (size_t)(n > 0 ? n : 0) * LANES;
+    if (good && !(memory = malloc(((size_t)(tape.registers + tape.outputs) * stride + 5 * (size_t)n * LANES) * sizeof(double))))
+        PyErr_NoMemory();
+    if (memory) {
+        Py_BEGIN_ALLOW_THREADS
+        enclose_all(&tape, n, &found, memory);
+        Py_END_ALLOW_THREADS
+    } else if (!PyErr_Occurred()) {
+        PyErr_SetString(PyExc_ValueError, "the kernel got no variables or no boxes");
+    }
+    free(memory);
+    for (int i = 0; i < all.count; i++)
+        PyBuffer_Release(&all.buffers[i]);
+    if (!memory)
+        return NULL;
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
+    {"enclose", enclose, METH_VARARGS,
+     "enclose(n, tape, (lower, upper, c, p, q, s, a), B)\n\n"
+     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a."},
     {"examine", examine, METH_VARARGS,
      "examine((n, functions, equation, depends, low, high, tape), arrays, B, begin, finish, threshold,\n"
      "        shared=0, models=None)\n\n"

@@ -55,13 +55,13 @@ class RegularData(JsonObject):
             left.
         pose: that pose; absent where the claim is proved.
         between: two poses at which the determinant of the rows has opposite signs, without rounding; absent where the
-            claim is not refuted.
+            claim is not refuted so.
         boxes: number of boxes examined.
         open: number of boxes left.
         share: part of the box of poses in boxes that are left.
         seconds: wall time.
         engine: ``c`` or ``numpy``.
-        reason: for stopping early; absent without one.
+        reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
         machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
     """
 
@@ -136,7 +136,8 @@ class WorkspaceResult(JsonObject):
         joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
             about the exact machine alone.
         proved: whether J is regular at every pose, every limit holds, and every number is bounded.
-        regular: whether J has full rank at every pose; null for a robot that is not six straight legs.
+        regular: whether J has full rank at every pose.
+        constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
         extremes: smallest and largest values.
         scale: the largest box; absent where it was not asked for.
         versions: of the programs.
@@ -146,7 +147,8 @@ class WorkspaceResult(JsonObject):
     parameters: Mapping[str, float | Vector]
     joint_centre: Absent[float]
     proved: bool
-    regular: RegularData | None
+    regular: RegularData
+    constraints: Absent[RegularData]
     extremes: tuple[ExtremeData, ...]
     scale: Absent[ScaleData]
     versions: VersionsData
@@ -196,7 +198,7 @@ class WorkspaceProofData(JsonObject):
     tighter: Absent[float]
     designs: tuple[DesignData, ...]
     poses: tuple[BindingData, ...]
-    regular: RegularData | None
+    regular: RegularData
     extremes: tuple[ExtremeData, ...]
 
 
@@ -212,7 +214,7 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
         tighter=proof.tighter,
         designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
-        regular=None if judged.regularity is None else _regular_data(judged.regularity, units),
+        regular=_regular_data(judged.regularity, units),
         extremes=tuple(_extreme_data(each, units) for each in judged.extremes),
     )
 
@@ -229,7 +231,8 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         parameters=parameters,
         joint_centre=case.joint_centre_tolerance,
         proved=judged.is_proved,
-        regular=None if judged.regularity is None else _regular_data(judged.regularity, case.units),
+        regular=_regular_data(judged.regularity, case.units),
+        constraints=None if judged.constraints is None else _regular_data(judged.constraints, case.units),
         extremes=tuple(_extreme_data(each, case.units) for each in judged.extremes),
         scale=scale,
         versions=versions(),

@@ -41,10 +41,9 @@ def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | Te
     """Yield the verdicts on a machine over its workspace: a digest, then every number."""
     yield title_line(case)
     yield from verdict_lines(case, result)
-    if result.regular is None:
-        yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
-    else:
-        yield from _regular_lines(case, result.regular)
+    yield from _regular_lines(case, result.regular)
+    if result.constraints is not None:
+        yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
     yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
@@ -115,15 +114,21 @@ def _pose_words(case: Case, pose: WorkspacePose) -> str:
     return f"({position}), {pose.angle:.5g} {case.units.angle} about ({axis})"
 
 
-def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line | TextTable]:
-    """Yield the verdict on regularity."""
+def _regular_lines(
+    case: Case, regular: RegularData, label: str = "regular", of: str = ""
+) -> Iterator[Line | TextTable]:
+    """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
     share = f"{100 * regular.share:.3g} % of the box"
+    found = f", {regular.reason}" if regular.reason and regular.between is None else ""
+    boxes = "box is" if regular.open == 1 else "boxes are"
     words = {
-        Outcome.PROVED: ": J has full rank at every pose",
-        Outcome.REFUTED: ": J is singular at a pose",
-        Outcome.OPEN: f": {regular.open:,} boxes are left, {share} ({regular.reason or ''})",
+        Outcome.PROVED: ": the constraint wrenches keep their rank at every pose"
+        if of
+        else ": J has full rank at every pose",
+        Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at a pose{found}",
+        Outcome.OPEN: f": {regular.open:,} {boxes} left, {share} ({regular.reason or ''})",
     }
-    yield Line(regular.outcome.value, label="regular", tone=TONES[regular.outcome], after=words[regular.outcome])
+    yield Line(regular.outcome.value, label=label, tone=TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
         yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
     if regular.outcome is Outcome.REFUTED and regular.pose is not None:

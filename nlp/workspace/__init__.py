@@ -10,5 +10,7 @@ The modules import each other in this order:
   tolerance), ``claims``, ``builtclaims`` (about all machines), ``extremes`` (bounds by the certificate's search),
   ``boundsearch``, ``clearance``, ``builtsingular``, ``singular`` and ``poseerror`` (searches of their own),
   ``ownsearches`` and ``strokes``;
+* any robot: ``closedform`` (unknowns that follow from the pose), the room ``general`` (ranks of matrices over boxes),
+  ``anyrobot`` (ranks and reach) and ``askedvalues`` (singular values that no limit asks for);
 * ``judge`` (all claims about a machine), ``scale`` (the largest box) and ``slices`` (for pictures).
 """

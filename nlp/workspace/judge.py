@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,12 +14,15 @@ from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
+from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
+from .askedvalues import SPECTRAL, spectral_extremes
 from .builtclaims import NO_LEGS, built_claims
 from .claims import Claim, claims_of
+from .closedform import ClosedForm, closed_form
 from .extremes import GAP, Extreme, prove_extreme
 from .machine import Legs, legs_of, workspace_of_case
 from .ownsearches import own_searches, pose_errors
-from .posebox import pose_box
+from .posebox import PoseBox, pose_box
 from .posed import posed_layout
 from .search import RankProgress, prove_regular
 from .strokes import with_strokes
@@ -43,26 +46,36 @@ class Judgement:
     Attributes:
         case: the case, its dimensions fixed.
         workspace: the poses.
-        regularity: whether J has full rank at every pose; None for a robot that is not six straight legs.
-        extremes: of the limits, lengths of legs, measures and tasks, in this order.
+        regularity: whether J has full rank at every pose.
+        extremes: of the reach of limbs, limits, lengths of legs, measures and tasks, in this order.
+        constraints: whether the constraint wrenches alone keep their rank; None for a robot without any.
     """
 
     case: Case
     workspace: Workspace
-    regularity: Regularity | None
+    regularity: Regularity
     extremes: tuple[Extreme, ...]
+    constraints: Regularity | None = None
+
+    @property
+    def ranks(self) -> tuple[Regularity, ...]:
+        """Verdicts on ranks."""
+        return (self.regularity,) if self.constraints is None else (self.regularity, self.constraints)
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether all ranks are proved to be full."""
+        return all(each.outcome is Outcome.PROVED for each in self.ranks)
 
     @property
     def is_proved(self) -> bool:
-        """Whether J is proved to have full rank, every limit holds, and every other number is bounded to the gap."""
-        regular = self.regularity is not None and self.regularity.outcome is Outcome.PROVED
-        return regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
+        """Whether all ranks are proved to be full, every limit holds, and every other number is bounded to the gap."""
+        return self.is_regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
 
     @property
     def is_refuted(self) -> bool:
         """Whether a pose is known that is singular or outside of a limit."""
-        outcomes = [] if self.regularity is None else [self.regularity.outcome]
-        return Outcome.REFUTED in (*outcomes, *(each.outcome for each in self.extremes))
+        return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
 def judge_workspace(
@@ -108,40 +121,139 @@ def judge_workspace(
     own = workspace_of_case(case)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
-    layout = posed_layout(case, workspace)
-    claims = claims_of(layout, quantities, with_objective=with_objective) if with_limits else []
-    prove = partial(prove_extreme, layout, time_limit=time_limit, jobs=jobs, interrupted=is_requested, legs=legs)
-    shortest, regularity = 0.0, None
+    closed = closed_form(case.model)
+    ranks = partial(_ranks, case, closed, box, legs, engine=engine, time_limit=time_limit, progress=rank_progress)
+    judged = Judgement(case, workspace, *_in_order(ranks(paper=paper)))
+    if not with_limits or (until_fault and not judged.is_regular):
+        return judged
+    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper)
+    found: list[Extreme] = []
+    for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+        if until_fault and outcome is not Outcome.PROVED:
+            break
+    return replace(judged, extremes=tuple(found))
+
+
+def _in_order(ranks: Ranks) -> tuple[Regularity, tuple[Extreme, ...], Regularity | None]:
+    """Return verdicts as a judgement without numbers takes them."""
+    return ranks.regular, (), ranks.constraints
+
+
+def _ranks(
+    case: Case,
+    closed: ClosedForm,
+    box: PoseBox,
+    legs: Legs | None,
+    *,
+    engine: str | None,
+    time_limit: float | None,
+    progress: RankProgress | None,
+    paper: PaperRecord | None,
+) -> Ranks:
+    """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
     if legs is not None:
         recorder = None if paper is None else paper.rank
-        regularity = prove_regular(
-            legs, box, engine=engine, time_limit=time_limit, progress=rank_progress, recorder=recorder
+        found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
+        return Ranks(touched(case, box, found), None)
+    if case.joint_centre_tolerance:
+        return Ranks(not_judged(box, NO_LEGS), None)
+    return prove_ranks(case, closed.model, box, engine=engine, time_limit=time_limit, progress=progress)
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """The numbers of a machine over its workspace.
+
+    Attributes:
+        case: with fixed dimensions.
+        workspace: the poses.
+        closed: its robot without unknowns in closed form.
+        legs: joint centres; None for a robot that is not six straight legs.
+        gap, time_limit, jobs, progress, paper: as in :func:`judge_workspace`.
+    """
+
+    case: Case
+    workspace: Workspace
+    closed: ClosedForm
+    legs: Legs | None
+    gap: float
+    time_limit: float | None
+    jobs: int | None
+    progress: Callable[[str, int, int], None] | None
+    paper: PaperRecord | None
+
+    def add(
+        self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
+    ) -> Iterator[Outcome]:
+        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks; yield each outcome.
+
+        Args:
+            found: gets the extremes; lengths that a stroke needs more finely take the place of those found before.
+            quantities: names of measures.
+            leg_error: largest error of a leg's length, length.
+            with_objective: whether F of each task, and errors of the pose, are bounded.
+
+        Raises:
+            InputError: the robot has no measure of a name.
+        """
+        case, box, legs = self.case, pose_box(self.workspace), self.legs
+        names = [name for name in quantities if name not in SPECTRAL]
+        asked = [name for name in quantities if name in SPECTRAL]
+        layout = posed_layout(case, self.workspace)
+        claims = claims_of(layout, names, with_objective=with_objective)
+        if self.closed.reaches:
+            place, reaches = reach_claims(case, self.closed, self.workspace)
+            reaches = _as_built(place, self.workspace, legs, reaches, self._prove(place)).claims
+            yield from self._add_proved(found, place, reaches)
+            if all(each.outcome is Outcome.PROVED for each in found):
+                # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+                model = without_identities(case, self.closed.model, box)
+                layout = posed_layout(replace(case, model=model), self.workspace)
+                claims = claims_of(layout, names, with_objective=with_objective)
+        prove = self._prove(layout)
+        shortest, claims = _as_built(layout, self.workspace, legs, claims, prove)
+        yield from self._add_proved(found, layout, claims)
+        if legs is not None:
+            refine = partial(_refined, layout, legs, shortest, claims, partial(prove, paper=self.paper, again=True))
+            before = len(found)
+            found[:] = with_strokes(case, legs, found, refine)
+            yield from (each.outcome for each in found[before:])
+            own = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            yield from _add(found, own(case, legs, box, shortest=shortest, paper=self.paper))
+        spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+        yield from _add(found, spectral(case, self.closed.model, box, asked))
+        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
+        if legs is not None and with_objective and eps > 0:
+            least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
+            shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
+            errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
+            yield from _add(found, errors(legs, box, eps, shortest))
+
+    def _prove(self, layout: Layout) -> Callable[..., Extreme]:
+        """Return the function that proves a claim to a gap."""
+        return partial(
+            prove_extreme,
+            layout,
+            time_limit=self.time_limit,
+            jobs=self.jobs,
+            interrupted=is_requested,
+            legs=self.legs,
         )
-    extremes: list[Extreme] = []
-    if until_fault and not (regularity is not None and regularity.outcome is Outcome.PROVED):
-        return Judgement(case, workspace, regularity, ())
-    shortest, claims = _as_built(layout, workspace, legs, claims, prove)
-    for done, claim in enumerate(claims):
-        if progress is not None:
-            progress(claim.name, done, len(claims))
-        found = prove(claim, gap=gap, paper=paper)
-        extremes.append(found)
-        if until_fault and found.outcome is not Outcome.PROVED:
-            return Judgement(case, workspace, regularity, tuple(extremes))
-    if legs is not None and with_limits:
-        refine = partial(_refined, layout, legs, shortest, claims, partial(prove, paper=paper, again=True))
-        extremes = with_strokes(case, legs, extremes, refine)
-        each_own = partial(own_searches, gap=gap, time_limit=time_limit, interrupted=is_requested, shortest=shortest)
-        for found in each_own(case, legs, box, paper=paper):
-            extremes.append(found)
-            if until_fault and found.outcome is not Outcome.PROVED:
-                break
-    eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
-    if legs is not None and with_limits and with_objective and eps > 0:
-        least = min((each.bound for each in extremes if each.name.startswith("leg_length limb ")), default=-math.inf)
-        shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
-        extremes += pose_errors(legs, box, eps, shortest, time_limit=time_limit, interrupted=is_requested, paper=paper)
-    return Judgement(case, workspace, regularity, tuple(extremes))
+
+    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Outcome]:
+        """Add the extremes of claims, and yield their outcomes."""
+        prove = self._prove(layout)
+        for done, claim in enumerate(claims):
+            if self.progress is not None:
+                self.progress(claim.name, done, len(claims))
+            yield from _add(found, [prove(claim, gap=self.gap, paper=self.paper)])
+
+
+def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Outcome]:
+    """Add extremes one by one, and yield the outcome of each."""
+    for each in more:
+        found.append(each)
+        yield each.outcome
 
 
 class _AsBuilt(NamedTuple):

@@ -85,16 +85,17 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
 
 def judged_holds(judged: Judgement) -> bool:
     """Return whether J is regular and every limit holds; numbers without a limit do not count."""
-    regular = judged.regularity is not None and judged.regularity.outcome is Outcome.PROVED
-    return regular and all(each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None)
+    return judged.is_regular and all(
+        each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None
+    )
 
 
 def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     """Return the claim that fails, a pose of it, and whether it is refuted: a refuted one before an open one."""
-    regular, faults = judged.regularity, []
-    if regular is not None and regular.outcome is not Outcome.PROVED:
-        pose = None if regular.y is None else regular.box.pose(regular.y)
-        faults.append((regular.outcome, "regular", pose))
+    faults = []
+    for name, found in zip(("regular", "constraints regular"), judged.ranks, strict=False):
+        if found.outcome is not Outcome.PROVED:
+            faults.append((found.outcome, name, None if found.y is None else found.box.pose(found.y)))
     faults += [
         (each.outcome, f"{each.name}: {each.key}", each.pose)
         for each in judged.extremes

@@ -611,18 +611,17 @@ def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, i
     assert np.median(bound / least) < 1.1
 
 
-def test_other_robots_are_bounded_and_stay_open(tmp_path: Path) -> None:
+def test_robots_with_other_rows_are_proved_and_have_no_slices(tmp_path: Path) -> None:
     runner, file = CliRunner(), tmp_path / "robot.toml"
     text = runner.invoke(app, ["new", "three-upu"]).output
     place = "position = [{ min = -2, max = 2 }, 0, { min = 45, max = 50 }]"
     box = f"[workspace]\n{place}\nrotation = {{ roll = {{ min = -5, max = 5 }} }}"
     file.write_text(f"{text}\n{box}\n", encoding="utf-8")
     run = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--json", "-"])
-    assert run.exit_code == 1
+    assert run.exit_code == 0
     result = json.loads(run.stdout)
-    assert result["regular"] is None
-    assert not result["proved"]
-    # Lengths and F are bounded all the same.
+    assert result["regular"]["outcome"] == result["constraints"]["outcome"] == "proved"
+    assert result["proved"]
     assert {each["outcome"] for each in result["extremes"]} == {"proved"}
     drawn = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--plot", str(tmp_path / "x.png")])
     assert "six straight legs" in str(drawn.exception)

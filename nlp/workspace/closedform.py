@@ -1,0 +1,272 @@
+"""Unknowns of a robot that follow from the pose in closed form: cranks and rails with a rod of constant length.
+
+The loop of such a limb has one equation with one unknown:
+
+* a crank or a rocker, ``A cos t + B sin t = D``, is closed where ``A^2 + B^2 >= D^2``;
+* a slide, ``c0 + c1 q + c2 q^2 = 0``, is closed where ``c1^2 >= 4 c0 c2``.
+
+Of the two solutions that of home's working mode is taken: the derivative of the equation by the unknown has the sign
+that it has at home, and is 0 where both solutions meet, at the edge of the limb's reach. The unknown then is an
+expression of dimensions and pose, and the edge a claim of its own.
+
+Coefficients are read off the equation at three values of the unknown. That it has no further terms is tested at random
+values of all symbols, at which another analytic expression would differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Closure, Dimension, Model, Substitution, Unknown, Wrench
+from ...models.drawing import Scene
+from ...models.limbjoints import expressions_of
+
+#: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
+_SAME = 1e-9
+#: Random values of the symbols at which an identity is tested.
+_TESTS = 4
+#: Smallest derivative of an equation, of order 1, by its unknown at home: below, home is on the edge of reach.
+_EDGE = 1e-9
+_SEED = 0
+
+
+class Reach(NamedTuple):
+    """The edge of a limb's reach.
+
+    Attributes:
+        limb: name of the limb.
+        value: (1, 1) squared sine of the angle between crank and rod, seen along the crank's axis, or squared cosine of
+            that between slide and rod: not negative where the limb reaches the pose, and 0 at the edge of its reach.
+    """
+
+    limb: str
+    value: SX
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """A robot without the unknowns that follow in closed form.
+
+    Attributes:
+        model: the robot; its drawing is left out.
+        reaches: one for each unknown that is left out.
+    """
+
+    model: Model
+    reaches: tuple[Reach, ...]
+
+
+class _Solved(NamedTuple):
+    """An unknown in closed form: itself, its sine and cosine where it is an angle, and the edge of its reach."""
+
+    value: SX
+    sine: SX | None
+    cosine: SX | None
+    reach: SX
+
+
+def closed_form(model: Model) -> ClosedForm:
+    """Return a robot without those of its unknowns that follow from dimensions and pose in closed form."""
+    symbols = [item.symbol for item in model.unknowns]
+    found: dict[int, _Solved] = {}
+    dropped: set[int] = set()
+    reaches: list[Reach] = []
+    for k, unknown in enumerate(model.unknowns):
+        for e, equation in enumerate(model.closure):
+            if e in dropped or _depends_on(equation.expression, symbols) != [k]:
+                continue
+            solved = _solved(model, unknown, equation)
+            if solved is not None:
+                found[k] = solved
+                dropped.add(e)
+                reaches.append(Reach(_limb_of(equation.name), solved.reach))
+                break
+    if not found:
+        return ClosedForm(model, ())
+    kept = tuple(each for e, each in enumerate(model.closure) if e not in dropped)
+    return ClosedForm(_rewritten(model, found, kept), tuple(reaches))
+
+
+def _limb_of(equation: str) -> str:
+    """Return the limb of a loop equation, such as ``1`` of ``loop 1.2 (1)``."""
+    return equation.removeprefix("loop ").partition(" ")[0].partition(".")[0]
+
+
+def _depends_on(expression: SX, symbols: Sequence[SX]) -> list[int]:
+    """Return the indices of the symbols that an expression depends on."""
+    return [k for k, each in enumerate(symbols) if ca.depends_on(expression, each)]
+
+
+def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None:
+    """Return an unknown that an equation determines in closed form; None where the equation has another form."""
+    q = unknown.symbol
+    expression = equation.expression / equation.size
+
+    def at(value: float) -> SX:
+        return ca.substitute(expression, q, SX(value))
+
+    slope = _slope_at_home(model, ca.jacobian(expression, q) * unknown.size)
+    if not abs(slope) > _EDGE:
+        return None
+    sign = 1.0 if slope > 0 else -1.0
+    if unknown.dimension is Dimension.ANGLE:
+        # pi and its half are not doubles: sine and cosine are put in instead.
+        none, half, quarter = (_at_turn(expression, q, *turn) for turn in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0)))
+        middle = (none + half) / 2
+        A, B = (none - half) / 2, quarter - middle
+        if not _is_same(model, expression, middle + A * ca.cos(q) + B * ca.sin(q)):
+            return None
+        D, square = -middle, A * A + B * B
+        root = sign * ca.sqrt(square - D * D)
+        cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
+        return _Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
+    c0, plus, minus = at(0.0), at(1.0), at(-1.0)
+    c1, c2 = (plus - minus) / 2, (plus + minus) / 2 - c0
+    if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
+        return None
+    square = c1 * c1 - 4 * c0 * c2
+    # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
+    return _Solved((sign * ca.sqrt(square) - c1) / (2 * c2), None, None, square / (2 * c2))
+
+
+def _at_turn(expression: SX, q: SX, sine: float, cosine: float) -> SX:
+    """Return an expression with numbers in the place of sine and cosine of an angle; 0 in that of the angle itself."""
+    others = ca.symvar(expression)
+    rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
+    turned = _Solved(SX(0), SX(sine), SX(cosine), SX(0))
+    return _walk([rest, q], [expression], 1, {0: turned})[0]
+
+
+def _symbols(model: Model) -> list[SX]:
+    """Return the symbols of a model: parameters, unknowns, rotation, position."""
+    own = Substitution.identity(model)
+    return [own.parameters, own.unknowns, own.rotation, own.position]
+
+
+def _slope_at_home(model: Model, expression: SX) -> float:
+    """Return the value of an expression at home, with typical dimensions."""
+    typical = [value for item in model.parameters for value in item.typical]
+    function = ca.Function("home", _symbols(model), [ca.densify(expression)])
+    return float(function(np.array(typical), 0, np.eye(3), np.array(model.home)))
+
+
+def _is_same(model: Model, one: SX, other: SX) -> bool:
+    """Return whether two expressions agree at random values of all symbols."""
+    symbols = _symbols(model)
+    function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
+    rng = np.random.default_rng(_SEED)
+    typical = np.array([value for item in model.parameters for value in item.typical])
+    for _ in range(_TESTS):
+        values = typical * rng.uniform(0.8, 1.2, typical.shape)
+        turn = rng.normal(size=(3, 3))
+        place = np.array(model.home) + rng.uniform(-0.5, 0.5, 3)
+        a, b = (float(each) for each in function(values, rng.uniform(-1.5, 1.5, symbols[1].numel()), turn, place))
+        if not abs(a - b) <= _SAME * (1 + abs(a) + abs(b)):
+            return False
+    return True
+
+
+def _walk(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, solved: dict[int, _Solved]) -> list[SX]:
+    """Return expressions with unknowns replaced; sines and cosines of theirs are replaced as a whole.
+
+    Args:
+        symbols: arguments of the expressions.
+        outputs: the expressions.
+        argument: index of the argument whose elements are the unknowns.
+        solved: what replaces an element of it, by its index.
+    """
+    function = ca.Function("outputs", list(symbols), [ca.densify(each) for each in outputs])
+    work: list[SX] = [SX(0)] * function.sz_w()
+    # The unknown that a register holds, and its sign.
+    held: list[tuple[int, float] | None] = [None] * function.sz_w()
+    results = [[SX(0)] * function.numel_out(i) for i in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        if op == ca.OP_OUTPUT:
+            results[target[0]][target[1]] = work[source[0]]
+            continue
+        to = target[0]
+        own = None
+        if op == ca.OP_INPUT:
+            is_solved = source[0] == argument and source[1] in solved
+            value = solved[source[1]].value if is_solved else ca.vec(symbols[source[0]])[source[1]]
+            own = (source[1], 1.0) if is_solved else None
+        elif op == ca.OP_CONST:
+            value = SX(function.instruction_constant(k))
+        else:
+            value, own = _applied(op, [work[i] for i in source], held[source[0]], solved)
+        work[to], held[to] = value, own
+    return [ca.reshape(ca.vertcat(*result), each.shape) for result, each in zip(results, outputs, strict=True)]
+
+
+def _applied(
+    op: int, operands: list[SX], held: tuple[int, float] | None, solved: dict[int, _Solved]
+) -> tuple[SX, tuple[int, float] | None]:
+    """Return the result of an operation, and the unknown that it is, with its sign."""
+    if held is not None and op in (ca.OP_SIN, ca.OP_COS, ca.OP_NEG):
+        index, sign = held
+        own = solved[index]
+        if op == ca.OP_NEG:
+            return -operands[0], (index, -sign)
+        if own.sine is not None and own.cosine is not None:
+            return (sign * own.sine if op == ca.OP_SIN else own.cosine), None
+    return (SX.unary(op, operands[0]) if len(operands) == 1 else SX.binary(op, *operands)), None
+
+
+def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure, ...]) -> Model:
+    """Return a model with unknowns replaced.
+
+    Args:
+        model: the model.
+        solved: by the index of the unknown.
+        closure: equations that are left.
+    """
+    outputs = [
+        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
+        *[each.expression for each in (*closure, *model.loops, *model.distances)],
+        *[each.screw for each in model.actuators],
+        *[each.value for each in model.signs],
+        *[quantity.values for quantity in model.quantities],
+        *[part for member in model.members for part in (member.centre, member.screws)],
+        *[each.all for each in model.joint_screws],
+        *expressions_of((*model.joints, *model.links)),
+    ]
+    following = iter(_walk(_symbols(model), outputs, 1, solved))
+
+    def equations(given: Sequence[Closure]) -> tuple[Closure, ...]:
+        return tuple(replace(each, expression=next(following)) for each in given)
+
+    def row(each: Wrench) -> Wrench:
+        force, moment, square = (next(following) for _ in range(3))
+        return replace(each, force=force, moment=moment, square=square)
+
+    # The order of the calls is that of the expressions.
+    wrenches = tuple(row(each) for each in model.wrenches)
+    kept, loops, distances = equations(closure), equations(model.loops), equations(model.distances)
+    actuators = tuple(replace(each, screw=next(following)) for each in model.actuators)
+    signs = tuple(replace(each, value=next(following)) for each in model.signs)
+    quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
+    members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)
+    screws = tuple(replace(each, all=next(following)) for each in model.joint_screws)
+    return replace(
+        model,
+        wrenches=wrenches,
+        closure=kept,
+        loops=loops,
+        distances=distances,
+        actuators=actuators,
+        signs=signs,
+        quantities=quantities,
+        members=members,
+        joint_screws=screws,
+        joints=tuple(each.replaced(following) for each in model.joints),
+        links=tuple(each.replaced(following) for each in model.links),
+        unknowns=tuple(each for k, each in enumerate(model.unknowns) if k not in solved),
+        scene=Scene(),
+    )

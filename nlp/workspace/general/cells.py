@@ -1,0 +1,246 @@
+"""Boxes of a search: ends of the independent coordinates, and where the dependent ones are known, theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....models import FloatArray
+from .assembled import Loops
+from .enclosing import Encloser, Forms
+from .problem import Problem
+from .rank import RankTest
+from .relation import Relation, are_contractions, inverses, relation_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
+#: and later ones, from the relation that was found with the guess before.
+_WIDER, _AGAIN = 1.1, 1.05
+#: Attempts to find widths of dependent coordinates in which they surely stay.
+_ATTEMPTS = 3
+#: Smallest half width of a dependent coordinate, in parts of its size: more than rounding.
+_LEAST = 1e-10
+#: Largest one: beyond it, the box of the pose is divided first.
+_MOST = 1.0
+#: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
+_ROUNDING = 1e-14
+#: Contractions of the closed point at the common face of two boxes: each one squares its width.
+_CONTRACTIONS = 3
+
+
+class Cells(NamedTuple):
+    """B boxes.
+
+    Attributes:
+        lower, upper: (B, n) ends of all coordinates; those of dependent ones are NaN until they are known.
+        near: (B, n) a closed point in or near the box.
+        is_known: (B,) whether each pose of the box surely has one, and only one, closed point between the ends.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    near: FloatArray
+    is_known: NDArray[np.bool_]
+
+    def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Cells:
+        """Return some of the boxes."""
+        return Cells(self.lower[which], self.upper[which], self.near[which], self.is_known[which])
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centres (B, n)."""
+        return np.clip(0.5 * self.lower + 0.5 * self.upper, self.lower, self.upper)
+
+
+def joined(parts: Sequence[Cells]) -> Cells:
+    """Return boxes one after the other."""
+    lower, upper, near, is_known = zip(*parts, strict=True)
+    return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
+
+
+class Examined(NamedTuple):
+    """Results for B boxes.
+
+    Attributes:
+        cells: the boxes, with dependent coordinates where they are known.
+        relation: of these; its rest is infinite where they are not known.
+        is_regular: (B,) whether the matrix has full rank at every pose of the box.
+        shares: (B, f) share of each independent coordinate in the bounds.
+        smallest: (B,) smallest singular value at the middle, in parts of the largest; infinite where it is not known.
+    """
+
+    cells: Cells
+    relation: Relation
+    is_regular: NDArray[np.bool_]
+    shares: FloatArray
+    smallest: FloatArray
+
+
+class Examiner:
+    """Examination of boxes of a robot for the rank of one matrix.
+
+    Args:
+        problem: the robot.
+        test: of the matrix.
+        engine: ``"c"``, ``"numpy"``, or None.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, problem: Problem, test: RankTest, engine: str | None) -> None:
+        self.problem, self._test = problem, test
+        self._independent, self._dependent = list(problem.independent), list(problem.dependent)
+        self.count = len(self._dependent)
+        slopes = [ca.jacobian(problem.equations, problem.z)[:, k] for k in self._dependent]
+        own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
+        # A last entry that is not used, for a matrix that is constant.
+        entries = ca.vertcat(problem.equations, own, test.entries, problem.z[0])
+        self._encloser = Encloser(problem.z, entries, engine)
+        self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
+
+    @property
+    def engine(self) -> str:
+        """``c`` or ``numpy``."""
+        return self._encloser.name
+
+    def examine(self, cells: Cells) -> Examined:
+        """Examine boxes."""
+        f, k = len(self._independent), self.count
+        B = len(cells.lower)
+        lower, upper = cells.lower.copy(), cells.upper.copy()
+        known, near = cells.is_known.copy(), cells.near.copy()
+        relation = Relation(np.zeros((B, k)), np.zeros((B, k, f)), np.full((B, k), np.inf))
+        shares, smallest, regular = np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=bool)
+        if k and not known.all():
+            new = np.flatnonzero(~known)
+            slopes = self._guess(new, lower, upper, near)
+            shares[new] = slopes
+        for attempt in range(1 + (_ATTEMPTS if k else 0)):
+            # The first round is of boxes that are known already.
+            rows = np.flatnonzero(known if attempt == 0 else ~known & np.isfinite(lower).all(axis=1))
+            if not rows.size:
+                continue
+            forms = self._encloser(lower[rows].T, upper[rows].T)
+            own = relation_of(forms.part(slice(0, k)), self._independent, self._dependent)
+            if attempt:
+                good = self._is_single(forms, own, lower[rows], upper[rows])
+                known[rows[good]] = True
+                again = rows[~good]
+                self._widen(again, own.reach[~good], lower, upper)
+                keep = np.flatnonzero(good)
+                rows = rows[good]
+                forms = Forms(*(each[keep] for each in forms))
+                own = Relation(*(each[keep] for each in own))
+            if not rows.size:
+                continue
+            for whole, part in zip(relation, own, strict=True):
+                whole[rows] = part
+            found = self._test.examine(forms.part(slice(k + k * k, -1)), own, self._independent, self._dependent)
+            regular[rows], shares[rows], smallest[rows] = found.is_regular, found.shares, found.smallest
+        for j in self._dependent:
+            lower[~known, j] = upper[~known, j] = np.nan
+        finite = np.asarray(np.isfinite(near).all(axis=1))
+        near = np.where(finite[:, None], near, cells.near)
+        return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
+
+    def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
+        """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
+        own, D, size = self._independent, self._dependent, self.problem.size
+        z = near[rows].copy()
+        half = 0.5 * (upper[rows] - lower[rows])[:, own]
+        with np.errstate(all="ignore"):
+            before = self.loops.slopes(z.T) * size
+            step = (0.5 * (lower[rows] + upper[rows])[:, own] - z[:, own]) / size[own]
+            z[:, own] = 0.5 * (lower[rows] + upper[rows])[:, own]
+            z[:, D] -= size[D] * (inverses(before[:, :, D]) @ before[:, :, own] @ step[:, :, None])[:, :, 0]
+            z = self.loops.all_closed(z.T, D).T
+            slopes = self.loops.slopes(z.T) * size
+            T = inverses(slopes[:, :, D]) @ slopes[:, :, own]
+            reach = np.abs(T) * (half / size[own])[:, None, :]
+        width = np.maximum(_WIDER * reach.sum(axis=2), _LEAST)
+        width = np.where(width <= _MOST, width, np.nan) * size[D]
+        near[rows] = z
+        lower[rows[:, None], D], upper[rows[:, None], D] = z[:, D] - width, z[:, D] + width
+        shares = np.nan_to_num(reach.sum(axis=1))
+        return np.asarray(np.where(shares.any(axis=1, keepdims=True), shares, half / size[own]))
+
+    def _is_single(self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
+        """Return whether each pose of a box surely has one closed point between the ends, and only one."""
+        k = self.count
+        stays = (relation.reach < 1).all(axis=1)
+        c, a, r = forms.part(slice(k, k + k * k))
+        half = 0.5 * (upper - lower)[:, self._dependent]
+        # Columns of the derivatives by dependent coordinates, one after the other.
+        G = c.reshape(-1, k, k).transpose(0, 2, 1) * half[:, None, :]
+        spread = (np.abs(a).sum(axis=2) + r).reshape(-1, k, k).transpose(0, 2, 1) * half[:, None, :]
+        Y = inverses(G)
+        with np.errstate(all="ignore"):
+            B = np.abs(Y @ G - np.eye(k)) + np.abs(Y) @ (spread * (1 + 1e-12) + 1e-12 * np.abs(G))
+        is_regular, _ = are_contractions(np.where(np.isfinite(B), B, np.inf))
+        return np.asarray(stays & is_regular)
+
+    def _widen(self, rows: NDArray[np.int64], reach: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
+        """Set the widths of dependent coordinates to those that were found to be needed."""
+        D, size = self._dependent, self.problem.size
+        middle = 0.5 * (lower[rows] + upper[rows])[:, D]
+        half = 0.5 * (upper[rows] - lower[rows])[:, D]
+        width = np.maximum(half * np.maximum(_AGAIN * reach, 0.5), _LEAST * size[D])
+        width = np.where(width <= _MOST * size[D], width, np.nan)
+        lower[rows[:, None], D], upper[rows[:, None], D] = middle - width, middle + width
+
+    def tied(self, one: Cells, other: Cells) -> NDArray[np.bool_]:
+        """Return whether neighbours have the same closed point somewhere on their common face.
+
+        Args:
+            one: (B,) boxes with known dependent coordinates.
+            other: as many, whose independent coordinates overlap those of the first in pairs.
+        """
+        own, D = self._independent, self._dependent
+        lower, upper = one.lower.copy(), one.upper.copy()
+        place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
+        lower[:, own] = upper[:, own] = place[:, own]
+        for _ in range(_CONTRACTIONS):
+            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, self.count)), own, D)
+            middle, half = 0.5 * (lower + upper)[:, D], 0.5 * (upper - lower)[:, D] * (1 + _ROUNDING)
+            slack = _ROUNDING * np.abs(middle)
+            with np.errstate(all="ignore"):
+                low = middle + half * np.maximum(relation.off - relation.rho, -1.0) - slack
+                high = middle + half * np.minimum(relation.off + relation.rho, 1.0) + slack
+            lower[:, D], upper[:, D] = np.minimum(low, high), np.maximum(low, high)
+        return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
+
+    def halves(self, found: Examined, split: NDArray[np.int64]) -> Cells:
+        """Return the halves of boxes along independent coordinates, first the lower ones.
+
+        Args:
+            found: the examined boxes.
+            split: (B,) place of the coordinate among the independent ones.
+        """
+        cells, (off, T, rho) = found.cells, found.relation
+        every, column = np.arange(len(split)), np.array(self._independent)[split]
+        middle = 0.5 * cells.lower[every, column] + 0.5 * cells.upper[every, column]
+        parts = []
+        for side in (-1.0, 1.0):
+            lower, upper = cells.lower.copy(), cells.upper.copy()
+            (upper if side < 0 else lower)[every, column] = middle
+            if self.count and cells.is_known.any():
+                # The coordinate lies in [-1, 0] or [0, 1] of the whole box, and a little beyond for rounding.
+                own = T[every, :, split]
+                reach = np.abs(T).sum(axis=2) - 0.5 * np.abs(own) + rho
+                reach = reach + 1e-12 * (np.abs(off) + np.abs(T).sum(axis=2))
+                centre = off - 0.5 * side * own
+                for place, j in enumerate(self._dependent):
+                    mid = 0.5 * cells.lower[:, j] + 0.5 * cells.upper[:, j]
+                    half = 0.5 * (cells.upper[:, j] - cells.lower[:, j]) * (1 + _ROUNDING)
+                    low = mid + half * np.maximum(centre[:, place] - reach[:, place], -1.0) - _ROUNDING * np.abs(mid)
+                    high = mid + half * np.minimum(centre[:, place] + reach[:, place], 1.0) + _ROUNDING * np.abs(mid)
+                    lower[:, j] = np.where(cells.is_known, np.minimum(low, high), np.nan)
+                    upper[:, j] = np.where(cells.is_known, np.maximum(low, high), np.nan)
+            parts.append(Cells(lower, upper, cells.near, cells.is_known))
+        return joined(parts)

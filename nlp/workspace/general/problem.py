@@ -1,0 +1,307 @@
+"""A robot with fixed dimensions over a workspace: loop equations and matrices in the coordinates of a search.
+
+The coordinates z are those numbers of a :class:`~..posebox.PoseBox` that vary, then the robot's unknowns. Equations
+that follow from others in this workspace are left out. Of the coordinates as many are *dependent* as there are
+equations: all unknowns, and numbers of the pose that a robot with fewer freedoms has no choice of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import FloatArray, Member, Model, Substitution, frozen_array, jacobian
+from ....models.instance import sizes_at
+from ....models.member import scaled_twists
+from ....models.rows import independent_rows
+from ...case.case import Case
+from ...case.pose import Free
+from ...case.workspace import TurnKind
+from ..posebox import PoseBox
+from .assembled import Loops, closed_from_home
+from .matrices import Limbs, RankMatrix, free_matrix, locked_matrix
+
+#: Points of the workspace at which the equations that are needed are found, beside its middle, and the part of the
+#: workspace, about its middle, in which they lie.
+_POINTS, _SPREAD = 4, 0.5
+#: Singular values below this part of the largest are zero at the middle of the workspace.
+_ZERO = 1e-9
+#: Residual up to which a loop is closed; equations are of order 1.
+CLOSED = 1e-9
+_SEED = 0
+
+
+class NotJudgedError(ValueError):
+    """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A robot over a workspace.
+
+    Attributes:
+        box: the poses.
+        z: (n,) symbols of the coordinates.
+        free: indices of the pose's numbers, among the six of the box, that are the first coordinates.
+        size: (n,) by which coordinates are comparable: of the order of their ranges.
+        equations: (k, 1) that hold where the loops are closed.
+        independent, dependent: indices of the coordinates, ``n - k`` and k.
+        start: (n,) closed loops at the middle of the workspace, or near it.
+        locked: rows and members with the actuators locked.
+        unactuated: the same with free actuators; None for a robot without constraints.
+        jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
+        length: of the order of the robot's, length.
+    """
+
+    box: PoseBox
+    z: SX
+    free: tuple[int, ...]
+    size: FloatArray
+    equations: SX
+    independent: tuple[int, ...]
+    dependent: tuple[int, ...]
+    start: FloatArray
+    locked: RankMatrix
+    unactuated: RankMatrix | None
+    jacobian: SX
+    length: float
+
+    def pose_of(self, z: FloatArray) -> FloatArray:
+        """Return the six coordinates of the pose (..., 6) at points (..., n)."""
+        y = np.broadcast_to(0.5 * self.box.lower + 0.5 * self.box.upper, (*z.shape[:-1], 6)).copy()
+        y[..., list(self.free)] = z[..., : len(self.free)]
+        return y
+
+
+def rotation_of(box: PoseBox, turn: SX) -> SX:
+    """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
+    if box.kind is TurnKind.ROLL_PITCH_YAW:
+        about = [_turn(k, turn[k]) for k in range(3)]
+        return about[2] @ about[1] @ about[0]
+    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    scaled = 2 / (1 + ca.sumsqr(r)) * r
+    return SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
+
+
+def _turn(about: int, tangent: SX) -> SX:
+    """Return the rotation about a coordinate axis by an angle, from the tangent of its half."""
+    i, j = (about + 1) % 3, (about + 2) % 3
+    factor = 2 / (1 + tangent * tangent)
+    matrix = SX.eye(3)
+    matrix[i, i] = matrix[j, j] = factor - 1
+    matrix[j, i], matrix[i, j] = factor * tangent, -factor * tangent
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """A model as expressions of the coordinates: Substitution's numbers put in.
+
+    Attributes:
+        z: (n, 1) symbols.
+        free: indices of the pose's numbers.
+        size: (n,) of the coordinates.
+        closure: equations, of order 1.
+        every: all equations of loops, and signs that must be positive.
+        signs: (s, 1) numbers that are positive in home's assembly.
+        limbs: rows, members and actuators.
+        jacobian: (rows, 6) J.
+    """
+
+    z: SX
+    free: tuple[int, ...]
+    size: FloatArray
+    closure: SX
+    every: SX
+    signs: SX
+    limbs: Limbs
+    jacobian: SX
+
+
+def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
+    """Return a robot over a workspace.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot, some of whose unknowns may have been replaced by expressions.
+        box: the poses.
+
+    Raises:
+        NotJudgedError: no closed loops are found in the middle of the workspace, or they leave a joint free.
+    """
+    posed = _posed(case, model, box)
+    count = len(posed.free)
+    loops = Loops(posed.z, posed.closure, posed.every, posed.signs, posed.size)
+    middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(posed.z.numel() - count)])
+    start = closed_from_home(loops, middle, count)
+    if start is None:
+        raise NotJudgedError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
+    needed = _needed(loops, start, count, posed)
+    equations = posed.closure[needed] if needed else SX(0, 1)
+    dependent = _dependent(Loops(posed.z, equations, posed.every, posed.signs, posed.size), start, count)
+    independent = tuple(k for k in range(posed.z.numel()) if k not in dependent)
+    length = _length(posed, start, case, model)
+    members = [_with_independent_screws(each, posed, start, length) for each in posed.limbs.members]
+    limbs = replace(posed.limbs, members=members, length=length)
+    locked = RankMatrix(locked_matrix(limbs), 0)
+    return Problem(
+        box=box,
+        z=posed.z,
+        free=posed.free,
+        size=posed.size,
+        equations=equations,
+        independent=independent,
+        dependent=dependent,
+        start=frozen_array(start, start.shape),
+        locked=locked,
+        unactuated=_unactuated(model, limbs, posed.z, start),
+        jacobian=_about_platform(posed.jacobian, limbs.position, length),
+        length=length,
+    )
+
+
+def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
+    """Return a model as expressions of the coordinates."""
+    free = box.free
+    y = [SX(float(each)) for each in 0.5 * box.lower + 0.5 * box.upper]
+    for k in free:
+        y[k] = SX.sym(f"y{k}")
+    unknowns = [SX.sym(item.name) for item in model.unknowns]
+    rotation, position = rotation_of(box, ca.vertcat(*y[3:])), ca.vertcat(*y[:3])
+    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+    own = Substitution.identity(model)
+    given = Substitution(ca.vertcat(SX(0, 1), *values), ca.vertcat(SX(0, 1), *unknowns), rotation, position)
+    every = (*model.closure, *model.loops)
+    outputs = [
+        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
+        *[part for member in model.members for part in (member.centre, member.screws)],
+        *[each.screw for each in model.actuators],
+        *[each.value for each in model.signs],
+        *[each.expression for each in every],
+    ]
+    following = iter(ca.Function("model", own.all, outputs).call(given.all))
+    wrenches = [
+        replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
+    ]
+    members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
+    actuators = [(each.limb, next(following)) for each in model.actuators]
+    signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
+    sizes = sizes_at(model, (*every, *model.unknowns), tuple(values), SX.ones(len(every) + len(model.unknowns)))
+    scaled = [next(following) / sizes[k] for k in range(len(every))]
+    ranges = (0.5 * (box.upper - box.lower))[list(free)]
+    own_sizes = np.array(ca.DM(sizes[len(every) :, :])).ravel()
+    return _Posed(
+        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
+        free=free,
+        size=np.concatenate([ranges, own_sizes]),
+        closure=ca.vertcat(SX(0, 1), *scaled[: len(model.closure)]),
+        every=ca.vertcat(SX(0, 1), *scaled),
+        signs=signs,
+        limbs=Limbs(wrenches, members, actuators, position, 1.0),
+        jacobian=jacobian(wrenches, SX(1), members),
+    )
+
+
+def _needed(loops: Loops, start: FloatArray, count: int, posed: _Posed) -> list[int]:
+    """Return the indices of the equations that do not follow from others in the workspace."""
+    if not loops.count:
+        return []
+    rng = np.random.default_rng(_SEED)
+    slopes = [loops.slopes(start[:, None])[0] * posed.size]
+    for _ in range(_POINTS):
+        z = start.copy()
+        z[:count] += _SPREAD * posed.size[:count] * rng.uniform(-1, 1, count)
+        found = loops.closed(z, list(range(count, len(z)))) if len(z) > count else z
+        if found is None or not loops.is_closed(found):
+            found = loops.closed(z, list(range(len(z))))
+        if found is not None and loops.is_closed(found):
+            slopes.append(loops.slopes(found[:, None])[0] * posed.size)
+    if not any(np.abs(each).max() > _ZERO for each in slopes):
+        return []
+    return sorted(independent_rows(slopes))
+
+
+def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
+    """Return the coordinates that the equations determine: all unknowns, then numbers of the pose.
+
+    Raises:
+        NotJudgedError: the equations leave an unknown free.
+    """
+    n, k = len(start), loops.count
+    unknowns = list(range(count, n))
+    if k < len(unknowns):
+        raise NotJudgedError("the loops leave a passive joint free")
+    if not k:
+        return ()
+    slopes = loops.slopes(start[:, None])[0] * loops.size
+    own = np.linalg.svd(slopes[:, unknowns], compute_uv=True) if unknowns else None
+    left = slopes[:, :count]
+    if own is not None:
+        basis, values, _ = own
+        if not values[-1] > _ZERO * values[0]:
+            raise NotJudgedError("the loops leave a passive joint free in the middle of the workspace")
+        left = basis[:, len(unknowns) :].T @ left
+    order = sorted(independent_rows([left.T])) if k > len(unknowns) else []
+    if len(order) != k - len(unknowns):
+        raise NotJudgedError("the loops are singular in the middle of the workspace")
+    return (*order, *unknowns)
+
+
+def _length(posed: _Posed, start: FloatArray, case: Case, model: Model) -> float:
+    """Return a length of the order of the robot's: the median arm of its rows and screws about the platform."""
+    p, pairs = posed.limbs.position, []
+    pairs += [(ca.norm_2(r.moment - ca.cross(p, r.force)), ca.norm_2(r.force)) for r in posed.limbs.wrenches]
+    for member in posed.limbs.members:
+        for j in range(member.screws.shape[1]):
+            omega, v = member.screws[:3, j], member.screws[3:, j]
+            pairs.append((ca.norm_2(v + ca.cross(omega, p)), ca.norm_2(omega)))
+    function = ca.Function("arms", [posed.z], [ca.densify(ca.horzcat(*[ca.vertcat(*each) for each in pairs]))])
+    values = function(start).full()
+    arms = [a / b for a, b in values.T if a > _ZERO and b > _ZERO]
+    home = float(np.linalg.norm(model.home))
+    return float(np.median(arms)) if arms else home or case.characteristic_length
+
+
+def _with_independent_screws(member: Member, posed: _Posed, start: FloatArray, length: float) -> Member:
+    """Return a member with as many of its screws as have its rank: they span the others where they are independent.
+
+    Raises:
+        NotJudgedError: its screws have another rank in the middle of the workspace.
+    """
+    if member.rank == member.screws.shape[1]:
+        return member
+    columns = scaled_twists(member.screws, member.centre, SX(length), member.size)
+    values = ca.Function("screws", [posed.z], [ca.densify(columns)])(start).full()
+    chosen = independent_rows([values.T])
+    if len(chosen) != member.rank:
+        raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
+    return replace(member, screws=member.screws[:, sorted(chosen)])
+
+
+def _about_platform(rows: SX, position: SX, length: float) -> SX:
+    """Return rows with moments about the platform's origin, divided by a length."""
+    found = [
+        ca.horzcat(rows[i, :3], (rows[i, 3:] - ca.cross(position, rows[i, :3].T).T) / length)
+        for i in range(rows.shape[0])
+    ]
+    return ca.vertcat(SX(0, 6), *found)
+
+
+def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMatrix | None:
+    """Return rows and members with free actuators; None for a robot without constraints."""
+    if model.generic is not None and model.generic.constraints == 0:
+        return None
+    if not limbs.actuators and model.members:
+        return None
+    matrix = free_matrix(limbs)
+    if not matrix.numel():
+        return None
+    values = np.linalg.svd(ca.Function("free", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
+    rank = int(np.count_nonzero(values > _ZERO * values[0]))
+    nullity = matrix.shape[1] - rank
+    if model.generic is not None:
+        nullity = 6 - model.generic.constraints
+    return RankMatrix(matrix, nullity) if 0 < nullity < 6 else None

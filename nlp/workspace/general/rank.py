@@ -1,0 +1,130 @@
+"""The test of a sparse matrix over boxes: whether it has full column rank at every closed point.
+
+With forms of the entries, in which the dependent coordinates are replaced by their relation to the independent ones,
+``M = M0 + sum_v M_v e_v + [-R, R]``. For any matrix C, here a pseudo-inverse of M0,
+
+    |I - C M| <= |I - C M0| + sum_v |C M_v| + |C| R  entry by entry;
+
+where the right side has a spectral radius below 1, C M has an inverse, and M full column rank.
+
+A matrix whose null space has d dimensions at almost all poses gets d further rows, a basis of the null space at the
+middle of the box: full column rank then means that it has no more dimensions anywhere in the box.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import FloatArray
+from .enclosing import Forms
+from .matrices import RankMatrix
+from .relation import ROUNDING, Relation, are_contractions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class Tested(NamedTuple):
+    """Results for B boxes.
+
+    Attributes:
+        is_regular: (B,) whether the rank is proved to be full.
+        shares: (B, f) share of each independent coordinate in the bound.
+        smallest: (B,) smallest singular value at the middle as a part of the largest: a computed number.
+    """
+
+    is_regular: NDArray[np.bool_]
+    shares: FloatArray
+    smallest: FloatArray
+
+
+class RankTest:
+    """The test of a matrix.
+
+    Args:
+        matrix: the matrix; all that is not constant is an entry of ``entries``.
+        z: (n, 1) symbols of the coordinates.
+        start: (n,) a closed point, at which rows and columns are scaled.
+    """
+
+    def __init__(self, matrix: RankMatrix, z: SX, start: FloatArray) -> None:
+        self.nullity = matrix.nullity
+        whole = matrix.matrix
+        values = ca.Function("start", [z], [ca.densify(whole)])(start).full()
+        sizes = np.linalg.norm(values, axis=1)
+        # A power of two, so that scaling rounds nothing.
+        self._scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
+        self._constant = np.zeros(whole.shape)
+        self._at: tuple[list[int], list[int]] = ([], [])
+        entries = []
+        rows, columns = whole.sparsity().get_triplet()
+        for k, (i, j) in enumerate(zip(rows, columns, strict=True)):
+            entry = whole.nz[k]
+            if entry.is_constant():
+                self._constant[i, j] = float(entry)
+            else:
+                self._at[0].append(i)
+                self._at[1].append(j)
+                entries.append(entry)
+        self.entries: SX = ca.vertcat(SX(0, 1), *entries)
+        self._constant *= self._scale[:, None]
+
+    def examine(self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int]) -> Tested:
+        """Return the verdict on boxes.
+
+        Args:
+            forms: of the entries.
+            relation: of the dependent coordinates.
+            independent: indices of the coordinates that are free.
+            dependent: indices of the others.
+        """
+        c, a, r = forms
+        own, others = a[:, :, dependent], a[:, :, independent]
+        size = np.abs(own)
+        with np.errstate(all="ignore"):
+            middle = c + (own @ relation.off[:, :, None])[:, :, 0]
+            slope = others - own @ relation.T
+            rest = r + (size @ relation.rho[:, :, None])[:, :, 0]
+            terms = np.abs(c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
+            rest = rest * (1 + ROUNDING) + ROUNDING * terms
+        count, f = len(c), len(independent)
+        M0 = np.broadcast_to(self._constant, (count, *self._constant.shape)).copy()
+        R = np.zeros_like(M0)
+        at, scale = self._at, self._scale[self._at[0]]
+        M0[:, at[0], at[1]] += middle * scale
+        R[:, at[0], at[1]] = rest * scale
+        M = np.zeros((count, f, *self._constant.shape))
+        M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
+        known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
+        known &= np.isfinite(M).all(axis=(1, 2, 3))
+        M0[~known], M[~known] = 0.0, 0.0
+        return self._judged(M0, M, np.where(known[:, None, None], R, np.inf))
+
+    def _judged(self, M0: FloatArray, M: FloatArray, R: FloatArray) -> Tested:
+        """Return the verdict from middles (B, m, c), linear parts (B, f, m, c) and rests (B, m, c)."""
+        columns = M0.shape[2]
+        _, values, right = np.linalg.svd(M0, full_matrices=True)
+        rank = columns - self.nullity
+        if self.nullity:
+            extra = right[:, rank:]
+            M0 = np.concatenate([M0, extra], axis=1)
+            M = np.concatenate([M, np.zeros((*M.shape[:2], *extra.shape[1:]))], axis=2)
+            R = np.concatenate([R, np.zeros_like(extra)], axis=1)
+        with np.errstate(all="ignore"):
+            smallest = (
+                np.nan_to_num(values[:, rank - 1] / values[:, 0]) if values.shape[1] >= rank else np.zeros(len(M0))
+            )
+            C = np.linalg.pinv(M0, rcond=1e-14)
+            size = np.abs(C)
+            linear = np.abs(C[:, None] @ M)
+            B = np.abs(C @ M0 - np.eye(columns)) + linear.sum(axis=1) + size @ R
+            # Products of fewer than 400 terms, and a sum.
+            B += ROUNDING * (size @ (np.abs(M0) + np.abs(M).sum(axis=1)))
+            B = np.where(np.isfinite(B), B, np.inf)
+            is_regular, v = are_contractions(B * (1 + ROUNDING))
+            shares = (linear * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
+        return Tested(is_regular, np.nan_to_num(shares), smallest)
