@@ -72,7 +72,9 @@ def expected_claims(
     found = [ExpectedClaim(REGULAR, "", "regular")]
     # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
     numbers: dict[tuple[str, str], Claim] = {}
-    for each in claims_of(layout, quantities):
+    # Singular values that no limit asks for have no proof on paper.
+    named = [name for name in quantities if name not in (SmallestSingularValue.key, ConditionNumber.key)]
+    for each in claims_of(layout, named):
         numbers.setdefault((each.name, each.sense.value), each)
     found += [ExpectedClaim(*key, "number", each.limit, each) for key, each in numbers.items()]
     if legs is None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...certificate.proof import fingerprint
+from ..closedform import closed_form
 from ..machine import Legs, legs_of
 from ..posed import posed_layout
 from ..verdict import Outcome
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 _OUTWARDS = 1e-6
 #: Reason of every claim about a case with a tolerance for joint centres.
 _AS_BUILT = "it is about every machine within the tolerance of joint centres, and proofs are about the exact machine"
+#: Reasons of claims about other robots than six straight legs.
+_NO_RULES = "claims of this kind have no proof on paper"
+_CLOSED = "it was bounded with passive joints in closed form, which the checker of proofs does not know"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
@@ -44,9 +48,13 @@ def paper_of(
     first = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
     proved: dict[tuple[str, str], PaperClaim] = {}
     unproved = []
-    for each in expected_claims(judged.case, layout, legs, quantities, leg_error):
+    expected = expected_claims(judged.case, layout, legs, quantities, leg_error)
+    for each in expected:
         if judged.case.joint_centre_tolerance:
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
+            continue
+        if each.kind == "number" and legs is None and closed_form(judged.case.model).reaches:
+            unproved.append(Unproved(each.name, each.sense, _CLOSED))
             continue
         extremes = first if each.kind == "number" else last
         found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
@@ -54,6 +62,10 @@ def paper_of(
             proved[each.key] = found
         else:
             unproved.append(Unproved(each.name, each.sense, found))
+    known = {each.key for each in expected}
+    names = [] if judged.constraints is None else [("constraints regular", "")]
+    names += [(each.name, each.sense.value) for each in judged.extremes]
+    unproved += [Unproved(*key, _NO_RULES) for key in names if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
     missing = [each for each in ERRORS if (each, "max") not in proved]
     if len(missing) == 1:
@@ -80,8 +92,8 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
 def _regular(judged: Judgement, record: PaperRecord) -> PaperClaim | str:
     """Return the claim that J has full rank with its proof, or why there is none."""
     found = judged.regularity
-    if found is None:
-        return "regular poses are proved for robots with six straight legs only"
+    if legs_of(judged.case) is None:
+        return "proofs of regular poses are written for robots with six straight legs"
     if found.outcome is Outcome.PROVED:
         return PaperClaim("regular", "", "regular", tree=record.rank.tree())
     if found.outcome is Outcome.REFUTED and found.sides is not None:
