@@ -2,24 +2,44 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Circle, Patch, Rectangle
+from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
-from ...workspace.slices import Region, Slice
+from ...results.rounding import number
+from ...workspace.slices import KEPT, UNDECIDED, Region, Slice
 from .canvas import INK, MUTED
 from .figures import picture_of
+from .fonts import legible
 
-#: Width and height of one slice, inches.
-_SIZE = (3.2, 3.3)
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Width and height of one slice, and height of a line of the legend, inches.
+_SIZE, _LINE = (3.2, 3.02), 0.185
 _COLUMNS = 3
-_COLOURS = {Region.REGULAR: "#a9d2ae", Region.BEYOND: "#b34700", Region.OPEN: "#e8c35a"}
+_GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
+#: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
+_LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e6d96c", "#bf9b7a")
+#: Points on each side of a box that is drawn curved.
+_CURVED = 2
+
+
+class _Kind(NamedTuple):
+    """A kind of boxes: its words in the legend, which are the ``gid`` of its boxes too, colour and hatch."""
+
+    words: str
+    colour: str
+    hatch: str = ""
 
 
 def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
@@ -34,48 +54,144 @@ def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
-    """Return the slices as a Matplotlib figure; the boxes of each region carry its name as ``gid``."""
+    """Return the slices as a Matplotlib figure; the boxes of each kind carry its words as ``gid``."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
-    figure = Figure(figsize=(_SIZE[0] * columns, _SIZE[1] * rows + 0.6), facecolor="white", layout="constrained")
+    kinds = _kinds(case, slices)
+    used: dict[_Kind, None] = {}
+    notes = _notes(slices)
+    across = min(2, columns)
+    lines = -(-(len(kinds) + 1) // across) + len(notes)
+    size = _SIZE[0] * columns, _SIZE[1] * rows + 0.6 + _LINE * lines
+    figure = Figure(figsize=size, facecolor="white", layout="constrained")
     for k, each in enumerate(slices):
         axes = figure.add_subplot(rows, columns, k + 1)
-        for region, colour in _COLOURS.items():
-            chosen = [box for box, own in zip(each.boxes, each.regions, strict=True) if own is region]
-            if chosen:
-                outlines = [_outline(case, each, box) for box in chosen]
-                axes.add_collection(
-                    PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.2, gid=region.value)
-                )
-        low, high = (_shown(case, each, end) for end in each.whole)
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        inner, outer = (_shown(case, each, end) for end in each.workspace)
-        axes.add_patch(
-            Rectangle((inner[0], inner[1]), *(outer - inner), fill=False, edgecolor=INK, linewidth=1.2, gid="workspace")
-        )
-        dimensions = [Dimension.ANGLE if is_angle else Dimension.LENGTH for is_angle in each.are_angles]
-        labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
-        axes.set_xlabel(labels[0], color=INK, parse_math=False)
-        axes.set_ylabel(labels[1], color=INK, parse_math=False)
-        axes.tick_params(colors=INK, labelsize=8)
-        for spine in axes.spines.values():
-            spine.set_edgecolor(MUTED)
-    title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
-    figure.suptitle(f"{title}: slices through the middle of the workspace", fontsize=10, color=INK, parse_math=False)
-    handles = [Patch(facecolor=colour, label=region.value) for region, colour in _COLOURS.items()]
-    handles.append(Patch(facecolor="none", edgecolor=INK, label="workspace"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+        axes.set_box_aspect(1)
+        for kind, layer in _layers(each, kinds):
+            if not layer.members.any():
+                continue
+            used[kind] = None
+            edges = {
+                "edgecolors": kind.colour if layer.is_filled else INK,
+                "linewidths": 0.3 if layer.is_filled else 0.0,
+            }
+            outlines = _outlines(case, each, each.boxes[layer.members])
+            boxes = PolyCollection(
+                outlines, facecolors=kind.colour if layer.is_filled else "none", gid=kind.words, **edges
+            )
+            if not layer.is_filled:
+                boxes.set_hatch(kind.hatch)
+            axes.add_collection(boxes)
+        _frame(axes, case, each)
+    title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
+    words = [*title, "slices through the middle of the workspace"]
+    figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
+    handles = [
+        Patch(facecolor=kind.colour, edgecolor=INK, linewidth=0.4, hatch=kind.hatch, label=legible(kind.words))
+        for kind in kinds
+        if kind in used
+    ]
+    handles.append(Patch(facecolor="none", edgecolor=INK, linewidth=1.6, label="workspace"))
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=across,
+        frameon=False,
+        fontsize=8,
+        labelcolor=INK,
+        title="\n".join(map(legible, notes)) or None,
+        title_fontproperties={"size": 8},
+        alignment="left",
+    )
     return figure
 
 
-def _shown(case: Case, each: Slice, point: FloatArray) -> FloatArray:
-    """Return a point (2,) of a slice in the case's units."""
-    parts = zip(point, each.are_angles, strict=True)
-    return np.array([case.units.shown(float(v), Dimension.ANGLE if a else Dimension.LENGTH) for v, a in parts])
+def _kinds(case: Case, slices: Sequence[Slice]) -> list[_Kind]:
+    """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
+    limits = slices[0].limits
+    kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
+    kinds = [_Kind(kept, _GREEN)]
+    for k, limit in enumerate(limits):
+        value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
+        how = "" if limit.is_enclosed else " at samples"
+        kinds.append(_Kind(f"violated{how}: {limit.key} = {value}", _LIMITS[k % len(_LIMITS)]))
+    if limits:
+        kinds.append(_Kind("limits open", _PALE))
+    return [*kinds, _Kind(Region.BEYOND.value, _ORANGE, "////"), _Kind(Region.OPEN.value, _BAND)]
 
 
-def _outline(case: Case, each: Slice, box: FloatArray) -> FloatArray:
-    """Return the corners (4, 2) of a box in the case's units."""
-    (a, b), (c, d) = _shown(case, each, box[:2]), _shown(case, each, box[2:])
-    return np.array([[a, b], [c, b], [c, d], [a, d]])
+class _Layer(NamedTuple):
+    """Which boxes (B,) of a slice are painted, and whether they are filled or hatched."""
+
+    members: NDArray[np.bool_]
+    is_filled: bool = True
+
+
+def _layers(each: Slice, kinds: Sequence[_Kind]) -> Iterator[tuple[_Kind, _Layer]]:
+    """Yield the kinds of boxes of a slice, the lowest layer first."""
+    regions = np.array([region.value for region in each.regions])
+    is_beyond, is_singular = regions == Region.BEYOND.value, regions == Region.OPEN.value
+    kept, *limits = kinds[: 1 + len(each.limits)]
+    *opened, beyond, band = kinds[1 + len(each.limits) :]
+    yield kept, _Layer((each.binding == KEPT) & ~is_beyond)
+    for k, kind in enumerate(limits):
+        yield kind, _Layer(each.binding == k)
+    for kind in opened:
+        yield kind, _Layer(each.binding == UNDECIDED)
+    yield beyond, _Layer((each.binding == KEPT) & is_beyond)
+    yield beyond, _Layer(is_beyond, is_filled=False)
+    yield band, _Layer(is_singular)
+
+
+def _notes(slices: Sequence[Slice]) -> list[str]:
+    """Return sentences about limits that the slices do not show, and about the limit that a box is coloured by."""
+    left_out = dict.fromkeys(key for each in slices for key in each.left_out)
+    notes = [f"not drawn: {', '.join(left_out)}"] if left_out else []
+    if len(slices[0].limits) > 1:
+        notes.append("where several limits are violated: the first on the straight way from the middle")
+    return notes
+
+
+def _frame(axes: Axes, case: Case, each: Slice) -> None:
+    """Draw the outline of the workspace, and name the axes of a slice."""
+    inner, outer = (_shown(case, each, end) for end in each.workspace)
+    outline = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
+    if each.ball is None:
+        low, high = (_shown(case, each, end) for end in each.whole)
+        axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
+    else:
+        # The corners of the slice are nearest to its middle.
+        corner = np.abs(_shown(case, each, each.whole[1]))
+        low, high = -corner, corner
+        axes.add_patch(Circle((0.0, 0.0), case.units.shown(each.ball, Dimension.ANGLE), **outline))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    dimensions = [Dimension.ANGLE if is_angle else Dimension.LENGTH for is_angle in each.are_angles]
+    labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
+    axes.set_xlabel(legible(labels[0]), color=INK, fontsize=9, parse_math=False)
+    axes.set_ylabel(legible(labels[1]), color=INK, fontsize=9, parse_math=False)
+    axes.tick_params(colors=INK, labelsize=8)
+    for spine in axes.spines.values():
+        spine.set_edgecolor(MUTED)
+
+
+def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
+    """Return points (..., 2) of a slice in the case's units; of rotations about any axis the rotation vector."""
+    points = np.array(points)
+    if each.ball is not None:
+        cayley = np.tan(points / 2)
+        size = np.linalg.norm(cayley, axis=-1, keepdims=True)
+        points = np.where(size > 0, 2 * np.arctan(size) / np.where(size > 0, size, 1.0), 2.0) * cayley
+    scale = [case.units.shown(1.0, Dimension.ANGLE if is_angle else Dimension.LENGTH) for is_angle in each.are_angles]
+    return points * np.array(scale)
+
+
+def _outlines(case: Case, each: Slice, boxes: FloatArray) -> FloatArray:
+    """Return outlines (B, k, 2) of boxes (B, 4) in the case's units."""
+    a, b, c, d = boxes.T
+    corners = [(a, b), (c, b), (c, d), (a, d), (a, b)]
+    count = 1 if each.ball is None else _CURVED
+    points = []
+    for (x, y), (u, v) in itertools.pairwise(corners):
+        points += [np.column_stack([x + part * (u - x), y + part * (v - y)]) for part in np.arange(count) / count]
+    return _shown(case, each, np.stack(points, axis=1))
