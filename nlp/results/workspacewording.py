@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.case import Case
@@ -11,6 +11,7 @@ from ..workspace.verdict import Outcome
 from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
+from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
     from .workspace import (
@@ -35,8 +36,16 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
         yield Line(words, label="lengths of legs", after=", at no pose shorter or longer")
 
 
-def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine over its workspace."""
+def workspace_summary(
+    case: Case, result: WorkspaceResult, command: Callable[[WorkspacePose], str] | None = None
+) -> Iterator[Line | TextTable]:
+    """Yield the verdicts on a machine over its workspace.
+
+    Args:
+        case: the case.
+        result: the verdicts.
+        command: returns the command that shows a pose; left out, none is named.
+    """
     yield title_line(case)
     if result.regular is None:
         yield Line("open", label="regular", tone=Tone.CAUTION, after=": proved only for robots with six straight legs")
@@ -44,19 +53,12 @@ def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | Te
         yield from _regular_lines(case, result.regular)
     yield from _tables(case, result.extremes)
     yield from _needs_line(case, result)
+    if command is not None:
+        yield from seeing_lines(result, command)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
     words = "everything is proved for every pose" if result.proved else "not everything is proved"
     yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
-
-
-def setting_words(pose: WorkspacePose) -> str:
-    """Return the options of ``evaluate`` that show a pose."""
-    values = zip(("p_x", "p_y", "p_z"), pose.position, strict=True)
-    words = [f"--set {name}={value:.10g}" for name, value in values]
-    return " ".join(
-        [*words, f"--set axis={','.join(f'{part:.10g}' for part in pose.axis)}", f"--set angle={pose.angle:.10g}"]
-    )
 
 
 def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
@@ -90,7 +92,7 @@ def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
             yield _table(case, name, title, rows)
 
 
-def _pose_words(case: Case, pose: WorkspacePose) -> str:
+def pose_words(case: Case, pose: WorkspacePose) -> str:
     """Return a pose in a few words."""
     position = ", ".join(f"{value:.5g}" for value in pose.position)
     if abs(pose.angle) <= 1e-9:  # rounding of a rotation that is none
@@ -109,9 +111,7 @@ def _regular_lines(case: Case, regular: RegularData) -> Iterator[Line]:
     }
     yield Line(regular.outcome.value, label="regular", tone=_TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
-        yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
-    if regular.outcome is Outcome.REFUTED and regular.pose is not None:
-        yield Line(f"evaluate {case.name} {setting_words(regular.pose)}", label="see it with")
+        yield Line(pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
     word = "box" if regular.boxes == 1 else "boxes"
     yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label="search")
 
@@ -132,7 +132,7 @@ def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTa
                 "" if each.bound is None else number(each.bound),
                 "" if each.reached is None else number(each.reached),
                 *known,
-                "" if each.pose is None else _pose_words(case, each.pose),
+                "" if each.pose is None else pose_words(case, each.pose),
             )
         )
     limits = () if name == "ranges" else ("limit",)
@@ -145,5 +145,5 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
     yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=" times the box is proved")
     if scale.claim:
         beyond = "" if scale.refuted is None else f"at {scale.refuted:.4g} times: "
-        at = "" if scale.pose is None else f", at {_pose_words(case, scale.pose)}"
+        at = "" if scale.pose is None else f", at {pose_words(case, scale.pose)}"
         yield Line(f"{beyond}{scale.claim}{at}", label="beyond")

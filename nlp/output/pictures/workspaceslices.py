@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 #: Width and height of one slice, and height of a line of the legend, inches.
 _SIZE, _LINE = (3.2, 3.02), 0.185
 _COLUMNS = 3
+#: Width and height of a slice by itself, inches.
+_ALONE = 4.2
 _GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
 #: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
 _LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e6d96c", "#bf9b7a")
@@ -34,7 +37,7 @@ _LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e
 _CURVED = 2
 
 
-class _Kind(NamedTuple):
+class Kind(NamedTuple):
     """A kind of boxes: its words in the legend, which are the ``gid`` of its boxes too, colour and hatch."""
 
     words: str
@@ -57,39 +60,19 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     """Return the slices as a Matplotlib figure; the boxes of each kind carry its words as ``gid``."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
-    kinds = _kinds(case, slices)
-    used: dict[_Kind, None] = {}
-    notes = _notes(slices)
+    entries, notes = slices_legend(case, slices), slices_notes(slices)
     across = min(2, columns)
-    lines = -(-(len(kinds) + 1) // across) + len(notes)
+    lines = -(-(len(entries) + 1) // across) + len(notes)
     size = _SIZE[0] * columns, _SIZE[1] * rows + 0.6 + _LINE * lines
     figure = Figure(figsize=size, facecolor="white", layout="constrained")
     for k, each in enumerate(slices):
-        axes = figure.add_subplot(rows, columns, k + 1)
-        axes.set_box_aspect(1)
-        for kind, layer in _layers(each, kinds):
-            if not layer.members.any():
-                continue
-            used[kind] = None
-            edges = {
-                "edgecolors": kind.colour if layer.is_filled else INK,
-                "linewidths": 0.3 if layer.is_filled else 0.0,
-            }
-            outlines = _outlines(case, each, each.boxes[layer.members])
-            boxes = PolyCollection(
-                outlines, facecolors=kind.colour if layer.is_filled else "none", gid=kind.words, **edges
-            )
-            if not layer.is_filled:
-                boxes.set_hatch(kind.hatch)
-            axes.add_collection(boxes)
-        _frame(axes, case, each)
+        _paint(figure.add_subplot(rows, columns, k + 1), case, each)
     title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
     words = [*title, "slices through the middle of the workspace"]
     figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
     handles = [
         Patch(facecolor=kind.colour, edgecolor=INK, linewidth=0.4, hatch=kind.hatch, label=legible(kind.words))
-        for kind in kinds
-        if kind in used
+        for kind in entries
     ]
     handles.append(Patch(facecolor="none", edgecolor=INK, linewidth=1.6, label="workspace"))
     figure.legend(
@@ -106,50 +89,82 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     return figure
 
 
-def _kinds(case: Case, slices: Sequence[Slice]) -> list[_Kind]:
-    """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
-    limits = slices[0].limits
-    kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
-    kinds = [_Kind(kept, _GREEN)]
-    for k, limit in enumerate(limits):
-        value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
-        how = "" if limit.is_enclosed else " at samples"
-        kinds.append(_Kind(f"violated{how}: {limit.key} = {value}", _LIMITS[k % len(_LIMITS)]))
-    if limits:
-        kinds.append(_Kind("limits open", _PALE))
-    return [*kinds, _Kind(Region.BEYOND.value, _ORANGE, "////"), _Kind(Region.OPEN.value, _BAND)]
+def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
+    """Return a PNG picture of each slice without words around it, for pages that have their own legend."""
+
+    def alone(each: Slice) -> Figure:
+        figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white", layout="constrained")
+        _paint(figure.add_subplot(), case, each)
+        return figure
+
+    return [picture_of(partial(alone, each), ".png") for each in slices]
 
 
-class _Layer(NamedTuple):
-    """Which boxes (B,) of a slice are painted, and whether they are filled or hatched."""
-
-    members: NDArray[np.bool_]
-    is_filled: bool = True
-
-
-def _layers(each: Slice, kinds: Sequence[_Kind]) -> Iterator[tuple[_Kind, _Layer]]:
-    """Yield the kinds of boxes of a slice, the lowest layer first."""
-    regions = np.array([region.value for region in each.regions])
-    is_beyond, is_singular = regions == Region.BEYOND.value, regions == Region.OPEN.value
-    kept, *limits = kinds[: 1 + len(each.limits)]
-    *opened, beyond, band = kinds[1 + len(each.limits) :]
-    yield kept, _Layer((each.binding == KEPT) & ~is_beyond)
-    for k, kind in enumerate(limits):
-        yield kind, _Layer(each.binding == k)
-    for kind in opened:
-        yield kind, _Layer(each.binding == UNDECIDED)
-    yield beyond, _Layer((each.binding == KEPT) & is_beyond)
-    yield beyond, _Layer(is_beyond, is_filled=False)
-    yield band, _Layer(is_singular)
+def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
+    """Return the kinds of boxes that slices have, in the order in which they are painted."""
+    kinds = _kinds(case, slices[0])
+    members = [[layer.members.any() for layer in _layers(each, kinds)] for each in slices]
+    shown = {layer.kind for row in members for layer, used in zip(_layers(slices[0], kinds), row, strict=True) if used}
+    return [kind for kind in kinds if kind in shown]
 
 
-def _notes(slices: Sequence[Slice]) -> list[str]:
+def slices_notes(slices: Sequence[Slice]) -> list[str]:
     """Return sentences about limits that the slices do not show, and about the limit that a box is coloured by."""
     left_out = dict.fromkeys(key for each in slices for key in each.left_out)
     notes = [f"not drawn: {', '.join(left_out)}"] if left_out else []
     if len(slices[0].limits) > 1:
         notes.append("where several limits are violated: the first on the straight way from the middle")
     return notes
+
+
+def _paint(axes: Axes, case: Case, each: Slice) -> None:
+    """Paint the boxes of a slice, the outline of the workspace, and the names of the axes."""
+    axes.set_box_aspect(1)
+    for kind, members, is_filled in _layers(each, _kinds(case, each)):
+        if members.any():
+            style = {"facecolors": kind.colour, "edgecolors": kind.colour, "linewidths": 0.3}
+            if not is_filled:
+                style = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.0, "hatch": kind.hatch}
+            axes.add_collection(PolyCollection(_outlines(case, each, each.boxes[members]), gid=kind.words, **style))
+    _frame(axes, case, each)
+
+
+def _kinds(case: Case, each: Slice) -> list[Kind]:
+    """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
+    limits = each.limits
+    kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
+    kinds = [Kind(kept, _GREEN)]
+    for k, limit in enumerate(limits):
+        value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
+        how = "" if limit.is_enclosed else " at samples"
+        kinds.append(Kind(f"violated{how}: {limit.key} = {value}", _LIMITS[k % len(_LIMITS)]))
+    if limits:
+        kinds.append(Kind("limits open", _PALE))
+    return [*kinds, Kind(Region.BEYOND.value, _ORANGE, "////"), Kind(Region.OPEN.value, _BAND)]
+
+
+class _Layer(NamedTuple):
+    """Boxes (B,) of a slice that are painted in one way: filled or hatched."""
+
+    kind: Kind
+    members: NDArray[np.bool_]
+    is_filled: bool = True
+
+
+def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
+    """Return the layers of a slice, the lowest first; a box may be in two."""
+    regions = np.array([region.value for region in each.regions])
+    is_beyond, is_singular = regions == Region.BEYOND.value, regions == Region.OPEN.value
+    kept, *limits = kinds[: 1 + len(each.limits)]
+    *opened, beyond, band = kinds[1 + len(each.limits) :]
+    return [
+        _Layer(kept, (each.binding == KEPT) & ~is_beyond),
+        *(_Layer(kind, each.binding == k) for k, kind in enumerate(limits)),
+        *(_Layer(kind, each.binding == UNDECIDED) for kind in opened),
+        _Layer(beyond, (each.binding == KEPT) & is_beyond),
+        _Layer(beyond, is_beyond, is_filled=False),
+        _Layer(band, is_singular),
+    ]
 
 
 def _frame(axes: Axes, case: Case, each: Slice) -> None:
