@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,11 +28,20 @@ class PosedClaim(NamedTuple):
         words: the claim, and its value there.
         outcome: of the claim over the workspace.
         pose: the pose.
+        key: dotted key, below ``limits``, of the limit in the case; empty for regular poses and without a limit.
+        beyond: part of the limit by which it is passed; negative where it is kept.
     """
 
     words: str
     outcome: Outcome
     pose: WorkspacePose
+    key: str = ""
+    beyond: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The claim alone."""
+        return self.words.partition(":")[0]
 
 
 def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
@@ -88,15 +98,27 @@ def evaluate_command(
 
 
 def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
-    """Yield the commands that show what refutes each claim.
+    """Yield the commands that show what refutes claims: of each limit the claim that is farthest beyond it.
 
     Args:
         result: of judging the workspace.
         command: returns the command that shows a pose.
     """
-    for each in refuted_claims(result):
+    claims = list(refuted_claims(result))
+    farthest: dict[str, float] = {}
+    for each in claims:
+        farthest[each.key] = max(each.beyond, farthest.get(each.key, each.beyond))
+    shown: dict[str, list[PosedClaim]] = {}
+    for each in claims:
+        own = shown.setdefault(each.key, [])
+        if each.beyond == farthest[each.key] and (not own or own[0].name == each.name):
+            own.append(each)
+    for each in itertools.chain.from_iterable(shown.values()):
         yield Line(each.words, label="refuted")
         yield Line(command(each.pose), label="see it with", is_command=True)
+    left = len({each.name for each in claims}) - len(shown)
+    if left:
+        yield Line(f"{left}, whose poses --html FILE lists", label="other refuted claims")
 
 
 def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim]:
@@ -109,9 +131,15 @@ def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim
         for own in _lengths(result.extremes, limb):
             if own.pose is not None:
                 end = "shortest" if own.sense is Sense.MIN else "longest"
-                yield PosedClaim(f"{each.name}:{value}{limit}; limb {limb} at its {end}", each.outcome, own.pose)
+                yield PosedClaim(
+                    f"{each.name}:{value}{limit}; limb {limb} at its {end}",
+                    each.outcome,
+                    own.pose,
+                    each.key,
+                    _beyond(each),
+                )
     elif each.pose is not None:
-        yield PosedClaim(f"{each.name}:{value}{limit}", each.outcome, each.pose)
+        yield PosedClaim(f"{each.name}:{value}{limit}", each.outcome, each.pose, each.key or "", _beyond(each))
 
 
 def _lengths(extremes: Sequence[ExtremeData], limb: str) -> list[ExtremeData]:

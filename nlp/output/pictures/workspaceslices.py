@@ -6,12 +6,12 @@ import itertools
 import textwrap
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
@@ -30,6 +30,8 @@ _SIZE, _LINE = (3.2, 3.02), 0.185
 _COLUMNS = 3
 #: Width and height of a slice by itself, inches.
 _ALONE = 4.2
+#: Place of its axes, left, bottom, width and height, as parts of it.
+_PLACE = (0.16, 0.13, 0.82, 0.82)
 _GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
 #: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
 _LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e6d96c", "#bf9b7a")
@@ -93,8 +95,9 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
     """Return a PNG picture of each slice without words around it, for pages that have their own legend."""
 
     def alone(each: Slice) -> Figure:
-        figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white", layout="constrained")
-        _paint(figure.add_subplot(), case, each)
+        figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white")
+        # The same place in each picture, so that slices side by side stand in line.
+        _paint(figure.add_axes(_PLACE), case, each)
         return figure
 
     return [picture_of(partial(alone, each), ".png") for each in slices]
@@ -122,10 +125,10 @@ def _paint(axes: Axes, case: Case, each: Slice) -> None:
     axes.set_box_aspect(1)
     for kind, members, is_filled in _layers(each, _kinds(case, each)):
         if members.any():
-            style = {"facecolors": kind.colour, "edgecolors": kind.colour, "linewidths": 0.3}
+            style: dict[str, Any] = {"facecolor": kind.colour, "edgecolor": kind.colour, "linewidth": 0.3}
             if not is_filled:
-                style = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.0, "hatch": kind.hatch}
-            axes.add_collection(PolyCollection(_outlines(case, each, each.boxes[members]), gid=kind.words, **style))
+                style = {"facecolor": "none", "edgecolor": INK, "linewidth": 0.0, "hatch": kind.hatch}
+            axes.add_patch(PathPatch(_path(_outlines(case, each, each.boxes[members])), gid=kind.words, **style))
     _frame(axes, case, each)
 
 
@@ -199,6 +202,14 @@ def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
         points = np.where(size > 0, 2 * np.arctan(size) / np.where(size > 0, size, 1.0), 2.0) * cayley
     scale = [case.units.shown(1.0, Dimension.ANGLE if is_angle else Dimension.LENGTH) for is_angle in each.are_angles]
     return points * np.array(scale)
+
+
+def _path(outlines: FloatArray) -> Path:
+    """Return outlines (B, k, 2) as one path, which is a tenth as long in a file as so many polygons."""
+    count, points, _ = outlines.shape
+    closed = np.concatenate([outlines, outlines[:, :1]], axis=1).reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * (points - 1), Path.CLOSEPOLY], count)
+    return Path(closed, codes)
 
 
 def _outlines(case: Case, each: Slice, boxes: FloatArray) -> FloatArray:

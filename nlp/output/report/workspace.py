@@ -16,6 +16,7 @@ from ...results.workspace import WorkspacePose, WorkspaceResult
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, workspace_summary
 from ...workspace.slices import Slice
+from ...workspace.verdict import Outcome
 from ..pictures.figures import picture
 from ..pictures.workspacepose import drawing_at
 from ..pictures.workspaceslices import Kind, slice_images, slices_legend, slices_notes
@@ -47,18 +48,19 @@ def workspace_page(report: WorkspaceReport) -> str:
     title = case.title or case.name
     found = [
         ("verdicts", "Verdicts", _verdicts(report)),
-        ("refuted", "Poses that refute a claim", _refuted(report)),
         ("robot", "The robot at its worst pose", _robot(report)),
         ("slices", "Slices of the workspace", _slices(report)),
+        ("refuted", "Poses that refute a claim", _refuted(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
     sections = [each for each in found if each[2]]
-    words = "Everything is proved for every pose." if result.proved else "Not everything is proved."
     parts = {
         "title": tag("title", f"{title} - workspace - screwsynth"),
         "heading": tag("h1", title),
         "subtitle": tag("p", f"{case.name}, robot {case.model.name}: the whole workspace", class_="subtitle"),
-        "answer": tag("div", paragraphs([words]), class_="answer" if result.proved else "answer none", id="answer"),
+        "answer": tag(
+            "div", paragraphs([_answer(result)]), class_="answer" if result.proved else "answer none", id="answer"
+        ),
         "contents": tag("ul", *(tag("li", tag("a", heading, href=f"#{key}")) for key, heading, _ in sections)),
         "body": join_markup(
             tag("section", tag("h2", heading, id=f"{key}-heading"), content, id=key, aria_labelledby=f"{key}-heading")
@@ -70,6 +72,16 @@ def workspace_page(report: WorkspaceReport) -> str:
         "plotly": "",
     }
     return Template(_file("report.html.in")).substitute(parts)
+
+
+def _answer(result: WorkspaceResult) -> str:
+    """Return the verdict in one sentence."""
+    if result.proved:
+        return "Everything is proved for every pose."
+    outcomes = [each.outcome for each in result.extremes]
+    outcomes.append(Outcome.OPEN if result.regular is None else result.regular.outcome)
+    counts = [f"{outcomes.count(each)} {each.value}" for each in (Outcome.REFUTED, Outcome.OPEN)]
+    return f"Not everything is proved: {' and '.join(counts)} of {len(outcomes)} claims."
 
 
 def _verdicts(report: WorkspaceReport) -> Markup:
