@@ -54,9 +54,23 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         table[place][end] = value
         return
     if name not in places:
-        raise CaseError(name, f"cannot be set; {nearest(name, [*places, *rotations])}")
+        raise CaseError(name, f"cannot be set; {_allowed(name, tables, _Places(places, rotations))}")
     table, place = places[name]
     table[place] = value
+
+
+def _allowed(name: str, tables: Mapping[str, Any], known: _Places) -> str:
+    """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
+    free = [each for each, (table, place) in known.places.items() if isinstance(table[place], dict)]
+    ends = [f"{each}.{end}" for each in free for end in _ENDS]
+    tasks = sorted(task_numbers(tables), key=len)
+    others = [
+        *(f"ends of free numbers such as {each}" for each in ends[1:2]),
+        "limits such as limits.leg_length.max",
+        *(f"numbers of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
+    ]
+    hint = nearest(name, [*known.places, *known.rotations], [*ends, *tasks])
+    return f"{hint}; also {', '.join(others)}"
 
 
 def task_numbers(tables: Mapping[str, Any]) -> dict[str, tuple[Any, int | str]]:

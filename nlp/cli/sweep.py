@@ -11,6 +11,7 @@ from .numbers import WholeNumber
 from .options import CaseName, Jobs, Seed, SettingTexts, check_picture, read_settings
 
 if TYPE_CHECKING:
+    from ..errors import CaseError, InputError
     from ..sweep.points import Points
     from ..sweep.sweep import Sweep
 
@@ -51,7 +52,7 @@ def sweep(
 ) -> None:
     """Solve at thousands of values of fixed numbers."""
     from ..case.reader import read_case
-    from ..errors import InputError
+    from ..errors import CaseError, InputError
     from ..interruption import say_on_leaving
     from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
@@ -76,7 +77,10 @@ def sweep(
 
         inputs[Path(points)] = "the file of the points"
     check_outputs(inputs, {"--out": out, "--plot": plot})
-    found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed)
+    try:
+        found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed)
+    except CaseError as error:
+        raise _in_points(error, chosen, points) from None
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
@@ -105,6 +109,15 @@ def sweep(
             write_table(out, found, journal.rows())
             journal.remove()
     raise typer.Exit(_show(found, out, plot))
+
+
+def _in_points(error: CaseError, chosen: Points, file: str | None) -> CaseError | InputError:
+    """Return an error about a column of the file of the points with the name of this file."""
+    from ..errors import InputError
+
+    if file is None or error.key not in chosen.names:
+        return error
+    return InputError(f"{file}: column {error.key}: {error.fault}")
 
 
 def _read_points(over: list[str] | None, file: str | None) -> Points:

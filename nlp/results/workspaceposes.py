@@ -90,7 +90,13 @@ def evaluate_command(
         prefix: of the names of the numbers of the case's first pose.
     """
     p_x, p_y, p_z = pose.position
-    numbers = {"p_x": p_x, "p_y": p_y, "p_z": p_z, "axis": list(pose.axis), "angle": pose.angle}
+    numbers: dict[str, float | list[float]] = {
+        "p_x": p_x,
+        "p_y": p_y,
+        "p_z": p_z,
+        "axis": list(pose.axis),
+        "angle": pose.angle,
+    }
     written = {**settings, **{f"{prefix}{part}": value for part, value in numbers.items()}}
     # All digits: a pose that is beyond a limit by a little is so only where it is exact.
     texts = [f"--set {shlex.quote(f'{key}={_digits(value)}')}" for key, value in written.items()]

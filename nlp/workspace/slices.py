@@ -243,7 +243,7 @@ class _First:
         # One that is violated at no point of the way comes last.
         begins = np.where(on_way.any(axis=1), np.argmax(on_way, axis=1), _STEPS)
         begins = np.where(candidates, begins, _STEPS + 1)
-        return np.argmin(begins, axis=0).astype(np.int16)
+        return np.asarray(np.argmin(begins, axis=0), dtype=np.int16)
 
 
 def _halves(lower: FloatArray, upper: FloatArray, chosen: list[int]) -> tuple[FloatArray, FloatArray]:

@@ -173,7 +173,7 @@ def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
 def _frame(axes: Axes, case: Case, each: Slice) -> None:
     """Draw the outline of the workspace, and name the axes of a slice."""
     inner, outer = (_shown(case, each, end) for end in each.workspace)
-    outline = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
+    outline: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
     if each.ball is None:
         low, high = (_shown(case, each, end) for end in each.whole)
         axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
@@ -201,7 +201,7 @@ def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
         size = np.linalg.norm(cayley, axis=-1, keepdims=True)
         points = np.where(size > 0, 2 * np.arctan(size) / np.where(size > 0, size, 1.0), 2.0) * cayley
     scale = [case.units.shown(1.0, Dimension.ANGLE if is_angle else Dimension.LENGTH) for is_angle in each.are_angles]
-    return points * np.array(scale)
+    return np.asarray(points * np.array(scale))
 
 
 def _path(outlines: FloatArray) -> Path:
