@@ -60,12 +60,17 @@ def _show_file(file: str, plot: str | None) -> None:
     from pathlib import Path
 
     from ..case.robotfile.reader import model_of_definition, read_definition
+    from ..errors import CaseError, InputError
     from ..output.files import check_outputs
     from ..output.terminal import show
     from ..results.robotwording import model_words
 
     check_outputs({Path(file): "the robot file that is read"}, {"--plot": plot})
-    model = model_of_definition(read_definition(file, Path()), file)
+    try:
+        model = model_of_definition(read_definition(file, Path()), file)
+    except CaseError as error:
+        # The key is that of a case that names the file, and there is no case here.
+        raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 

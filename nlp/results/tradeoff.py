@@ -1,5 +1,6 @@
 """Trade-off curves as a result: the types, and how they are made."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from ..case.case import Case
@@ -97,6 +98,8 @@ def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> s
     """
     if name.startswith(_LIMITS):
         return next((row.unit for row in limits if _is_key(name, row.key)), "")
+    if re.fullmatch(r"task(\[\d+\])?\.pitch", name):
+        return f"{case.units.length}/rad"
     whole, _, end = name.rpartition(".")
     own = whole if end in ("min", "max", "start") else name
     if own.endswith("angle") and own not in case.scalars:
