@@ -32,8 +32,8 @@ _SIDE, _LEAST_SIDE, _SIDES = 20, 2, 80
 #: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
-#: Significant digits of numbers at postures other than the one found; tables show seven at most.
-_DIGITS = 9
+#: Significant digits of numbers at postures other than the one found: the page shows seven, and computes with them.
+_DIGITS = 11
 #: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
 #: First elevation of the eye, degrees.
