@@ -138,7 +138,12 @@ def _places(tables: dict[str, Any], name: str) -> _Places:
         for part in ("angle", "axis"):
             rotations.append(f"{prefix}{part}")
             if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
-                places[f"{prefix}{part}"] = (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part)
+                rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
+                if part == "axis":
+                    # An axis takes the place of a rotation in another form; it then needs an angle of its own.
+                    for other in rotation.keys() - {"axis", "angle"}:
+                        del rotation[other]
+                places[f"{prefix}{part}"] = (rotation, part)
     return _Places(places, rotations)
 
 

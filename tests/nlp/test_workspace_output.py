@@ -203,6 +203,25 @@ def test_each_command_shows_what_it_is_printed_for(refuted: tuple[str, Workspace
         assert row["value"] == pytest.approx(float(reached), rel=1e-6)
 
 
+def test_a_command_takes_the_place_of_a_rotation_in_another_form(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "turned.toml"
+    turned = LIMITED.partition("[limits]")[0].replace(
+        "position = [0, 0, 20]", "position = [0, 0, 20]\nrotation = { rpy = [0, 0, 9] }"
+    )
+    path.write_text(
+        f"{turned}[limits]\nleg_length = {{ max = 27 }}\n[workspace]\nposition = [{{ min = -5, max = 5 }}, 0, 20]\n"
+    )
+    status, out, _ = cli("workspace", str(path), "--gap", "0.1")
+    assert status == 1
+    line = next(line for line in out.splitlines() if line.startswith("see it with"))
+    status, shown, err = cli(*shlex.split(line.removeprefix("see it with"))[1:], "--json", "-")
+    assert (status, err) == (1, "")
+    assert json.loads(shown)["violated"][0]["name"].startswith("leg_length")
+    status, _, err = cli("evaluate", str(path), "--set", "axis=0,0,1")
+    assert status == 2
+    assert "angle" in err
+
+
 def test_a_singular_pose_is_seen_with_its_command(cli: Run, tmp_path: Path) -> None:
     path = tmp_path / "turned.toml"
     fixed = LIMITED.partition("[limits]")[0]
