@@ -1,7 +1,8 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters; the gallery of robots given joint by joint on one sheet, and the Delta of robots.md.
+robots with their parameters; slices of a workspace; the gallery of robots given joint by joint on one sheet, and the
+Delta of robots.md.
 """
 
 import re
@@ -18,6 +19,8 @@ from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.view import clearest_view
+from screwsynth.nlp.output.pictures.workspaceslices import slices_picture
+from screwsynth.nlp.workspace.slices import slices_of
 
 FOLDER = Path(__file__).parent / "figures"
 #: Columns of the gallery's sheet, and width and height of a robot on it, inches.
@@ -64,6 +67,8 @@ def case_of_page(page: str, number: int) -> dict[str, object]:
 FOLDER.mkdir(exist_ok=True)
 draw_gallery()
 plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
+machine = load_case("hexapod-linuxcnc")
+(FOLDER / "hexapod-linuxcnc-slices.png").write_bytes(slices_picture(machine, slices_of(machine), ".png"))
 for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in (name for name in model_names() if name not in gallery_names()):

@@ -84,12 +84,18 @@ def listing(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
-def nearest(name: str, allowed: Iterable[str]) -> str:
-    """Return a hint for a name that is not allowed: the most similar allowed name, if any, then all allowed names."""
+def nearest(name: str, allowed: Iterable[str], others: Iterable[str] = ()) -> str:
+    """Return a hint for a name that is not allowed: the most similar allowed name, if any, then all allowed names.
+
+    Args:
+        name: that is not allowed.
+        allowed: names that are listed.
+        others: allowed names that are too many to be listed.
+    """
     import difflib  # noqa: PLC0415 - only messages need it
 
     names = list(allowed)
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(name, [*names, *others], n=1)
     return f"{f'did you mean {close[0]!r}? ' if close else ''}allowed: {listing(names)}"
 
 

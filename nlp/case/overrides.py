@@ -54,9 +54,23 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         table[place][end] = value
         return
     if name not in places:
-        raise CaseError(name, f"cannot be set; {nearest(name, [*places, *rotations])}")
+        raise CaseError(name, f"cannot be set; {_allowed(name, tables, _Places(places, rotations))}")
     table, place = places[name]
     table[place] = value
+
+
+def _allowed(name: str, tables: Mapping[str, Any], known: _Places) -> str:
+    """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
+    free = [each for each, (table, place) in known.places.items() if isinstance(table[place], dict)]
+    ends = [f"{each}.{end}" for each in free for end in _ENDS]
+    tasks = sorted(task_numbers(tables), key=len)
+    others = [
+        *(f"ends of free numbers such as {each}" for each in ends[1:2]),
+        "limits such as limits.leg_length.max",
+        *(f"numbers of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
+    ]
+    hint = nearest(name, [*known.places, *known.rotations], [*ends, *tasks])
+    return f"{hint}; also {', '.join(others)}"
 
 
 def task_numbers(tables: Mapping[str, Any]) -> dict[str, tuple[Any, int | str]]:
@@ -124,7 +138,12 @@ def _places(tables: dict[str, Any], name: str) -> _Places:
         for part in ("angle", "axis"):
             rotations.append(f"{prefix}{part}")
             if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
-                places[f"{prefix}{part}"] = (pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0}), part)
+                rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
+                if part == "axis":
+                    # An axis takes the place of a rotation in another form; it then needs an angle of its own.
+                    for other in rotation.keys() - {"axis", "angle"}:
+                        del rotation[other]
+                places[f"{prefix}{part}"] = (rotation, part)
     return _Places(places, rotations)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from ... import cases
 from ..errors import InputError, nearest
+from ..system.reading import read_limited, text_of_bytes
 from .csvrows import named_csv_files
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
@@ -66,18 +67,11 @@ def read_text(path: Path) -> str:
     Raises:
         InputError: the file cannot be read, is too large, or is no UTF-8 text.
     """
+    content = read_limited(path, _LARGEST_FILE)
     try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    if len(content) > _LARGEST_FILE:
-        raise InputError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
-    try:
-        text = content.decode("utf-8-sig")
+        return text_of_bytes(content)
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def tables_of(path: Path, text: str) -> dict[str, Any]:

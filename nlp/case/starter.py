@@ -6,6 +6,8 @@ import json
 import math
 from collections.abc import Sequence
 
+import casadi as ca
+
 from ...models import Dimension, Model, Parameter
 from ..units import Units
 from .plain import plain_value
@@ -34,7 +36,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     """
     z, search = model.home[2], Search()
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
-    reach = _SPREAD * (math.hypot(*model.home) or max(lengths, default=0.0)) or 1.0
+    reach = _SPREAD * (math.hypot(*model.home) or max(lengths, default=0.0) or _size(model)) or 1.0
     position = ", ".join(_free_number(value, reach) for value in model.home)
     options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
@@ -91,6 +93,21 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         f"seed = {search.seed}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _size(model: Model) -> float:
+    """Return the largest distance of a point of a robot's drawing from the origin of its body, at typical dimensions.
+
+    It is 0 for a robot without a drawing, or with one that depends on more than the dimensions.
+    """
+    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+    typical = ca.DM([value for item in model.parameters for value in item.typical])
+    sizes = []
+    for point in model.scene.points:
+        size = ca.norm_2(point.position)
+        if not ca.symvar(ca.substitute(size, symbols, ca.SX(typical))):
+            sizes.append(float(ca.Function("size", [symbols], [size])(typical)))
+    return max((each for each in sizes if math.isfinite(each)), default=0.0)
 
 
 def _units_of(model: Model) -> Units:

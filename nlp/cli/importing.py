@@ -47,6 +47,7 @@ def import_(
         typer.Option(metavar="NAME...", help="Make a joint's place, JOINT.axis, or a suggestion a dimension."),
     ] = None,
     suggest: Annotated[bool, typer.Option("--suggest", help="List circles and symmetries, for --free.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that screwsynth did not write.")] = False,
 ) -> None:
     """Read a robot with closed loops from MJCF or URDF.
 
@@ -55,10 +56,10 @@ def import_(
     from ..errors import InputError, one_line
     from ..exchange.reading.importing import Request, import_robot
     from ..exchange.reading.reduction import Ends
-    from ..exchange.reading.robotfile import robot_file
+    from ..exchange.reading.robotfile import BEGINNING, robot_file
     from ..exchange.reading.symmetry import offers_of
     from ..exchange.reading.words import offer_lines, summary_lines
-    from ..output.files import check_outputs, write_text
+    from ..output.files import check_origin, check_outputs, write_text
     from ..output.terminal import show
     from ..results.text import Line, Tone
 
@@ -68,6 +69,8 @@ def import_(
         raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
     inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}
     check_outputs(inputs, {"--out": out})
+    if out is not None:
+        check_origin(out, BEGINNING, force=force)
     ends = Ends(platform, base, tuple(actuated or ()))
     found = import_robot(Request(Path(file), ends, close, None if loops is None else Path(loops)))
     lines = list(summary_lines(found))

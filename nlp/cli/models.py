@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def models(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One robot, in full.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="One robot, or a robot file (.toml), in full.")
+    ] = None,
     plot: PlotFile = None,
 ) -> None:
     """List the robots, or show one in full.
@@ -37,6 +39,9 @@ def models(
             raise InputError(f"--plot {plot}: needs the name of a robot")
         show(console(), [models_table((each, _description(each)) for each in model_names())])
         return
+    if name.endswith(".toml"):
+        _show_file(name, plot)
+        return
     options = model_options(name)
     needed = [option.name for option in options if option.default is None]
     # Without the options that have no default, the robot cannot be built, and has no parameters to show.
@@ -48,6 +53,29 @@ def models(
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
         draw(_variants(name, model, options), plot)
     show(console(), model_words(name, model, options))
+
+
+def _show_file(file: str, plot: str | None) -> None:
+    """Show the robot of a robot file in full, and draw it into a file."""
+    from pathlib import Path
+
+    from ..case.robotfile.reader import model_of_definition, read_definition
+    from ..errors import CaseError, InputError
+    from ..output.files import check_outputs
+    from ..output.terminal import show
+    from ..results.robotwording import model_words
+
+    check_outputs({Path(file): "the robot file that is read"}, {"--plot": plot})
+    try:
+        model = model_of_definition(read_definition(file, Path()), file)
+    except CaseError as error:
+        # The key is that of a case that names the file, and there is no case here.
+        raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
+    if plot is not None:
+        from ..output.pictures.plot import plot as draw
+
+        draw(model, plot)
+    show(console(), model_words(model.name, model, ()))
 
 
 def _variants(name: str, model: Model, options: Sequence[ModelOption]) -> list[Model]:

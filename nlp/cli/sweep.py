@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -73,17 +75,7 @@ def sweep(
     if engine is not None and engine not in kinds:
         raise InputError(f"--engine {engine}: must be compiled or ipopt")
     chosen = _read_points(over, points)
-    check_picture(plot)
-    if plot is not None:
-        from ..output.pictures.sweeps import check_axes
-
-        check_axes(chosen)
-    if html is not None:
-        from ..output.pictures.requirements import check_library
-
-        check_library("matplotlib", "pages")
-    if json_file == html == "-":
-        raise InputError("standard output can take one of --json - and --html - only")
+    _check_files(chosen, plot, html, json_file)
     check_seconds(time)
     check_table(out)
     read = read_case(case, read_settings(settings))
@@ -93,7 +85,8 @@ def sweep(
 
         inputs[Path(points)] = "the file of the points"
     check_outputs(inputs, {"--out": out, "--json": json_file, "--html": html, "--plot": plot})
-    found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, time if certified else None)
+    with _named_points(chosen, points):
+        found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, time if certified else None)
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
@@ -140,6 +133,44 @@ def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> N
         from ..output.report.sweep import sweep_page
 
         write_text(html, sweep_page(case, found.points, columns))
+
+
+def _check_files(chosen: Points, plot: str | None, html: str | None, json_file: str | None) -> None:
+    """Refuse a picture, a page or JSON that cannot be made, before the work begins.
+
+    Raises:
+        InputError: a file is refused.
+    """
+    from ..errors import InputError
+
+    check_picture(plot)
+    if plot is not None:
+        from ..output.pictures.sweeps import check_axes
+
+        check_axes(chosen)
+    if html is not None:
+        from ..output.pictures.requirements import check_library
+
+        check_library("matplotlib", "pages")
+    if json_file == html == "-":
+        raise InputError("standard output can take one of --json - and --html - only")
+
+
+@contextmanager
+def _named_points(chosen: Points, file: str | None) -> Iterator[None]:
+    """Report a wrong column of the file of the points with the name of this file.
+
+    Raises:
+        InputError: a column is wrong.
+    """
+    from ..errors import CaseError, InputError
+
+    try:
+        yield
+    except CaseError as error:
+        if file is None or error.key not in chosen.names:
+            raise
+        raise InputError(f"{file}: column {error.key}: {error.fault}") from None
 
 
 def _read_points(over: list[str] | None, file: str | None) -> Points:

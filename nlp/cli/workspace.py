@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .numbers import Number
-from .options import CaseName, Jobs, JsonFile, SettingTexts, check_picture, console, read_settings, write_json
+from .options import CaseName, Jobs, JsonFile, SettingTexts, console, read_settings
+from .workspacefiles import WorkspaceFiles
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..results.workspace import WorkspacePose
     from ..workspace.judge import Judgement
     from ..workspace.paper.record import PaperRecord
-    from ..workspace.slices import Slice
 
 
 def workspace(
@@ -51,13 +52,20 @@ def workspace(
         str | None,
         typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
     ] = None,
+    picture: Annotated[
+        str | None,
+        typer.Option("--picture", metavar="FILE", help="Draw the robot at its worst pose: a .png, .svg or .pdf file."),
+    ] = None,
+    page: Annotated[
+        str | None, typer.Option("--html", metavar="FILE", help="Write a page: verdicts, poses, slices; - is stdout.")
+    ] = None,
 ) -> None:
     """Prove regular poses and limits over a whole workspace."""
     from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
-    from ..output.files import check_outputs
     from ..results.workspace import workspace_of
+    from ..results.workspaceposes import evaluate_command
     from ..workspace.machine import workspace_of_case
     from .dimensions import settings_of_result
     from .paper import paper_record, write_paper
@@ -71,15 +79,12 @@ def workspace(
     record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
     given = {} if of is None else settings_of_result(of)
-    loaded, text, inputs = read_case(case, {**given, **read_settings(settings)})
+    chosen = {**given, **read_settings(settings)}
+    loaded, text, inputs = read_case(case, chosen)
     workspace_of_case(loaded)
-    check_picture(plot)
-    check_outputs(inputs, {"--json": json_file, "--plot": plot, "--proof": proof})
-    slices: tuple[Slice, ...] = ()
-    if plot is not None:
-        from ..workspace.slices import slices_of
-
-        slices = slices_of(loaded)
+    files = WorkspaceFiles(json_file, plot, picture, page, proof)
+    files.check(inputs)
+    slices = files.slices(loaded)
     judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
     largest = None
     if scale:
@@ -88,21 +93,19 @@ def workspace(
 
         largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
     result = workspace_of(judged, largest)
-    if json_file is not None:
-        write_json(json_file, result)
-    if plot is not None:
-        from ..output.files import write_bytes
-        from ..output.pictures.requirements import ending_of
-        from ..output.pictures.workspaceslices import slices_picture
 
-        write_bytes(plot, slices_picture(loaded, slices, ending_of(plot)))
+    def command(pose: WorkspacePose) -> str:
+        """Return the command that shows a pose."""
+        return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
+
+    files.write(loaded, text, result, slices, command)
     if proof is not None:
         write_paper(proof, judged, record, text, of_quantity or (), leg_error)
-    if "-" not in (json_file, proof):
+    if not files.is_piped:
         from ..output.terminal import show
         from ..results.workspacewording import workspace_summary
 
-        show(console(), workspace_summary(loaded, result))
+        show(console(), workspace_summary(loaded, result, command))
     raise typer.Exit(0 if result.proved else 1)
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from ..system.programs import RunError, first_program, run_program
 from .callgraph import stack_bound
 
 #: Flags of every compiler.
@@ -78,10 +78,6 @@ X86_64 = Target("x86-64", "X86_64", ("gcc", "cc", "clang"), "size", (), "x86_64"
 TARGETS = (X86_64, CORTEX_M7)
 
 
-class _RunError(Exception):
-    """A program that cannot be run or fails; its text says why."""
-
-
 def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
     """Compile generated C for every target, all at the same time, and return the figures.
 
@@ -120,8 +116,8 @@ def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder:
         return _Running(Figures(target, fault=f"no compiler for it was found: {names}"), (), folder, None)
     words = (found, *target.flags, *_FLAGS)
     try:
-        version = _run([found, "--version"]).splitlines()[0]
-        machine = _run([found, "-dumpmachine"]).strip()
+        version = run_program([found, "--version"]).splitlines()[0]
+        machine = run_program([found, "-dumpmachine"]).strip()
         figures = Figures(target, " ".join([version, *target.flags, *_FLAGS]))
         if not machine.startswith(target.machine):
             fault = f"{Path(found).name} compiles for {machine}"
@@ -132,7 +128,7 @@ def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder:
         extra = [_GRAPH] if _writes_graphs(words, folder) else []
         with (folder / "errors").open("wb") as errors:
             process = subprocess.Popen([*words, *extra, "-c", *sources], cwd=folder, stdout=errors, stderr=errors)  # noqa: S603 - the user's own compiler
-    except (OSError, IndexError, _RunError) as error:
+    except (OSError, IndexError, RunError) as error:
         return _Running(Figures(target, fault=f"{Path(found).name}: {error}"), words, folder, None)
     return _Running(figures, words, folder, process)
 
@@ -147,13 +143,13 @@ def _end(running: _Running, sources: list[str], prefix: str) -> Figures:
         return figures._replace(fault=f"the compiler failed: {said[0] if said else process.returncode}")
     objects = [f"{name[:-2]}.o" for name in sources]
     try:
-        sizes = _run([figures.target.size, *objects], folder).splitlines()[1:]
+        sizes = run_program([figures.target.size, *objects], folder).splitlines()[1:]
         flash = sum(int(text) + int(data) for text, data in (line.split()[:2] for line in sizes))
         figures = figures._replace(flash=flash)
         if figures.target is X86_64:
-            _run([*words, "stack.c", *objects, *_LINK, "-o", "stack"], folder)
-            figures = figures._replace(painted=int(_PAINTED.findall(_run([str(folder / "stack")], folder))[0]))
-    except (OSError, ValueError, IndexError, _RunError) as error:
+            run_program([*words, "stack.c", *objects, *_LINK, "-o", "stack"], folder)
+            figures = figures._replace(painted=int(_PAINTED.findall(run_program([str(folder / "stack")], folder))[0]))
+    except (OSError, ValueError, IndexError, RunError) as error:
         figures = figures._replace(fault=f"{error}")
     graphs = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob(f"{prefix}*.ci")}
     stack = stack_bound(graphs, prefix)
@@ -170,30 +166,14 @@ def _names(target: Target) -> tuple[str, ...]:
 
 def _compiler(target: Target) -> str | None:
     """Return the path of a target's compiler; None where there is none."""
-    return next((found for found in map(shutil.which, _names(target)) if found), None)
+    return first_program(_names(target))
 
 
 def _writes_graphs(words: tuple[str, ...], folder: Path) -> bool:
     """Return whether a compiler writes call graphs."""
     (folder / "probe.c").write_text("int probe(void);\nint probe(void) { return 0; }\n", encoding="utf-8")
     try:
-        _run([*words, _GRAPH, "-c", "probe.c"], folder)
-    except _RunError:
+        run_program([*words, _GRAPH, "-c", "probe.c"], folder)
+    except RunError:
         return False
     return (folder / "probe.ci").exists()
-
-
-def _run(words: list[str], folder: Path | None = None) -> str:
-    """Run a program and return its standard output.
-
-    Raises:
-        _RunError: it cannot be run, or fails.
-    """
-    try:
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - the user's own compiler
-    except OSError as error:
-        raise _RunError(f"{Path(words[0]).name} cannot be run: {error.strerror or error}") from None
-    if done.returncode:
-        said = (done.stderr or done.stdout).strip().splitlines() or [f"exit status {done.returncode}"]
-        raise _RunError(f"{Path(words[0]).name} failed: {said[0]}")
-    return done.stdout

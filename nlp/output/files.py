@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..interruption import WRITING
+from ..system.reading import read_limited, text_of_bytes
 
 #: Name of the file that lists what was written into a folder; only a folder with it is written into again.
 MANIFEST = "screwsynth-files.txt"
@@ -158,6 +159,29 @@ def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None])
             raise InputError(f"{option} {path}: is the file of {other} too; choose another name")
 
 
+def check_origin(target: str, beginning: str, *, force: bool = False) -> None:
+    """Refuse a file of another origin, which would be lost, before the work begins.
+
+    Args:
+        target: file to write; one that is missing or empty may be written, and so may pipes and devices.
+        beginning: of each file that this program writes in its place.
+        force: write also over a file of another origin.
+
+    Raises:
+        InputError: the file begins with something else.
+    """
+    path = Path(target)
+    if force or target == "-" or not path.is_file():
+        return
+    try:
+        with path.open("rb") as file:
+            found = file.read(len(beginning.encode("utf-8")))
+    except OSError as error:
+        raise _cannot_be_written(target, error) from None
+    if found and found != beginning.encode("utf-8"):
+        raise InputError(f"{target}: exists, and screwsynth did not write it: choose another name, or --force")
+
+
 def check_target(target: str) -> None:
     """Refuse a file that cannot be written, before the work begins.
 
@@ -181,16 +205,9 @@ def read_text(source: str) -> str:
     Raises:
         InputError: it cannot be read, is too large, or is no UTF-8 text.
     """
+    content = read_limited(source, LARGEST_FILE)
     try:
-        with Path(source).open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        fault = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{source}: cannot be read: {fault}") from None
-    if len(content) > LARGEST_FILE:
-        raise InputError(f"{source}: cannot be read: it is larger than {LARGEST_FILE // 2**20} MB")
-    try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        return text_of_bytes(content)
     except UnicodeDecodeError:
         raise InputError(f"{source}: is no text") from None
 

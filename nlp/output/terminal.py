@@ -32,8 +32,9 @@ _COMFORTABLE = 28
 def show(console: Console, items: Iterable[Line | TextTable]) -> None:
     """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself."""
     for item in items:
+        is_command = isinstance(item, Line) and item.is_command
         for line in [_text(item)] if isinstance(item, Line) else _table_lines(item, console.width):
-            console.print(line)
+            console.print(line, soft_wrap=is_command)
 
 
 def _header(text: str) -> str:

@@ -7,29 +7,30 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..units import Units
-from .rounding import number, settled
+from .rounding import NOISE, number, settled
 
 if TYPE_CHECKING:
     from .motiondata import MotionData, WrenchData
 
 
-def motion_words(motion: MotionData, units: Units, size: float = 0.0) -> str:
+def motion_words(motion: MotionData, units: Units, size: float = 0.0, part: float = NOISE) -> str:
     """Return a motion in words: its axis, point and pitch.
 
     Args:
         motion: of the platform.
         units: of the case.
         size: length that the motion was computed from, beside which its point and pitch have rounding error.
+        part: error bound of its pitch, as a part of this length.
     """
     if motion.point is None or motion.pitch == "inf":
         return f"translation along {triple(motion.axis, 1.0)}"
     reach = reach_of(motion, size)
-    return f"{screw_words(motion, units, reach)} through {triple(motion.point, reach)}"
+    return f"{screw_words(motion, units, reach, part)} through {triple(motion.point, reach)}"
 
 
-def screw_words(motion: MotionData, units: Units, size: float) -> str:
-    """Return pitch and axis of a motion that is no translation."""
-    pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size)
+def screw_words(motion: MotionData, units: Units, size: float, part: float = NOISE) -> str:
+    """Return pitch and axis of a motion that is no translation; other arguments are those of :func:`motion_words`."""
+    pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size, part)
     words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
     return f"{words} about {triple(motion.axis, 1.0)}"
 

@@ -16,7 +16,7 @@ from ..units import Units
 from .text import Figure
 
 if TYPE_CHECKING:
-    from .parts import Jacobian, RobotData
+    from .parts import Jacobian, RobotData, TaskData
 
 #: Error bound of a number, as a part of its terms, its neighbours or its range: a thousand times what a search leaves.
 NOISE = 1e-9
@@ -93,11 +93,18 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def size_of_F(robot: RobotData, F: float = 0.0) -> float:  # noqa: N802 - the objective's name
-    """Return the size of the terms of F, over all poses; F itself where the task is not known."""
-    if robot.task is None:
+def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) -> float:  # noqa: N802 - the objective's name
+    """Return the size of the terms of F, over all poses; F itself where the task is not known.
+
+    Args:
+        robot: at the point.
+        F: the objective.
+        task: whose F is meant; the robot's own where left out.
+    """
+    task = task or robot.task
+    if task is None:
         return abs(F)
-    twist = robot.task.motion.twist
+    twist = task.motion.twist
     poses = [robot] if robot.several is None else robot.several.poses
     sizes = [size for each in poses for size in rate_sizes(each.jacobian, twist, each.pose.position)]
     return math.fsum(size**2 for size in sizes)

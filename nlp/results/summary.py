@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
+from ..evidence.state import ZERO_F
+from ..units import objective_unit
 from .data import CombinedResult
 from .designtable import combined_design_table, design_table, solved_design_table
 from .jointwording import limb_part_table
@@ -113,7 +115,9 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     yield title_line(case)
     for each in result.tasks:
         yield from task_lines(each.task, case.units)
-        yield Line(number(0.0 if each.task_is_free and robot.several is None else each.F), label="F")
+        is_free = each.task_is_free and robot.several is None
+        value = number(0.0 if is_free else each.F, size_of_F(robot, task=each.task), part=ZERO_F)
+        yield Line(f"{value} {objective_unit([each.task.motion.twist], case.units)}".rstrip(), label="F")
     yield from violation_lines(result.violated)
     yield design_table(case, robot)
     yield from robot_tables(case, robot)

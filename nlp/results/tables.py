@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 _PLACES = 3
 #: Error of the margin in an active limit, as a part of the limit: that of the test whether a point lies on it.
 _ON_LIMIT = 10 * ACTIVE
+#: Error bound of the pitch of a principal motion, as a part of the robot's size: motions whose F are nearly equal are
+#: eigenvectors that mix, and robot files give their numbers with six to nine digits.
+_EIGENVECTOR = 1e-6
 #: So many optima are shown in full.
 MOST_OPTIMA = 12
 
@@ -40,7 +43,8 @@ def principal_table(motions: PrincipalMotionsData, units: Units, size: float) ->
     rows = []
     for kind in (motions.rotations, motions.translations):
         for rank, motion in zip(("least", "", "most"), kind, strict=True):
-            rows.append((rank, number(motion.F, kind[-1].F), motion_words(motion.motion, units, size)))
+            words = motion_words(motion.motion, units, size, _EIGENVECTOR)
+            rows.append((rank, number(motion.F, kind[-1].F), words))
     return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
 
 

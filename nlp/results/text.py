@@ -30,6 +30,7 @@ class Line:
         label: name of the text; empty without one.
         tone: of the text.
         before, after: words around the text, without a tone.
+        is_command: whether the text is to be copied, so that no line break may stand in it.
     """
 
     text: str
@@ -37,6 +38,7 @@ class Line:
     tone: Tone = Tone.PLAIN
     before: str = ""
     after: str = ""
+    is_command: bool = False
 
     @property
     def words(self) -> str:

@@ -1,6 +1,7 @@
 """Trade-off curves as a result: the types, and how they are made."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 
 from ..case.case import Case
 from ..case.task import Sense
@@ -77,7 +78,7 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
     return TradeoffResult(
         head=head_data(case),
         over=found.name,
-        unit=_unit(found.name, case, results),
+        unit=unit_of_number(found.name, case, [row for result in results for row in _limits(result)]),
         senses=tuple(task.sense for task in case.tasks),
         tasks=tuple(task.name for task in case.tasks),
         points=(
@@ -91,11 +92,18 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
     )
 
 
-def _unit(name: str, case: Case, results: list[CaseResult]) -> str:
-    """Return the unit of a number by its name."""
+def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> str:
+    """Return the unit of a case's number by its name; empty for a plain number, or where it is not known.
+
+    Args:
+        name: as ``--set`` takes it.
+        case: the case.
+        limits: rows of its limits, which have their units.
+    """
     if name.startswith(_LIMITS):
-        rows = (row for result in results for row in _limits(result) if _is_key(name, row.key))
-        return next((row.unit for row in rows), "")
+        return next((row.unit for row in limits if _is_key(name, row.key)), "")
+    if re.fullmatch(r"task(\[\d+\])?\.pitch", name):
+        return f"{case.units.length}/rad"
     whole, _, end = name.rpartition(".")
     own = whole if end in ("min", "max", "start") else name
     if own.endswith("angle") and own not in case.scalars:

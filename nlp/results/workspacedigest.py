@@ -24,7 +24,7 @@ _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
     """Yield the verdict on a machine, what it is about, F, and the tightest claims."""
     outcomes = [each.outcome for each in result.extremes]
-    outcomes.append(Outcome.OPEN if result.regular is None else result.regular.outcome)
+    outcomes.append(result.regular.outcome)
     words = "everything is proved for every pose"
     if not result.proved:
         refuted, left = outcomes.count(Outcome.REFUTED), outcomes.count(Outcome.OPEN)

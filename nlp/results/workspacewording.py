@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.case import Case
@@ -12,6 +12,7 @@ from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
 from .workspacedigest import TONES, refuting_machine, verdict_lines
+from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
     from .workspace import (
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
         WorkspaceProofData,
         WorkspaceResult,
     )
-
-#: So many limits that are refuted are shown with their poses before the tables.
-_REFUTED = 3
 
 
 def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
@@ -37,38 +35,36 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
         yield Line(words, label="lengths of legs", after=", at no pose shorter or longer")
 
 
-def workspace_summary(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine over its workspace: a digest, then every number."""
+def workspace_summary(
+    case: Case, result: WorkspaceResult, command: Callable[[WorkspacePose], str] | None = None
+) -> Iterator[Line | TextTable]:
+    """Yield the verdicts on a machine over its workspace: a digest, then every number.
+
+    Args:
+        case: the case.
+        result: the verdicts.
+        command: returns the command that shows a pose; left out, none is named.
+    """
     yield title_line(case)
     yield from verdict_lines(case, result)
     yield from _regular_lines(case, result.regular)
     if result.constraints is not None:
         yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
     yield from _needs_line(case, result)
+    if command is not None:
+        yield from seeing_lines(result, command)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
-    yield from _refuted_lines(case, result.extremes)
+    yield from _machine_lines(case, result.extremes)
     yield from _tables(case, result.extremes)
 
 
-def _refuted_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[Line | TextTable]:
-    """Yield the pose of the first limits that are refuted, and the machine of the first of them."""
-    refuted = [each for each in extremes if each.outcome is Outcome.REFUTED and each.pose is not None]
-    for k, each in enumerate(refuted[:_REFUTED]):
-        if each.pose is not None:
-            yield Line(each.name, label="refuted", tone=Tone.FAULT, after=f", at {_pose_words(case, each.pose)}")
-            yield Line(f"evaluate {case.name} {setting_words(each.pose)}", label="see it with")
-        if k == 0 and each.machine is not None:
+def _machine_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+    """Yield the machine of the first limit that is refuted by one within the tolerance."""
+    for each in extremes:
+        if each.outcome is Outcome.REFUTED and each.machine is not None:
             yield refuting_machine(case, each.name, each.machine)
-
-
-def setting_words(pose: WorkspacePose) -> str:
-    """Return the options of ``evaluate`` that show a pose."""
-    values = zip(("p_x", "p_y", "p_z"), pose.position, strict=True)
-    words = [f"--set {name}={value:.10g}" for name, value in values]
-    return " ".join(
-        [*words, f"--set axis={','.join(f'{part:.10g}' for part in pose.axis)}", f"--set angle={pose.angle:.10g}"]
-    )
+            return
 
 
 def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
@@ -105,7 +101,7 @@ def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
             yield _table(case, name, title, rows)
 
 
-def _pose_words(case: Case, pose: WorkspacePose) -> str:
+def pose_words(case: Case, pose: WorkspacePose) -> str:
     """Return a pose in a few words."""
     position = ", ".join(f"{value:.5g}" for value in pose.position)
     if abs(pose.angle) <= 1e-9:  # rounding of a rotation that is none
@@ -130,9 +126,7 @@ def _regular_lines(
     }
     yield Line(regular.outcome.value, label=label, tone=TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
-        yield Line(_pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
-    if regular.outcome is Outcome.REFUTED and regular.pose is not None:
-        yield Line(f"evaluate {case.name} {setting_words(regular.pose)}", label="see it with")
+        yield Line(pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
     if regular.machine is not None:
         yield refuting_machine(case, "regular", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
@@ -155,7 +149,7 @@ def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTa
                 "" if each.bound is None else number(each.bound),
                 "" if each.reached is None else number(each.reached),
                 *known,
-                "" if each.pose is None else _pose_words(case, each.pose),
+                "" if each.pose is None else pose_words(case, each.pose),
             )
         )
     limits = () if name == "ranges" else ("limit",)
@@ -168,5 +162,5 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
     yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=" times the box is proved")
     if scale.claim:
         beyond = "" if scale.refuted is None else f"at {scale.refuted:.4g} times: "
-        at = "" if scale.pose is None else f", at {_pose_words(case, scale.pose)}"
+        at = "" if scale.pose is None else f", at {pose_words(case, scale.pose)}"
         yield Line(f"{beyond}{scale.claim}{at}", label="beyond")

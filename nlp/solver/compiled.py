@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import InputError
+from ..system.programs import RunError, first_program, run_program
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 
@@ -53,13 +54,10 @@ def _compiler() -> str:
     Raises:
         InputError: there is none.
     """
-    import shutil
-
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
-    for name in wanted:
-        found = shutil.which(name)
-        if found:
-            return found
+    found = first_program(wanted)
+    if found:
+        return found
     raise InputError(f"compiling needs a C compiler, and none was found: {' or '.join(wanted)}; CC names another one")
 
 
@@ -69,16 +67,11 @@ def _run(words: list[str]) -> str:
     Raises:
         InputError: it cannot be run, or fails.
     """
-    import subprocess
-
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False)  # noqa: S603 - the user's own compiler
-    except OSError as error:
-        raise InputError(f"{words[0]}: cannot be run: {error.strerror or error}") from None
-    if done.returncode:
-        said = (done.stderr or done.stdout).strip().splitlines() or [f"exit status {done.returncode}"]
-        raise InputError(f"{words[0]}: the C compiler failed: {said[0]}")
-    return done.stdout
+        return run_program(words)
+    except RunError as error:
+        fault = "the C compiler failed" if error.is_started else "cannot be run"
+        raise InputError(f"{words[0]}: {fault}: {error.said}") from None
 
 
 def _folder() -> Path:

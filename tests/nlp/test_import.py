@@ -255,7 +255,12 @@ def test_a_slide_follows_the_joints_that_it_joins(tmp_path: Path, cli: Run) -> N
     )
     code, _, err = cli("import", str(model), "--platform", "top", "--out", str(out), "--free", "a0=A", "b3")
     assert (code, err) == (0, "")
-    tables = tomllib.loads(out.read_text(encoding="utf-8"))
+    text = out.read_text(encoding="utf-8")
+    out.write_text("mine\n", encoding="utf-8")
+    again = cli("import", str(model), "--platform", "top", "--out", str(out))
+    assert again[0] == 2
+    assert "screwsynth did not write it" in again[2]
+    tables = tomllib.loads(text)
     moved = mechanism_of(tables, {"A_x": 0.7, "b3_z": -0.2})
     joints = {joint.name: joint for joint in moved.joints}
     for leg, (ball, slide, end) in {"p0": ("p0:1", "p0:2", "p0:3"), "p3": ("p3:1", "p3:2", "p3:3")}.items():

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, InputError, json_data, load_result, solve
+from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data, load_result, solve
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
@@ -494,7 +494,7 @@ def spans(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
 
 
 def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: Path, tmp_path: Path) -> None:
-    wide = replace(case, workspace=turned(TurnKind.ROLL_PITCH_YAW, 30))
+    wide = replace(case, workspace=turned(TurnKind.ROLL_PITCH_YAW, 30), limits=Limits())
     assert wide.workspace is not None
     slices = slices_of(wide)
     assert [each.names for each in slices][-1] == ("pitch", "yaw")
@@ -515,7 +515,7 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: P
     assert run.exit_code == 0, run.output
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
-    assert f'id="{Region.REGULAR.value}"' in text
+    assert 'id="proved: regular, and every limit is kept"' in text
 
 
 def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:

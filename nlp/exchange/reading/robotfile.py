@@ -22,6 +22,11 @@ class Written(NamedTuple):
     lines: tuple[tuple[str, str], ...]
 
 
+#: Beginning of the comment at the head of an imported robot file, and of the file itself.
+_IMPORTED = "Imported by screwsynth from "
+BEGINNING = f"# {_IMPORTED}"
+
+
 def robot_file(found: Imported, source: str, wanted: Sequence[str], offers: Offers | None) -> Written:
     """Return the text of the robot file of an imported robot.
 
@@ -35,7 +40,7 @@ def robot_file(found: Imported, source: str, wanted: Sequence[str], offers: Offe
         InputError: a name means nothing, or the text would not state this robot.
     """
     tables = found.tables if offers is None else with_dimensions(found.tables, wanted, offers)
-    remarks = [f"Imported by screwsynth from {source}, with its numbers, in the frame and the units of that file."]
+    remarks = [f"{_IMPORTED}{source}, with its numbers, in the frame and the units of that file."]
     text = robot_file_text(tables, remarks)
     is_folded = any("repeat" in limb for limb in tables.get("limb", ()))
     difference = check_text(text, found.mechanism, found.size, _COPIES if is_folded else SAME_ROBOT)

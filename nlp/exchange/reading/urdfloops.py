@@ -20,11 +20,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ...errors import InputError, listing
+from ...system.reading import read_limited
 from .description import Closing, LoopClosure, axis_frame, common_name, unique_name
 from .extra import required
 from .frames import Frame
 from .urdfelements import axis_of, link_of, name_of, origin_of
-from .xmltext import read_limited
 
 #: Largest YAML file, bytes: those that are published have 2 kB.
 _LARGEST_YAML = 2**20
@@ -68,7 +68,7 @@ def read_loop_file(path: Path) -> LoopFile:
     """
     yaml = required("yaml", "YAML files of loops", "pyyaml")
     try:
-        tables = yaml.safe_load(read_limited(path, _LARGEST_YAML))
+        tables = yaml.safe_load(read_limited(path, _LARGEST_YAML, is_regular=True))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         reason = str(error).splitlines() or [""]
         raise InputError(f"{path}: is not valid YAML: {reason[0]}") from None

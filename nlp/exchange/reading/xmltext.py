@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from ...errors import InputError
+from ...system.reading import read_limited
 
 #: Largest description, bytes: twenty times the largest of those that robots' makers publish (without meshes).
 LARGEST_FILE = 16 * 2**20
@@ -27,7 +28,7 @@ def read_xml(path: Path) -> Element:
         InputError: the file cannot be read, is too large or too deep, is no XML, or declares a document type, by which
             entities could grow without end or bring in other files.
     """
-    content = read_limited(path)
+    content = read_limited(path, LARGEST_FILE, is_regular=True)
     builder = TreeBuilder()
     parser = expat.ParserCreate()
     depth, count = 0, 0
@@ -59,22 +60,3 @@ def read_xml(path: Path) -> Element:
         raise InputError(f"{path}: cannot be read: {refused}") from None
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise InputError(f"{path}: is not valid XML: {error}") from None
-
-
-def read_limited(path: Path, largest: int = LARGEST_FILE) -> bytes:
-    """Return the bytes of a regular file.
-
-    Raises:
-        InputError: it cannot be read, is no file, or is larger than ``largest``.
-    """
-    try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: cannot be read: it is no file")
-        with path.open("rb") as file:
-            content = file.read(largest + 1)
-    except (OSError, ValueError) as error:
-        fault = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{path}: cannot be read: {fault}") from None
-    if len(content) > largest:
-        raise InputError(f"{path}: cannot be read: it is larger than {largest // 2**20} MB")
-    return content

@@ -13,11 +13,16 @@ from matplotlib.figure import Figure
 from ....models import FloatArray
 from ...case.case import Case
 from ...errors import InputError
+from ...program.formulation import formulate_each
+from ...results.design import limits_data, margins_data
+from ...results.parts import LimitData
+from ...results.tradeoff import unit_of_number
 from ...results.tradeoffwording import objective_label
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
 from .canvas import INK, MUTED
 from .figures import picture_of
+from .fonts import legible
 
 _SIZE = (7.2, 5.0)
 #: Names of at most as many regions are written, each of at least this part of the points; others are outlined only.
@@ -62,8 +67,8 @@ def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Fig
         _draw_curve(axes, changing[0][1], F, sets, names, objective_label(case))
     else:
         _draw_map(figure, axes, [axis for _, axis in changing], F, sets, names, objective_label(case))
-        axes.set_ylabel(changing[1][0], color=INK, parse_math=False)
-    axes.set_xlabel(changing[0][0], color=INK, parse_math=False)
+        axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
+    axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
     axes.tick_params(colors=INK, labelsize=9)
     for spine in axes.spines.values():
         spine.set_edgecolor(MUTED)
@@ -76,6 +81,16 @@ def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Fig
     )
     figure.supxlabel(note, fontsize=8.5, color=MUTED, x=0.01, ha="left")
     return figure
+
+
+def _label(case: Case, name: str) -> str:
+    """Return the name of a case's number with its unit, for an axis."""
+    limits: Sequence[LimitData] = ()
+    if name.startswith("limits."):
+        nlp = formulate_each(case)[0]
+        limits = limits_data(margins_data(nlp, nlp.start, optimal=False))
+    unit = unit_of_number(name, case, limits)
+    return legible(f"{name}, {unit}" if unit else name)
 
 
 def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: FloatArray, names: Sequence[str], label: str) -> None:

@@ -2,24 +2,49 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
+from matplotlib.path import Path
+from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
-from ...workspace.slices import Region, Slice
+from ...results.rounding import number
+from ...workspace.slices import KEPT, UNDECIDED, Region, Slice
 from .canvas import INK, MUTED
 from .figures import picture_of
+from .fonts import legible
 
-#: Width and height of one slice, inches.
-_SIZE = (3.2, 3.3)
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Width and height of one slice, and height of a line of the legend, inches.
+_SIZE, _LINE = (3.2, 3.02), 0.185
 _COLUMNS = 3
-_COLOURS = {Region.REGULAR: "#a9d2ae", Region.BEYOND: "#b34700", Region.OPEN: "#e8c35a"}
+#: Width and height of a slice by itself, inches.
+_ALONE = 4.2
+#: Place of its axes, left, bottom, width and height, as parts of it.
+_PLACE = (0.16, 0.13, 0.82, 0.82)
+_GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
+#: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
+_LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e6d96c", "#bf9b7a")
+#: Points on each side of a box that is drawn curved.
+_CURVED = 2
+
+
+class Kind(NamedTuple):
+    """A kind of boxes: its words in the legend, which are the ``gid`` of its boxes too, colour and hatch."""
+
+    words: str
+    colour: str
+    hatch: str = ""
 
 
 def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
@@ -34,48 +59,165 @@ def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
-    """Return the slices as a Matplotlib figure; the boxes of each region carry its name as ``gid``."""
+    """Return the slices as a Matplotlib figure; the boxes of each kind carry its words as ``gid``."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
-    figure = Figure(figsize=(_SIZE[0] * columns, _SIZE[1] * rows + 0.6), facecolor="white", layout="constrained")
+    entries, notes = slices_legend(case, slices), slices_notes(slices)
+    across = min(2, columns)
+    lines = -(-(len(entries) + 1) // across) + len(notes)
+    size = _SIZE[0] * columns, _SIZE[1] * rows + 0.6 + _LINE * lines
+    figure = Figure(figsize=size, facecolor="white", layout="constrained")
     for k, each in enumerate(slices):
-        axes = figure.add_subplot(rows, columns, k + 1)
-        for region, colour in _COLOURS.items():
-            chosen = [box for box, own in zip(each.boxes, each.regions, strict=True) if own is region]
-            if chosen:
-                outlines = [_outline(case, each, box) for box in chosen]
-                axes.add_collection(
-                    PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.2, gid=region.value)
-                )
-        low, high = (_shown(case, each, end) for end in each.whole)
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        inner, outer = (_shown(case, each, end) for end in each.workspace)
-        axes.add_patch(
-            Rectangle((inner[0], inner[1]), *(outer - inner), fill=False, edgecolor=INK, linewidth=1.2, gid="workspace")
-        )
-        dimensions = [Dimension.ANGLE if is_angle else Dimension.LENGTH for is_angle in each.are_angles]
-        labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
-        axes.set_xlabel(labels[0], color=INK, parse_math=False)
-        axes.set_ylabel(labels[1], color=INK, parse_math=False)
-        axes.tick_params(colors=INK, labelsize=8)
-        for spine in axes.spines.values():
-            spine.set_edgecolor(MUTED)
-    title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
-    figure.suptitle(f"{title}: slices through the middle of the workspace", fontsize=10, color=INK, parse_math=False)
-    handles = [Patch(facecolor=colour, label=region.value) for region, colour in _COLOURS.items()]
-    handles.append(Patch(facecolor="none", edgecolor=INK, label="workspace"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+        _paint(figure.add_subplot(rows, columns, k + 1), case, each)
+    title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
+    words = [*title, "slices through the middle of the workspace"]
+    figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
+    handles = [
+        Patch(facecolor=kind.colour, edgecolor=INK, linewidth=0.4, hatch=kind.hatch, label=legible(kind.words))
+        for kind in entries
+    ]
+    handles.append(Patch(facecolor="none", edgecolor=INK, linewidth=1.6, label="workspace"))
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=across,
+        frameon=False,
+        fontsize=8,
+        labelcolor=INK,
+        title="\n".join(map(legible, notes)) or None,
+        title_fontproperties={"size": 8},
+        alignment="left",
+    )
     return figure
 
 
-def _shown(case: Case, each: Slice, point: FloatArray) -> FloatArray:
-    """Return a point (2,) of a slice in the case's units."""
-    parts = zip(point, each.are_angles, strict=True)
-    return np.array([case.units.shown(float(v), Dimension.ANGLE if a else Dimension.LENGTH) for v, a in parts])
+def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
+    """Return a PNG picture of each slice without words around it, for pages that have their own legend."""
+
+    def alone(each: Slice) -> Figure:
+        figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white")
+        # The same place in each picture, so that slices side by side stand in line.
+        _paint(figure.add_axes(_PLACE), case, each)
+        return figure
+
+    return [picture_of(partial(alone, each), ".png") for each in slices]
 
 
-def _outline(case: Case, each: Slice, box: FloatArray) -> FloatArray:
-    """Return the corners (4, 2) of a box in the case's units."""
-    (a, b), (c, d) = _shown(case, each, box[:2]), _shown(case, each, box[2:])
-    return np.array([[a, b], [c, b], [c, d], [a, d]])
+def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
+    """Return the kinds of boxes that slices have, in the order in which they are painted."""
+    kinds = _kinds(case, slices[0])
+    members = [[layer.members.any() for layer in _layers(each, kinds)] for each in slices]
+    shown = {layer.kind for row in members for layer, used in zip(_layers(slices[0], kinds), row, strict=True) if used}
+    return [kind for kind in kinds if kind in shown]
+
+
+def slices_notes(slices: Sequence[Slice]) -> list[str]:
+    """Return sentences about limits that the slices do not show, and about the limit that a box is coloured by."""
+    left_out = dict.fromkeys(key for each in slices for key in each.left_out)
+    notes = [f"not drawn: {', '.join(left_out)}"] if left_out else []
+    if len(slices[0].limits) > 1:
+        notes.append("where several limits are violated: the first on the straight way from the middle")
+    return notes
+
+
+def _paint(axes: Axes, case: Case, each: Slice) -> None:
+    """Paint the boxes of a slice, the outline of the workspace, and the names of the axes."""
+    axes.set_box_aspect(1)
+    for kind, members, is_filled in _layers(each, _kinds(case, each)):
+        if members.any():
+            style: dict[str, Any] = {"facecolor": kind.colour, "edgecolor": kind.colour, "linewidth": 0.3}
+            if not is_filled:
+                style = {"facecolor": "none", "edgecolor": INK, "linewidth": 0.0, "hatch": kind.hatch}
+            axes.add_patch(PathPatch(_path(_outlines(case, each, each.boxes[members])), gid=kind.words, **style))
+    _frame(axes, case, each)
+
+
+def _kinds(case: Case, each: Slice) -> list[Kind]:
+    """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
+    limits = each.limits
+    kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
+    kinds = [Kind(kept, _GREEN)]
+    for k, limit in enumerate(limits):
+        value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
+        how = "" if limit.is_enclosed else " at samples"
+        kinds.append(Kind(f"violated{how}: {limit.key} = {value}", _LIMITS[k % len(_LIMITS)]))
+    if limits:
+        kinds.append(Kind("limits open", _PALE))
+    return [*kinds, Kind(Region.BEYOND.value, _ORANGE, "////"), Kind(Region.OPEN.value, _BAND)]
+
+
+class _Layer(NamedTuple):
+    """Boxes (B,) of a slice that are painted in one way: filled or hatched."""
+
+    kind: Kind
+    members: NDArray[np.bool_]
+    is_filled: bool = True
+
+
+def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
+    """Return the layers of a slice, the lowest first; a box may be in two."""
+    regions = np.array([region.value for region in each.regions])
+    is_beyond, is_singular = regions == Region.BEYOND.value, regions == Region.OPEN.value
+    kept, *limits = kinds[: 1 + len(each.limits)]
+    *opened, beyond, band = kinds[1 + len(each.limits) :]
+    return [
+        _Layer(kept, (each.binding == KEPT) & ~is_beyond),
+        *(_Layer(kind, each.binding == k) for k, kind in enumerate(limits)),
+        *(_Layer(kind, each.binding == UNDECIDED) for kind in opened),
+        _Layer(beyond, (each.binding == KEPT) & is_beyond),
+        _Layer(beyond, is_beyond, is_filled=False),
+        _Layer(band, is_singular),
+    ]
+
+
+def _frame(axes: Axes, case: Case, each: Slice) -> None:
+    """Draw the outline of the workspace, and name the axes of a slice."""
+    inner, outer = (_shown(case, each, end) for end in each.workspace)
+    outline: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
+    if each.ball is None:
+        low, high = (_shown(case, each, end) for end in each.whole)
+        axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
+    else:
+        # The corners of the slice are nearest to its middle.
+        corner = np.abs(_shown(case, each, each.whole[1]))
+        low, high = -corner, corner
+        axes.add_patch(Circle((0.0, 0.0), case.units.shown(each.ball, Dimension.ANGLE), **outline))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    dimensions = [Dimension.ANGLE if is_angle else Dimension.LENGTH for is_angle in each.are_angles]
+    labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
+    axes.set_xlabel(legible(labels[0]), color=INK, fontsize=9, parse_math=False)
+    axes.set_ylabel(legible(labels[1]), color=INK, fontsize=9, parse_math=False)
+    axes.tick_params(colors=INK, labelsize=8)
+    for spine in axes.spines.values():
+        spine.set_edgecolor(MUTED)
+
+
+def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
+    """Return points (..., 2) of a slice in the case's units; of rotations about any axis the rotation vector."""
+    points = np.array(points)
+    if each.ball is not None:
+        cayley = np.tan(points / 2)
+        size = np.linalg.norm(cayley, axis=-1, keepdims=True)
+        points = np.where(size > 0, 2 * np.arctan(size) / np.where(size > 0, size, 1.0), 2.0) * cayley
+    scale = [case.units.shown(1.0, Dimension.ANGLE if is_angle else Dimension.LENGTH) for is_angle in each.are_angles]
+    return np.asarray(points * np.array(scale))
+
+
+def _path(outlines: FloatArray) -> Path:
+    """Return outlines (B, k, 2) as one path, which is a tenth as long in a file as so many polygons."""
+    count, points, _ = outlines.shape
+    closed = np.concatenate([outlines, outlines[:, :1]], axis=1).reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * (points - 1), Path.CLOSEPOLY], count)
+    return Path(closed, codes)
+
+
+def _outlines(case: Case, each: Slice, boxes: FloatArray) -> FloatArray:
+    """Return outlines (B, k, 2) of boxes (B, 4) in the case's units."""
+    a, b, c, d = boxes.T
+    corners = [(a, b), (c, b), (c, d), (a, d), (a, b)]
+    count = 1 if each.ball is None else _CURVED
+    points = []
+    for (x, y), (u, v) in itertools.pairwise(corners):
+        points += [np.column_stack([x + part * (u - x), y + part * (v - y)]) for part in np.arange(count) / count]
+    return _shown(case, each, np.stack(points, axis=1))

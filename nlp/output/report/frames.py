@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -32,6 +32,8 @@ _SIDE, _LEAST_SIDE, _SIDES = 20, 2, 80
 #: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
+#: Significant digits of numbers at postures other than the one found: the page shows seven, and computes with them.
+_DIGITS = 11
 #: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
 #: First elevation of the eye, degrees.
@@ -186,7 +188,9 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
         "zero": zero,
         "frames": [
-            _frame_data(drawing, t, posture, rates if k == zero else drawing.rates_at(posture), units)
+            _frame_data(drawing, t, posture, rates, units)
+            if k == zero
+            else _rounded(_frame_data(drawing, t, posture, drawing.rates_at(posture), units))
             for k, (t, posture) in enumerate(postures)
         ],
     }
@@ -245,6 +249,23 @@ def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray,
         "lengths": measured_values(drawing, posture, units),
         "velocities": drawing.velocities_at(posture).tolist(),
     }
+
+
+def _rounded(frame: FrameData) -> FrameData:
+    """Return a frame along the motion with as many digits as the page can show; that of the result keeps all."""
+    found: FrameData = _few_digits(frame)
+    return found
+
+
+def _few_digits(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    """Return JSON's values with rounded numbers."""
+    if isinstance(value, float):
+        return float(f"{value:.{_DIGITS}g}")
+    if isinstance(value, list):
+        return [_few_digits(each) for each in value]
+    if isinstance(value, dict):
+        return {key: _few_digits(each) for key, each in value.items()}
+    return value
 
 
 def _noise(drawing: Drawing, posture: Posture) -> float:

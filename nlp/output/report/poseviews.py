@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 
 from ..pictures.figures import picture
@@ -11,6 +12,13 @@ from .report import Report
 
 #: So many drawings stand in a page at most; the other views have their tables only.
 _DRAWINGS = 12
+#: Outlines of an SVG picture, and numbers in them with digits that nobody sees.
+_OUTLINE, _DIGITS = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
+
+
+def _with_fewer_digits(content: bytes) -> bytes:
+    """Return an SVG picture with two digits behind the points of its outlines, in units of 1/72 in."""
+    return _OUTLINE.sub(lambda found: _DIGITS.sub(rb"\1", found[0].replace(b"\n", b" ")), content)
 
 
 def pose_controls(views: list[ViewData], poses: int) -> Markup | None:
@@ -40,7 +48,7 @@ def drawings(report: Report) -> Markup:
     ]
     stills = []
     for index, view, drawing in found[:_DRAWINGS]:
-        source = b64encode(picture([drawing], ".svg")).decode("ascii")
+        source = b64encode(_with_fewer_digits(picture([drawing], ".svg"))).decode("ascii")
         words = f"The robot, {view['pose_words']}; the table below has its numbers."
         kind = "still" if index else "still chosen"
         stills.append(tag("img", src=f"data:image/svg+xml;base64,{source}", alt=words, class_=kind, data_view=index))

@@ -323,10 +323,10 @@
 
   // The library is half of a second's work: it waits until words and tables are painted.
   requestAnimationFrame(() => setTimeout(async () => {
-    const library = document.createElement("script");
-    library.textContent = byId("plotly").textContent;
-    document.head.append(library);
     try {
+      const library = document.createElement("script");
+      library.textContent = await unpacked(byId("plotly").textContent);
+      document.head.append(library);
       if (view && !hasWebGL()) throw new Error("no WebGL");
       if (view) {
         byId("view").textContent = "";

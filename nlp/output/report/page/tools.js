@@ -58,6 +58,12 @@ function heads(name, tips, directions, length, fill) {
   return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
 }
 
+// A text from its compressed bytes in base 64; a browser that cannot do so shows what needs no library.
+const unpacked = (text) => {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+};
+
 const hasWebGL = () => {
   try {
     return Boolean(document.createElement("canvas").getContext("webgl"));

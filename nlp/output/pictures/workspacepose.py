@@ -1,0 +1,41 @@
+"""The robot at one pose of its workspace."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ....models import Dimension
+from ...case.case import Case
+from ...case.pose import HERE, Rotation
+from ...evidence.closing import closed_start
+from ...evidence.state import evaluate
+from ...program.formulation import formulate_each
+from ...results.workspaceposes import PosedClaim
+from ...workspace.verdict import Outcome
+from .drawing import Drawing, drawing_of
+
+
+def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
+    """Return the robot at the pose of a claim, with the case's first task.
+
+    Args:
+        case: with fixed dimensions.
+        claim: the claim and the pose, in the case's units.
+
+    Raises:
+        EvaluationError: the robot does not exist at the pose.
+    """
+    pose = claim.pose
+    angle = case.units.to_internal(pose.angle, Dimension.ANGLE)
+    posed = replace(
+        case,
+        position=tuple(pose.position),
+        rotation=Rotation(tuple(pose.axis), angle),
+        displacements=(HERE,),
+        further=(),
+        workspace=None,
+    )
+    nlp = formulate_each(posed)[0]
+    x = closed_start(nlp)
+    headline = f"{claim.outcome.value}: {claim.words}"
+    return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)

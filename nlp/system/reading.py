@@ -1,0 +1,41 @@
+"""Reading of files up to a size, each fault as one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+
+
+def read_limited(source: str | Path, largest: int, *, is_regular: bool = False) -> bytes:
+    """Return the bytes of a file.
+
+    Args:
+        source: name of the file, as messages write it.
+        largest: size of the largest file that is read, bytes; a device has no end.
+        is_regular: whether pipes and devices are refused.
+
+    Raises:
+        InputError: it cannot be read, is no regular file where it must be, or is larger.
+    """
+    path = Path(source)
+    try:
+        if is_regular and path.exists() and not path.is_file():
+            raise InputError(f"{source}: cannot be read: it is no file")
+        with path.open("rb") as file:
+            content = file.read(largest + 1)
+    except (OSError, ValueError) as error:
+        fault = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(f"{source}: cannot be read: {fault}") from None
+    if len(content) > largest:
+        raise InputError(f"{source}: cannot be read: it is larger than {largest // 2**20} MB")
+    return content
+
+
+def text_of_bytes(content: bytes) -> str:
+    """Return UTF-8 text without a byte order mark, with the line ends of Unix.
+
+    Raises:
+        UnicodeDecodeError: it is no such text.
+    """
+    return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")

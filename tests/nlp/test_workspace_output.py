@@ -1,0 +1,295 @@
+"""What a user sees of a workspace: slices, a page, a picture of the worst pose, commands that show a pose."""
+
+import json
+import math
+import re
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, Free, Limits, load_case, load_result
+from screwsynth.nlp.case.limits.clearance import LegClearance
+from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.output.pictures.workspaceslices import slices_legend
+from screwsynth.nlp.results.workspace import WorkspaceResult
+from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
+from screwsynth.nlp.workspace.limitcells import LimitCells, LimitState
+from screwsynth.nlp.workspace.machine import legs_of
+from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.workspace.slices import UNDECIDED, slices_of
+
+Run = Callable[..., tuple[int, str, str]]
+
+#: Limits of every kind that a slice shows, on a design that violates each of them somewhere.
+LIMITED = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 5, x4 = 9 }
+[pose]
+position = [0, 0, 20]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+leg_length = { min = 26, max = 34 }
+base_joint_angle = { max = 25, about = "home" }
+home = { position = [0, 0, 20] }
+leg_clearance = { min = 3.5 }
+smallest_singular_value = { min = 0.5, length = 11.5 }
+actuator = { stroke_max = 12 }
+[workspace]
+position = [{ min = -4, max = 4 }, 0, { min = 17, max = 23 }]
+"""
+#: Number of random boxes, and of poses in each.
+BOXES, POSES = 120, 4
+
+
+@pytest.fixture(scope="module")
+def limited(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("workspace") / "a machine.toml"
+    path.write_text(LIMITED, encoding="utf-8")
+    return path
+
+
+def violations(
+    case: Case, position: FloatArray, rotation: FloatArray, *, angle: float = 25, with_distances: bool = True
+) -> dict[str, FloatArray]:
+    """How far each limit is violated at poses, (K, 3) and (K, 3, 3): positive where it is; by the definitions alone."""
+    legs = legs_of(case)
+    assert legs is not None
+    ends = position[:, None] + np.einsum("kij,lj->kli", rotation, legs.platform)
+    span = ends - legs.base
+    length = np.linalg.norm(span, axis=2)
+    home = np.array([0, 0, 20]) + legs.platform - legs.base
+    cosines = np.einsum("kli,li->kl", span / length[..., None], home / np.linalg.norm(home, axis=1)[:, None])
+    unit = span / length[..., None]
+    J = np.concatenate([unit, np.cross(ends - position[:, None], unit) / 11.5], axis=2)
+    found = {
+        "leg_length.min": 26 - length.min(axis=1),
+        "leg_length.max": length.max(axis=1) - 34,
+        "base_joint_angle.max": np.degrees(np.arccos(cosines.min(axis=1))) - angle,
+    }
+    if not with_distances:
+        return found
+    # The distance of two legs, from many pairs of their points: at most the distance between these too large.
+    parts = np.linspace(0, 1, 21)[:, None]
+    points = legs.base[None, :, None] + parts * span[:, :, None]
+    apart = np.full(len(position), np.inf)
+    for one in range(6):
+        for other in range(one):
+            between = points[:, one, :, None] - points[:, other, None]
+            apart = np.minimum(apart, np.sqrt((between**2).sum(axis=3).min(axis=(1, 2))))
+    return found | {
+        "leg_clearance.min": 3.5 - apart,
+        "smallest_singular_value.min": 0.5 - np.linalg.svd(J, compute_uv=False)[:, -1],
+    }
+
+
+@pytest.mark.parametrize("kind", TurnKind)
+def test_limits_over_boxes_are_those_at_their_poses(limited: Path, kind: TurnKind) -> None:
+    case, rng = load_case(str(limited)), np.random.default_rng(0)
+    count = 3 if kind is TurnKind.ROLL_PITCH_YAW else 1
+    turns = Turns(kind, (Free(-0.7, 0.7),) * count, (0.6, 0.0, 0.8))
+    box = pose_box(Workspace((Free(-12.0, 12.0), 0.0, Free(11.0, 29.0)), turns))
+    chosen = (0, 3) if kind is TurnKind.AXIS else (3, 4)
+    machine = legs_of(case)
+    assert machine is not None
+    cells = LimitCells(case, machine, box, chosen)
+    lower = np.repeat(0.5 * (box.lower + box.upper)[None], BOXES, axis=0)
+    upper = lower.copy()
+    size = (box.upper - box.lower)[list(chosen)] * 2.0 ** -rng.integers(3, 8, size=(BOXES, 1))
+    lower[:, chosen] = rng.uniform(box.lower[list(chosen)], box.upper[list(chosen)] - size)
+    upper[:, chosen] = lower[:, chosen] + size
+    states = cells.states(cells.examine(np.repeat(cells.unknown, BOXES, axis=1), lower, upper))
+    points = rng.uniform(np.repeat(lower, POSES, axis=0), np.repeat(upper, POSES, axis=0))
+    found = violations(case, points[:, :3], np.array([box.pose(point).rotation for point in points]))
+    for limit, row in zip(cells.limits, states, strict=True):
+        values = found[limit.key].reshape(BOXES, POSES)
+        # The distance of two legs is taken between points 1.7 in apart: it is too large by less than 0.3 in.
+        slack = 0.3 if limit.key == "leg_clearance.min" else 1e-9
+        assert (values[row == LimitState.KEPT] <= 1e-9).all(), limit.key
+        assert (values[row == LimitState.VIOLATED] > -slack).all(), limit.key
+        assert np.count_nonzero(row == LimitState.OPEN) < 0.7 * BOXES, limit.key
+    assert (states == LimitState.VIOLATED).any(axis=1).sum() >= 3
+    assert (states == LimitState.KEPT).any(axis=1).sum() >= 3
+
+
+def test_a_box_has_the_limit_that_is_violated_first(limited: Path) -> None:
+    case = load_case(str(limited), {"limits.base_joint_angle.max": 12})
+    slow = (SmallestSingularValue, LegClearance)
+    case = replace(case, limits=Limits(*[each for each in case.limits if not isinstance(each, slow)]))
+    (each,) = slices_of(case)
+    assert each.names == ("p_x", "p_z")
+    assert each.left_out == ("actuator.stroke_max",)
+    area = np.prod(each.boxes[:, 2:] - each.boxes[:, :2], axis=1)
+    assert area.sum() == pytest.approx(float(np.prod(each.whole[1] - each.whole[0])))
+    # Boxes that are left open are as small as they get, and few.
+    assert area[each.binding == UNDECIDED].sum() < 0.05 * area.sum()
+    keys = [limit.key for limit in each.limits]
+    chosen = np.flatnonzero((area > area.sum() / 4**7) & (each.binding >= 0))
+    middle = each.workspace.mean(axis=0)
+    ends = 0.5 * (each.boxes[chosen, :2] + each.boxes[chosen, 2:])
+    way = middle + np.linspace(0, 1, 40)[:, None, None] * (ends - middle)
+    position = np.stack([way[..., 0], np.zeros(way.shape[:2]), way[..., 1]], axis=-1).reshape(-1, 3)
+    found = violations(
+        case, position, np.repeat(np.eye(3)[None], len(position), axis=0), angle=12, with_distances=False
+    )
+    on_way = np.array([(found[key] > 0).reshape(way.shape[:2]) for key in keys])
+    begins = np.where(on_way.any(axis=1), np.argmax(on_way, axis=1), way.shape[0] - 1)
+    own = begins[each.binding[chosen], np.arange(len(chosen))]
+    # The grid in which the first one is looked up has steps of 1/64 of the slice, the way here of 1/80.
+    assert (own <= begins.min(axis=0) + 3).all()
+    assert len(set(each.binding[chosen].tolist())) > 2
+    words = [kind.words for kind in slices_legend(case, [each])]
+    assert "violated: leg_length.max = 34 in" in words
+
+
+@pytest.fixture(scope="module")
+def refuted(limited: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, WorkspaceResult, Path]:
+    """Output, result and files of a machine with refuted claims."""
+    folder = tmp_path_factory.mktemp("judged")
+    files = [str(folder / name) for name in ("result.json", "page.html", "worst.svg")]
+    flags = [part for pair in zip(("--json", "--html", "--picture"), files, strict=True) for part in pair]
+    numbers = ["x3=6", "limits.leg_clearance.min=6", "limits.base_joint_angle.max=8", "limits.actuator.stroke_max=5"]
+    flags += [part for each in numbers for part in ("--set", each)]
+    run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "0.1", *flags])
+    assert run.exit_code == 1
+    result = load_result(folder / "result.json")
+    assert isinstance(result, WorkspaceResult)
+    return run.output, result, folder
+
+
+def test_each_command_shows_what_it_is_printed_for(refuted: tuple[str, WorkspaceResult, Path], cli: Run) -> None:
+    out, result, folder = refuted
+    claims = list(refuted_claims(result))
+    keys = {each.key for each in claims}
+    assert keys == {"base_joint_angle.max", "leg_length.min", "actuator.stroke_max", "leg_clearance.min"}
+    lines = [line.removeprefix("see it with  ") for line in out.splitlines() if line.startswith("see it with")]
+    # One for each limit, and two for a stroke, which no single pose shows.
+    assert len(lines) == len(keys) + 1
+    page = Reader((folder / "page.html").read_text(encoding="utf-8")).words
+    assert all(line in page for line in lines)
+    words = [line.removeprefix("refuted  ") for line in out.splitlines() if line.startswith("refuted")]
+    for claim, line in zip(words, lines, strict=True):
+        program, *arguments = shlex.split(line)
+        assert program == "screwsynth"
+        status, shown, _ = cli(*arguments, "--json", "-")
+        assert status == 1
+        point = json.loads(shown)
+        found = re.fullmatch(r"(.*): (?:smallest|largest) (\S+) \S+, limit (\S+) = (\S+) \S+", claim)
+        if found is None:
+            assert claim.startswith("actuator.stroke_max")
+            continue
+        name, reached, key, limit = found.groups()
+        # Of limbs that mirror each other the point names one.
+        alike = [each["value"] for each in point["violated"] if each["name"].split()[0] == name.split()[0]]
+        assert any(each == pytest.approx(float(reached), rel=1e-6) for each in alike)
+        row = next(each for each in point["limits"] if each["key"] == key)
+        assert row["limit"] == pytest.approx(float(limit))
+        assert row["value"] == pytest.approx(float(reached), rel=1e-6)
+
+
+def test_a_command_takes_the_place_of_a_rotation_in_another_form(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "turned.toml"
+    turned = LIMITED.partition("[limits]")[0].replace(
+        "position = [0, 0, 20]", "position = [0, 0, 20]\nrotation = { rpy = [0, 0, 9] }"
+    )
+    path.write_text(
+        f"{turned}[limits]\nleg_length = {{ max = 27 }}\n[workspace]\nposition = [{{ min = -5, max = 5 }}, 0, 20]\n"
+    )
+    status, out, _ = cli("workspace", str(path), "--gap", "0.1")
+    assert status == 1
+    line = next(line for line in out.splitlines() if line.startswith("see it with"))
+    status, shown, err = cli(*shlex.split(line.removeprefix("see it with"))[1:], "--json", "-")
+    assert (status, err) == (1, "")
+    assert json.loads(shown)["violated"][0]["name"].startswith("leg_length")
+    status, _, err = cli("evaluate", str(path), "--set", "axis=0,0,1")
+    assert status == 2
+    assert "angle" in err
+
+
+def test_a_singular_pose_is_seen_with_its_command(cli: Run, tmp_path: Path) -> None:
+    path = tmp_path / "turned.toml"
+    fixed = LIMITED.partition("[limits]")[0]
+    path.write_text(f"{fixed}[workspace]\nposition = [0, 0, 20]\nrotation = {{ angle = {{ min = -80, max = 80 }} }}\n")
+    status, out, _ = cli("workspace", str(path), "--gap", "0.5", "--time", "0.1")
+    assert status == 1
+    assert "refuted  regular: J is singular" in out
+    line = next(line for line in out.splitlines() if line.startswith("see it with"))
+    _, shown, _ = cli(*shlex.split(line.removeprefix("see it with"))[1:], "--json", "-")
+    assert json.loads(shown)["rank"] < 6
+
+
+class Reader(HTMLParser):
+    """Headings, images and text of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.images: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        if found.get("id"):
+            self.ids.append(found["id"] or "")
+        if tag == "img":
+            self.images.append(found["src"] or "")
+
+    def handle_data(self, data: str) -> None:
+        self.words += data
+
+
+def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceResult, Path]) -> None:
+    _, result, folder = refuted
+    text = (folder / "page.html").read_text(encoding="utf-8")
+    page = Reader(text)
+    assert {"verdicts", "robot", "slices", "refuted", "origin"} <= set(page.ids)
+    assert len(page.images) == 1 + 1
+    assert all(each.startswith("data:image/") for each in page.images)
+    assert "http" not in re.sub(r"http-equiv|http://www\.w3\.org/\S+", "", text)
+    for claim in refuted_claims(result):
+        assert claim.words in page.words
+    assert len(text) < 1_000_000
+    worst = worst_claim(result, Sense.MAX)
+    assert worst is not None
+    assert worst.words in page.words
+    assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
+
+
+def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
+    status, out, _ = cli("workspace", "hexapod-linuxcnc")
+    assert status == 0
+    assert "everything is proved for every pose" in out
+    assert math.isclose(load_case("hexapod-linuxcnc").position[2], 20)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--html", "-", "--json", "-"], "standard output can take one of --json - and --html - only"),
+        (["--picture", "a.txt"], "a.txt"),
+        (["--html", "nowhere/page.html"], "nowhere/page.html"),
+    ],
+)
+def test_files_are_refused_in_a_sentence(cli: Run, flags: list[str], words: str) -> None:
+    status, out, err = cli("workspace", "hexapod-linuxcnc", *flags)
+    assert status == 2
+    assert out == ""
+    assert words in err
+    assert err.count("\n") == 1
