@@ -42,16 +42,19 @@ def main() -> int:
     if chosen.page:
         page.write(Store.read(path).data, PAGE, target)
         return 0
-    total = chosen.total or (QUICK_TOTAL if chosen.quick else FULL_TOTAL)
+    usual = QUICK_TOTAL if chosen.quick else FULL_TOTAL
+    total = chosen.total or usual
     store = Store.begin(path, "quick" if chosen.quick else "full")
     began, failed = time.monotonic(), False
     for name in chosen.sections:
         module = SECTIONS[name]
         plan = module.QUICK if chosen.quick else module.FULL
         left = total - (time.monotonic() - began)
-        print(f"{name}: at most {min(left, plan.seconds):.0f} s", file=sys.stderr, flush=True)
+        # A shorter run shortens each section, and the last one has what is left.
+        seconds = min(left, plan.seconds if module is race else plan.seconds * min(1.0, total / usual))
+        print(f"{name}: at most {seconds:.0f} s", file=sys.stderr, flush=True)
         try:
-            module.run(plan._replace(seconds=min(left, plan.seconds)), store.keeper(name))
+            module.run(plan._replace(seconds=seconds), store.keeper(name))
         except Exception:  # the other sections are measured all the same
             traceback.print_exc()
             failed = True

@@ -1,6 +1,6 @@
 """What ``make bench`` measures, one section in each module, and the page that it writes.
 
-In order: machine, problems, judging, attempts, workers, race; numpyrobot, compiledc, evaluation; certificates; growth;
+In order: machine, shares, problems, judging, attempts, workers, race; numpyrobot, evaluation; certificates; growth;
 summary, store, tables, racetables, page.
 """
 

@@ -26,6 +26,7 @@ from screwsynth.nlp.program.sampling import starting_points
 
 from . import numpyrobot
 from .problems import Subject, subject_of
+from .shares import shared
 
 _FOLDER = Path(__file__).parents[1]
 #: The case with implementations by hand.
@@ -52,21 +53,18 @@ FULL = Plan((_BY_HAND, "paper-4.3", "paper-4.4-max", "hexapod-machining", "3-rps
 
 def run(plan: Plan, keep: Callable[[object], None]) -> None:
     """Measure each case and hand over the rows so far."""
-    deadline, rows = time.monotonic() + plan.seconds, []
-    for name in plan.cases:
-        if time.monotonic() > deadline:
-            rows.append({"case": name, "note": "left out: no time"})
-            continue
+    rows: list[dict[str, object]] = []
+    for name, end in shared(plan.seconds, plan.cases):
         print(f"  {name}", file=sys.stderr, flush=True)
         try:
-            rows += _rows(name, subject_of(name), plan)
+            rows += _rows(name, subject_of(name), plan, end)
         except (subprocess.CalledProcessError, OSError, ValueError) as fault:
             rows.append({"case": name, "note": f"failed: {type(fault).__name__}: {fault}"[:160]})
         keep({"rows": rows})
 
 
-def _rows(name: str, subject: Subject, plan: Plan) -> list[dict[str, object]]:
-    """Return the rows of a case, one for each quantity."""
+def _rows(name: str, subject: Subject, plan: Plan, end: float) -> list[dict[str, object]]:
+    """Return the rows of a case, one for each quantity; after the end of its time no further turn begins."""
     points = starting_points(subject.nlp, _BATCH + 1, 0)[1:]
     machines = _functions(subject.nlp)
     best: dict[str, list[float]] = {}
@@ -76,7 +74,9 @@ def _rows(name: str, subject: Subject, plan: Plan) -> list[dict[str, object]]:
         _compile(folder, subject, by_hand=name == _BY_HAND)
         if name == _BY_HAND:
             _compare(machines, points)
-        for _ in range(plan.turns):
+        for turn in range(plan.turns):
+            if turn and time.monotonic() > end:
+                break
             *generated, own = map(float, _output(folder, "./evaluation", str(plan.each)).split())
             operation = min(operation, own)
             _keep_least(best, "generated C", generated)

@@ -24,6 +24,8 @@ from poses import case_of as case_with_poses
 
 from screwsynth.nlp import Case, Limits, Task, certify_program, load_case, solve
 
+from .shares import shared
+
 _HELICAL = "paper-4.1-helical"
 #: Starts of a solve where something else grows.
 _STARTS = 8
@@ -146,11 +148,11 @@ FULL = Plan(_series(3), 210.0)
 
 def run(plan: Plan, keep: Callable[[object], None]) -> None:
     """Measure each series and hand over those so far; a size that would begin after the end of the time is left out."""
-    deadline, found = time.monotonic() + plan.seconds, []
-    for series in plan.series:
+    found: list[dict[str, object]] = []
+    for series, end in shared(plan.seconds, [each for each in plan.series if each.sizes]):
         print(f"  {series.name}", file=sys.stderr, flush=True)
         try:
-            found.append(_measured(series, deadline))
+            found.append(_measured(series, end))
         except Exception as fault:  # the other series are measured all the same
             found.append({"name": series.name, "note": f"failed: {type(fault).__name__}: {fault}"[:160]})
         keep({"series": found})

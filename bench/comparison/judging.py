@@ -59,9 +59,14 @@ class Reference(NamedTuple):
     scale: float
 
     @property
+    def unit(self) -> float:
+        """Size in whose parts differences of F are: that of F, or F's scale where F is 0."""
+        return abs(self.F) if abs(self.F) > ZERO * self.scale else self.scale
+
+    @property
     def tolerance(self) -> float:
         """Largest difference of F between a correct answer and this one."""
-        return SAME_F * (abs(self.F) if abs(self.F) > ZERO * self.scale else self.scale)
+        return SAME_F * self.unit
 
     def accepts(self, verdict: Verdict) -> bool:
         """Whether an answer is correct: feasible, and as good as the best known."""

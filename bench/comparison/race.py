@@ -1,4 +1,4 @@
-"""Time to the optimum: every peer on every case, one attempt of each by turns, until its seeds or its time are used up.
+"""Time to the optimum: every peer on every case by short turns, until its seeds or its time are used up.
 
 By turns, because a machine that becomes busy then burdens all. What is kept is each attempt with its verdict; which of
 them are correct is decided when the page is written, from the best answer that the whole run knows.
@@ -25,6 +25,8 @@ _PROVABLE = ("paper-4.1-helical", "paper-4.2-rotation", "paper-4.3", "paper-4.4-
 _GAP = 5e-7
 #: Seconds between two writings of what is known so far.
 _WRITE_EVERY = 10.0
+#: CPU seconds after which the turn of a peer on a case ends: quick ones make several attempts in each.
+_TURN = 0.3
 #: Losses of a peer's process on a case after which it is not begun again.
 _MOST_LOSSES = 2
 
@@ -93,7 +95,8 @@ def run(plan: Plan, keep: Callable[[object], None], peers: tuple[Peer, ...] | No
             for pair in pairs:
                 if time.monotonic() > deadline:
                     break
-                if pair.is_open(plan):
+                before = pair.seconds
+                while pair.is_open(plan) and pair.seconds <= before + _TURN and time.monotonic() < deadline:
                     _attempt(pair, workers[pair.peer.name], plan)
                 if time.monotonic() > written + _WRITE_EVERY:
                     written = time.monotonic()

@@ -109,6 +109,7 @@ def _case_table(scores: Sequence[Score]) -> str:
                 each.peer,
                 f"{each.correct} of {each.attempts}" if each.attempts else "-",
                 "" if each.polished is None or not each.attempts else f"{each.polished} of {each.attempts}",
+                "-" if each.error is None else f"{each.error:.0e}",
                 "-" if each.seconds is None else number(1e3 * each.seconds),
                 work,
                 "-" if each.expected is None else number(1e3 * each.expected),
@@ -116,7 +117,17 @@ def _case_table(scores: Sequence[Score]) -> str:
                 "; ".join(part for part in (_spent(each), each.note) if part),
             )
         )
-    columns = ("method", "correct", "after a polish", "median ms", "evaluations", "expected ms", "ratio", "remark")
+    columns = (
+        "method",
+        "correct",
+        "after a polish",
+        "error of F",
+        "median ms",
+        "evaluations",
+        "expected ms",
+        "ratio",
+        "remark",
+    )
     return table(columns, rows)
 
 

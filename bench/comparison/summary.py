@@ -36,6 +36,8 @@ class Score(NamedTuple):
         attempts: number.
         correct: of them, as returned.
         polished: of them, after the polish; None for local methods.
+        error: median difference of F from the best known, as returned, of feasible answers: a part of F, or of its
+            scale where the best is 0; None where none is feasible.
         seconds: median CPU time of an attempt.
         evaluations: median number of evaluations of F; None for this program's searches.
         iterations: median number of iterations of this program's searches; None for others.
@@ -48,6 +50,7 @@ class Score(NamedTuple):
     attempts: int
     correct: int
     polished: int | None
+    error: float | None
     seconds: float | None
     evaluations: float | None
     iterations: float | None
@@ -96,6 +99,7 @@ def score_of(pair: Mapping[str, Any], best: Reference, *, is_global: bool) -> Sc
         len(attempts),
         correct,
         at_last if is_global else None,
+        _median([abs(each[0].F - best.F) / best.unit for each in judged if each[0].is_feasible]),
         _median([each["seconds"] for each in attempts]),
         _median([each["evaluations"] for each in attempts if each["evaluations"] is not None]),
         _median([each["iterations"] for each in attempts if each["iterations"] is not None]),

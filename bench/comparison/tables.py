@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 Row = Mapping[str, Any]
-#: Load at the begin above which a machine is busy with something else.
-_BUSY = 0.7
+#: Load of each core at the begin above which a machine is busy with something else.
+_BUSY = 0.5
+_RUNS = {"quick": "A quick run, with few attempts and short limits", "full": "A full run"}
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -36,10 +37,10 @@ def machine_lines(data: Row) -> str:
     """Return machine, versions, date and the kind of the run."""
     at = data["machine"]
     packages = ", ".join(f"{name} {version}" for name, version in at["packages"].items())
-    run = {"quick": "**Preliminary**: a quick run, with few attempts and short limits", "full": "A full run"}[
-        data["run"]
-    ]
-    begin = f"{run}, {at['date']}, revision {at['revision']}, {data.get('seconds', '-')} s in all."
+    run = _RUNS[data["run"]]
+    if at["load"] > _BUSY * at["cores"]:
+        run = f"**Preliminary, on a machine that was busy with other work.** {run}"
+    begin = f"{run}, {at['date']}, revision {at['revision']}, {data.get('seconds', '-')} s."
     hardware = f"{at['processor']}, {at['cores']} cores, load {at['load']} at the begin."
     return f"{begin} {hardware} {at['system']}, Python {at['python']}, {at['compiler']}; {packages}.\n"
 
