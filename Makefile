@@ -44,11 +44,12 @@ docs: $(VENV)/ready ## write the program's output into the documentation
 figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py
 
-# The methods that are compared are installed one by one: without one of them, its rows say so.
+# Where not all methods that are compared can be installed, each is tried by itself: the rows of a missing one say so.
 PEERS := scipy nlopt cma pygmo pyscipopt maingopy
 bench: $(VENV)/ready ## compare with other methods and write docs/benchmarks.md; BENCH=--quick for a short run
-	@for each in $(PEERS); do $(BIN)/python -P -c "import $$each" 2>/dev/null || \
-		$(BIN)/python -m pip install --quiet "$$each" || echo "$$each is left out"; done
+	@$(BIN)/python -P -c 'import scipy, nlopt, cma, pygmo, pyscipopt, maingopy' 2>/dev/null \
+		|| $(BIN)/python -m pip install --quiet --editable '.[bench]' \
+		|| for each in $(PEERS); do $(BIN)/python -m pip install --quiet $$each || echo "without $$each"; done
 	$(BIN)/python bench/benchmark.py $(BENCH)
 
 clean: ## remove the environment and all build results
