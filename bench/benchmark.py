@@ -33,6 +33,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="few attempts, short limits")
     parser.add_argument("--total", type=float, metavar="SECONDS", help="most seconds of the whole run")
+    parser.add_argument("--attempt", type=float, metavar="SECONDS", help="most CPU seconds of an attempt of a method")
     parser.add_argument("--sections", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="what is measured")
     parser.add_argument("--page", action="store_true", help="measure nothing, write the page from the last results")
     parser.add_argument("--write", action="store_true", help="write docs/benchmarks.md after a quick run too")
@@ -45,14 +46,19 @@ def main() -> int:
     usual = QUICK_TOTAL if chosen.quick else FULL_TOTAL
     total = chosen.total or usual
     store = Store.begin(path, "quick" if chosen.quick else "full")
+    store.data["is_shortened"] = total < usual
     began, failed = time.monotonic(), False
     for name in chosen.sections:
         module = SECTIONS[name]
         plan = module.QUICK if chosen.quick else module.FULL
         left = total - (time.monotonic() - began)
         # A shorter run shortens each section, and the last one has what is left.
+        if module is race and chosen.attempt:
+            plan = plan._replace(budget=plan.budget._replace(seconds=chosen.attempt))
         seconds = min(left, plan.seconds if module is race else plan.seconds * min(1.0, total / usual))
         print(f"{name}: at most {seconds:.0f} s", file=sys.stderr, flush=True)
+        if seconds <= 0:
+            continue  # the page says that it was not measured
         try:
             module.run(plan._replace(seconds=seconds), store.keeper(name))
         except Exception:  # the other sections are measured all the same

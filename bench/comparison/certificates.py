@@ -7,6 +7,7 @@ natural formulation) and ``limbs.py`` (joint coordinates and axes, this program'
 from __future__ import annotations
 
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -101,7 +102,7 @@ def _own(question: Question, seconds: float) -> dict[str, object]:
 def _general(question: Question, method: str, seconds: float) -> dict[str, object]:
     """Return what a general solver reaches within a time."""
     command = [sys.executable, str(_FOLDER / question.script), method, question.word, str(seconds)]
-    began = time.monotonic()
+    before = _children_seconds()
     with tempfile.TemporaryDirectory() as folder:  # a solver writes its log where it runs
         try:
             done = subprocess.run(
@@ -109,7 +110,7 @@ def _general(question: Question, method: str, seconds: float) -> dict[str, objec
             )
         except subprocess.TimeoutExpired:
             return {"note": f"ended after {seconds + _GRACE:.0f} s without an answer"}
-    taken = time.monotonic() - began
+    taken = _children_seconds() - before
     reached = _REACHED.search(done.stdout)
     if reached is None:
         said = (done.stderr.strip().splitlines() or ["no words"])[-1]
@@ -123,3 +124,9 @@ def _general(question: Question, method: str, seconds: float) -> dict[str, objec
         "nodes": int(reached[3]),
         "seconds": taken,
     }
+
+
+def _children_seconds() -> float:
+    """Return the CPU time of all processes that this one has begun and that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime

@@ -6,6 +6,7 @@ them are correct is decided when the page is written, from the best answer that 
 
 from __future__ import annotations
 
+import random
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -86,13 +87,15 @@ def run(plan: Plan, keep: Callable[[object], None], peers: tuple[Peer, ...] | No
         subjects[name] = subject_of(name)
         cases[name] = _reference(name, subjects[name], plan)
     pairs = [_Pair(name, peer, _reason_against(peer, subjects[name])) for name in plan.cases for peer in peers]
+    # In an order that favours no case and no peer, where the time ends within the first turn.
+    random.Random(0).shuffle(order := list(pairs))  # noqa: S311 - an order, no secret
     workers = {peer.name: Worker(peer, subjects) for peer in peers}
     written, turn = time.monotonic(), 0
     try:
         while any(pair.is_open(plan) for pair in pairs) and time.monotonic() < deadline:
             turn += 1
             print(f"  turn {turn}: {sum(pair.is_open(plan) for pair in pairs)} pairs", file=sys.stderr, flush=True)
-            for pair in pairs:
+            for pair in order:
                 if time.monotonic() > deadline:
                     break
                 before = pair.seconds

@@ -69,9 +69,10 @@ def _expected(scores: Mapping[str, Sequence[Score]]) -> str:
         found = [None if each[k].expected is None else 1e3 * each[k].expected for each in scores.values()]
         is_least = [each[k].expected == best for each, best in zip(scores.values(), least, strict=True)]
         cells = [f"**{number(ms)}**" if bold and ms else number(ms) for ms, bold in zip(found, is_least, strict=True)]
-        rows.append((name, *cells))
+        tried = [each[k].attempts > 0 for each in scores.values()]
+        rows.append((name, *(cell if has else "" for cell, has in zip(cells, tried, strict=True))))
     text = (
-        "Expected CPU time to a correct answer, ms; a dash where no attempt was correct, bold the least of a case:\n\n"
+        "Expected CPU time to a correct answer, ms; a dash where no attempt was correct, empty where none was made:\n\n"
     )
     return text + table(("method", *(f"`{case}`" for case in scores)), rows)
 

@@ -37,7 +37,7 @@ def machine_lines(data: Row) -> str:
     """Return machine, versions, date and the kind of the run."""
     at = data["machine"]
     packages = ", ".join(f"{name} {version}" for name, version in at["packages"].items())
-    run = _RUNS[data["run"]]
+    run = _RUNS[data["run"]] + (", cut short" if data.get("is_shortened") else "")
     if at["load"] > _BUSY * at["cores"]:
         run = f"**Preliminary, on a machine that was busy with other work.** {run}"
     begin = f"{run}, {at['date']}, revision {at['revision']}, {data.get('seconds', '-')} s."
