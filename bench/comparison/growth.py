@@ -115,15 +115,15 @@ def _free_variables(size: int) -> Callable[[], int]:
 
 def _rows(size: int) -> Callable[[], None]:
     """Return a sweep of a number of pitches as a whole command, compiled before."""
-    words = ["sweep", _HELICAL, "--over", f"task.pitch=0:2:{size}"]
 
-    def call() -> None:
+    def sweep(count: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-P", "-m", "screwsynth.nlp", *words, "--out", str(Path(folder) / "rows.csv")]
+            command = [sys.executable, "-P", "-m", "screwsynth.nlp", "sweep", _HELICAL]
+            command += ["--over", f"task.pitch=0:2:{count}", "--out", str(Path(folder) / "rows.csv")]
             subprocess.run(command, check=True, capture_output=True)
 
-    call()
-    return call
+    sweep(2)
+    return lambda: sweep(size)
 
 
 def _series(scale: int) -> tuple[Series, ...]:
@@ -159,13 +159,15 @@ def run(plan: Plan, keep: Callable[[object], None]) -> None:
 
 
 def _measured(series: Series, deadline: float) -> dict[str, object]:
-    """Return the medians of a series, and its exponent or factor."""
-    calls = {size: series.measure(size) for size in series.sizes if time.monotonic() < deadline}
+    """Return the medians of a series, and its exponent or factor; the two least sizes are measured in any case."""
+    calls = {
+        size: series.measure(size) for size in series.sizes if size in series.sizes[:2] or time.monotonic() < deadline
+    }
     times: dict[int, list[float]] = {size: [] for size in calls}
     counts: dict[int, int | None] = {}
     for turn in range(series.turns):
         for size in list(calls)[:: -1 if turn % 2 else 1]:
-            if time.monotonic() > deadline:
+            if time.monotonic() > deadline and (turn or size not in series.sizes[:2]):
                 continue
             began = time.perf_counter()
             counts[size] = calls[size]()
