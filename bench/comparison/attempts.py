@@ -21,6 +21,8 @@ from .problems import Subject
 _POLISH = Budget(5_000, 1.0)
 #: CPU seconds beyond its budget after which a search is ended by a signal, because it evaluates nothing.
 _LATE = 0.2
+#: Wall seconds between two looks at whether a search is to be ended.
+_LOOK = 0.1
 #: Length of a fault's text in the results.
 _SHORT = 120
 
@@ -106,16 +108,20 @@ def _alarm(seconds: float | None) -> Iterator[None]:
         yield
         return
 
-    def end(*_: object) -> None:
-        raise BudgetSpentError
+    end = time.process_time() + seconds
 
-    before = signal.signal(signal.SIGPROF, end)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    def look(*_: object) -> None:
+        if time.process_time() > end:
+            raise BudgetSpentError
+
+    # A timer of CPU time would make the system's clock of CPU time coarse: this one only looks at that clock.
+    before = signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, _LOOK, _LOOK)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _verdict(problem: Problem, answer: FloatArray | None) -> Verdict:
