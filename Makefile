@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check docs figures clean
+.PHONY: help demo test quick check docs figures bench clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -43,6 +43,14 @@ docs: $(VENV)/ready ## write the program's output into the documentation
 
 figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py
+
+# Where not all methods that are compared can be installed, each is tried by itself: the rows of a missing one say so.
+PEERS := scipy nlopt cma pygmo pyscipopt maingopy
+bench: $(VENV)/ready ## compare with other methods and write docs/benchmarks.md; BENCH=--quick for a short run
+	@$(BIN)/python -P -c 'import scipy, nlopt, cma, pygmo, pyscipopt, maingopy' 2>/dev/null \
+		|| $(BIN)/python -m pip install --quiet --editable '.[bench]' \
+		|| for each in $(PEERS); do $(BIN)/python -m pip install --quiet $$each || echo "without $$each"; done
+	$(BIN)/python bench/benchmark.py $(BENCH)
 
 clean: ## remove the environment and all build results
 	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so nlp/workspace/_workspace*.so nlp/screening/_screen*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,5 +1,5 @@
-/* F of the paper's Section 4.1 written by hand, as one would for a controller: joints and twist prepared, then the six
- * legs in a loop. The yardstick for the generated function; see embedding.py. */
+/* F of the paper's Section 4.1 and its gradient written by hand, as one would for a controller: joints and twist
+ * prepared, then the six legs in a loop. The yardstick for the generated functions; see embedding.py. */
 #include <math.h>
 #include <stdio.h>
 #include <time.h>
@@ -8,7 +8,9 @@
 
 #define LEGS 6
 #define ROUNDS 15
+#ifndef CALLS
 #define CALLS 400000
+#endif
 
 typedef struct {
     double base[LEGS][3], platform[LEGS][3], omega[3], v[3];
@@ -52,11 +54,51 @@ static double by_hand(const robot *r, const double *x) {
     return F;
 }
 
+static void cross(const double *a, const double *b, double *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* With d = p + R a - b, g = v + omega x b and r = d . g: F is the sum of r^2 / d^2 and dF/dd = 2 s (g - s d), s = r / d^2. */
+static double gradient_by_hand(const robot *r, const double *x, double *gradient) {
+    const double *q = x + 3, q0 = sqrt(1.0 - (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
+    double F = 0.0;
+    int leg, i;
+    for (i = 0; i < 6; ++i) gradient[i] = 0.0;
+    for (leg = 0; leg < LEGS; ++leg) {
+        const double *b = r->base[leg], *a = r->platform[leg];
+        double qa[3], qqa[3], g[3], d[3], w[3], aw[3], qaw[3], wq[3], awq[3], rate = 0.0, square = 0.0, s, along = 0.0;
+        cross(q, a, qa);
+        cross(q, qa, qqa);
+        cross(r->omega, b, g);
+        for (i = 0; i < 3; ++i) {
+            g[i] += r->v[i];
+            d[i] = x[i] + a[i] + 2.0 * (q0 * qa[i] + qqa[i]) - b[i];
+            rate += g[i] * d[i];
+            square += d[i] * d[i];
+        }
+        s = rate / square;
+        F += s * rate;
+        for (i = 0; i < 3; ++i) {
+            w[i] = 2.0 * s * (g[i] - s * d[i]);
+            gradient[i] += w[i];
+            along += qa[i] * w[i];
+        }
+        cross(a, w, aw);
+        cross(qa, w, qaw);
+        cross(w, q, wq);
+        cross(a, wq, awq);
+        for (i = 0; i < 3; ++i) gradient[3 + i] += 2.0 * (q0 * aw[i] + qaw[i] + awq[i] - along / q0 * q[i]);
+    }
+    return F;
+}
+
 static double since(clock_t begin) { return (double)(clock() - begin) / CLOCKS_PER_SEC / CALLS * 1e9; }
 
 int main(void) {
     double k[SCREWSYNTH_PAPER_4_1_HELICAL_K], work[SCREWSYNTH_PAPER_4_1_HELICAL_WORK], F, off = 0.0, sum = 0.0;
-    double hand = HUGE_VAL, generated = HUGE_VAL;
+    double hand = HUGE_VAL, generated = HUGE_VAL, hand_gradient = HUGE_VAL, gradient[6], theirs[6];
     robot r;
     int round, call, i;
     set_up(&r, screwsynth_paper_4_1_helical_parameter_defaults);
@@ -71,6 +113,9 @@ int main(void) {
             for (i = 3; i < 6; ++i) x[call][i] = 0.14 * screwsynth_paper_4_1_helical_seeds[call][i];
             screwsynth_paper_4_1_helical_F(x[call], k, &F, work);
             off = fmax(off, fabs(F / by_hand(&r, x[call]) - 1.0));
+            screwsynth_paper_4_1_helical_F_gradient(x[call], k, &F, theirs, work);
+            off = fmax(off, fabs(F / gradient_by_hand(&r, x[call], gradient) - 1.0));
+            for (i = 0; i < 6; ++i) off = fmax(off, fabs(theirs[i] - gradient[i]) / (fabs(theirs[i]) + F));
         }
         begin = clock();
         for (call = 0; call < CALLS; ++call) sum += by_hand(&r, x[call % 16]);
@@ -81,8 +126,15 @@ int main(void) {
             sum += F;
         }
         generated = fmin(generated, since(begin));
+        begin = clock();
+        for (call = 0; call < CALLS; ++call) {
+            sum += gradient_by_hand(&r, x[call % 16], gradient);
+            sum += gradient[0];
+        }
+        hand_gradient = fmin(hand_gradient, since(begin));
     }
     printf("F by hand %.1f ns, generated %.1f ns: %.2f times; they differ by %.1g at most\n", hand, generated,
            generated / hand, off);
+    printf("F and its gradient by hand %.1f ns\n", hand_gradient);
     return sum == sum && off < 1e-13 ? 0 : 1;
 }

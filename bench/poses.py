@@ -47,15 +47,21 @@ def case_of(count: int, limits: Limits) -> Case:
     )
 
 
-for count in [int(each) for each in sys.argv[1:]] or [4, 8, 16, 40, 100]:
-    for name, limits in (("without", Limits()), ("with", Limits(Actuator(stroke_max=STROKE, dead_length=6)))):
-        case = case_of(count, limits)
-        began = time.perf_counter()
-        formulate(case)
-        formulated = time.perf_counter() - began
-        solution = solve(case, starts=24)
-        constraints = len(solution.nlp.program.constraints)
-        print(
-            f"{count:4d} poses, {name:7s} actuator: formulated in {formulated:5.2f} s, "
-            f"solved in {solution.seconds:6.2f} s, {solution.status.value}, {constraints} constraints"
-        )
+def main(counts: list[int]) -> None:
+    """Print a row for each number of poses, with and without an actuator."""
+    for count in counts:
+        for name, limits in (("without", Limits()), ("with", Limits(Actuator(stroke_max=STROKE, dead_length=6)))):
+            case = case_of(count, limits)
+            began = time.perf_counter()
+            formulate(case)
+            formulated = time.perf_counter() - began
+            solution = solve(case, starts=24)
+            constraints = len(solution.nlp.program.constraints)
+            print(
+                f"{count:4d} poses, {name:7s} actuator: formulated in {formulated:5.2f} s, "
+                f"solved in {solution.seconds:6.2f} s, {solution.status.value}, {constraints} constraints"
+            )
+
+
+if __name__ == "__main__":
+    main([int(each) for each in sys.argv[1:]] or [4, 8, 16, 40, 100])
