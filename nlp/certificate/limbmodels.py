@@ -7,7 +7,7 @@ conditions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -37,6 +37,7 @@ class LimbModels:
         stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
         high: (B,) upper bound of the function.
         value: (B,) lower bound of the function at the centre; -inf where a condition may be violated there.
+        under: lower models of the function where every condition holds.
     """
 
     is_possible: NDArray[np.bool_]
@@ -51,19 +52,21 @@ class LimbModels:
     stops_down: NDArray[np.bool_]
     high: FloatArray
     value: FloatArray
+    under: QuadraticModel
 
     def part(self, which: slice) -> LimbModels:
         """Return the results of some boxes."""
-        L = QuadraticModel(**{name: values[..., which] for name, values in vars(self.L).items()})
-        return LimbModels(
-            **{**{name: values[..., which] for name, values in vars(self).items() if name != "L"}, "L": L}
-        )
+        parts = {
+            name: values.part(which) if isinstance(values, QuadraticModel) else values[..., which]
+            for name, values in vars(self).items()
+        }
+        return LimbModels(**parts)
 
 
 class LimbEngine(Protocol):
     """Upper models of one limb."""
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
 
     def close(self) -> None:
@@ -81,7 +84,7 @@ class NumpyLimbEngine:
     def __init__(self, engine: NumpyEngine, shared: int) -> None:
         self._engine, self._shared = engine, shared
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
         with np.errstate(all="ignore"):
             return self._limb_models(lower, upper)
@@ -107,6 +110,7 @@ class NumpyLimbEngine:
         is_equation = engine.equation[:, None, None]
         g_lo, g_hi = model.gradient_lo[:, :m], model.gradient_hi[:, :m]
         holds = (middle[J:] + error[J:] <= 0).all(axis=0)
+        value = np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf)
         return LimbModels(
             is_possible=~(closed | impossible.any(axis=0)),
             defined=defined,
@@ -119,7 +123,8 @@ class NumpyLimbEngine:
             stops_up=(stops & (is_equation | ~(g_hi < 0))).any(axis=0),
             stops_down=(stops & (is_equation | ~(g_lo > 0))).any(axis=0),
             high=np.where(defined, high[:J].min(axis=0), np.inf),
-            value=np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf),
+            value=value,
+            under=replace(L, middle=value),
         )
 
 

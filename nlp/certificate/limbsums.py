@@ -93,7 +93,7 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
         finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
         tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
-        reached = np.where(is_known, good.value - _spread(without_tilt(good.L, tilt)), -np.inf)
+        reached = np.where(is_known, -without_tilt(good.under, tilt).opposite().bound(), -np.inf)
         reached = np.where(np.isnan(reached), -np.inf, reached)
         rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
         bounds = np.where(models.defined, rest.bound(), np.inf)
@@ -113,12 +113,6 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         np.maximum.reduceat(bounds, own.starts),
         first_largest(bounds, own),
     )
-
-
-def _spread(L: QuadraticModel) -> FloatArray:
-    """Return how far (B,) a modelled function may fall below its value at the centre."""
-    spread = (np.abs(L.b) + L.w).sum(axis=0) + 0.5 * np.abs(L.H).sum(axis=(0, 1))
-    return np.asarray(spread * (1 + 64 * ULP) + L.rounding)
 
 
 def without_tilt(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:

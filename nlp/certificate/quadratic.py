@@ -5,7 +5,7 @@ See :mod:`screwsynth.nlp.certificate.bounding` for the formula, and ``docs/certi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -109,6 +109,10 @@ class QuadraticModel:
     slope_hi: FloatArray
     rounding: FloatArray
 
+    def part(self, which: slice) -> QuadraticModel:
+        """Return the models of some boxes."""
+        return QuadraticModel(**{name: values[..., which] for name, values in vars(self).items()})
+
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         mean = self.middle + np.maximum(np.abs(self.slope_lo), np.abs(self.slope_hi)).sum(axis=0)
@@ -127,6 +131,12 @@ class QuadraticModel:
         tangent = fixed + _tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
         best = np.fmin(mean, np.fmin(separate, tangent))
         return np.asarray(best + self.rounding)
+
+    def opposite(self) -> QuadraticModel:
+        """Return models of minus the functions, upper ones for lower ones."""
+        return replace(
+            self, middle=-self.middle, b=-self.b, H=-self.H, slope_lo=-self.slope_hi, slope_hi=-self.slope_lo
+        )
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""

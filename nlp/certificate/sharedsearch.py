@@ -101,14 +101,15 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         """Return bounds of shared boxes."""
         models, parts = [], []
         for engine, own, good in zip(self._engines, boxes.own, boxes.good, strict=True):
-            # The own boxes, then the good points.
-            of = np.concatenate([own.of, np.arange(boxes.count)])
-            lower = np.concatenate([boxes.lower[:, of], np.concatenate([own.lower, good], axis=1)])
-            upper = np.concatenate([boxes.upper[:, of], np.concatenate([own.upper, good], axis=1)])
-            found = engine.limb_models(lower, upper)
-            self.boxes += of.size
-            models.append(found.part(slice(own.of.size)))
-            parts.append(bound_limb(models[-1], found.part(slice(own.of.size, None)), own, self._m))
+            at_good = engine.limb_models(*(np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)))
+            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+            known = at_good.holds & at_good.defined
+            least = np.where(known, -at_good.under.opposite().bound(), -np.inf)
+            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
+            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
+            models.append(engine.limb_models(lower, upper, least[own.of]))
+            self.boxes += own.of.size + boxes.count
+            parts.append(bound_limb(models[-1], at_good, own, self._m))
         radius = midpoints(boxes.lower, boxes.upper).radius
         common = self._common.model(boxes.lower, boxes.upper, radius)
         low, high = ranges(common)
