@@ -10,7 +10,7 @@ a quadratic model with a remainder of third order, without second derivatives. W
 ``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
 conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
 
-This module is the reference; ``_bounds.c`` has the same formulas. ``docs/certificate.md`` explains each of them.
+This module is the reference; the C kernel (``kernel/``) has the same formulas. ``docs/certificate.md`` explains each of them.
 """
 
 from __future__ import annotations

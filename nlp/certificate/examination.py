@@ -17,7 +17,7 @@ UNMOVED, COLLAPSED = -2, -1
 
 
 class Verdict(enum.IntEnum):
-    """Verdict on a box: open, or closed by a rule. The numbers are those of ``_bounds.c``."""
+    """Verdict on a box: open, or closed by a rule. The numbers are those of ``kernel/examination.h``."""
 
     OPEN = 0
     BOUNDED = 1  # its bound does not exceed the threshold
