@@ -47,21 +47,24 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *equation, *depends, *low, *high, *arrays[12], *models = NULL;
+    PyObject *tape, *equation, *depends, *low, *high, *whose, *arrays[12], *models = NULL, *least = NULL;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOO!)(OOOOOOOOOOOO)nnnd|iO", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &PyTuple_Type, &tape, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
+                          &high, &whose, &PyTuple_Type, &tape, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
                           &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
-                          &report.shared, &models))
+                          &report.shared, &models, &least))
         return NULL;
     int good = form.n > 0 && form.functions > 0 && read_tape(&all, tape, &form.tape) == 0;
-    form.expressions = good ? form.tape.outputs / (form.n + 1) : 0;
+    Py_ssize_t pairs = good ? PyObject_Length(whose) : 0;
+    good = good && pairs >= 0 && (form.whose = borrow(&all, whose, pairs, sizeof(int), 0));
+    form.quotients = (int)(pairs / 2);
+    form.expressions = good ? form.tape.outputs / (form.n + 1) - 2 * form.quotients : 0;
     Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
     good = good && (form.equation = borrow(&all, equation, R, I, 0)) && (form.depends = borrow(&all, depends, R * n, I, 0));
     good = good && (form.low = borrow(&all, low, n, D, 0)) && (form.high = borrow(&all, high, n, D, 0));
@@ -81,8 +84,12 @@ static PyObject *examine(PyObject *module, PyObject *args)
     } else if (report.shared != 0) {
         report.shared = 0;
     }
+    if (good && models && least)
+        good = (report.least = borrow(&all, least, B, D, 0)) != NULL;
+    for (int k = 0; good && k < form.quotients; k++)
+        good = form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
     double *memory = NULL;
-    if (good && (form.functions > R || form.tape.outputs != R * (n + 1) || begin < 0 || finish > B)) {
+    if (good && (form.functions > R || form.tape.outputs != (R + 2 * form.quotients) * (n + 1) || begin < 0 || finish > B)) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
     }
@@ -103,8 +110,8 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, tape), arrays, B, begin, finish, threshold,\n"
-     "        shared=0, models=None)\n\n"
+     "examine((n, functions, equation, depends, low, high, whose, tape), arrays, B, begin, finish, threshold,\n"
+     "        shared=0, models=None, least=None)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
      "With models the first variables are shared with other limbs."},
     {NULL, NULL, 0, NULL},

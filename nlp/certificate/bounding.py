@@ -26,6 +26,7 @@ from .examination import COLLAPSED, UNMOVED, Examination, Verdict
 from .instructions import compile_tape
 from .intervals import ULP
 from .kinks import refuse_jumps
+from .quotients import search_rows, with_quotients
 from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .standardform import StandardForm
 from .tape import Tape
@@ -51,8 +52,9 @@ def search_tape(form: StandardForm) -> Tape:
         UncoveredError: an expression holds an operation without a rule, or its value jumps.
     """
     try:
-        refuse_jumps(form.expressions, form.x)
-        return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+        rows = search_rows(form)
+        refuse_jumps(rows.expressions, form.x)
+        return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 
@@ -111,6 +113,7 @@ class NumpyEngine:
     def __init__(self, form: StandardForm) -> None:
         self.form = form
         self._tape = search_tape(form)
+        self._quotients = search_rows(form).quotients
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)
@@ -164,28 +167,35 @@ class NumpyEngine:
             centre=box.centre,
         )
 
-    def model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
-        """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each."""
+    def model(
+        self, lower: FloatArray, upper: FloatArray, radius: FloatArray, least: FloatArray | None = None
+    ) -> GradientModel:
+        """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each.
+
+        The ends of gradients that are not scaled are for points whose values are at least ``least`` (B,).
+        """
         n, R = self.form.n, len(self.equation)
+        E = R + 2 * len(self._quotients)
         box = enclose(self._tape, lower, upper)
-        shape = (R, n, lower.shape[1])
+        shape = (E, n, lower.shape[1])
         r = radius[None]
 
         def scaled(values: FloatArray) -> FloatArray:
-            return np.where(r > 0, values[R:].reshape(shape) * r, 0.0)
+            return np.where(r > 0, values[E:].reshape(shape) * r, 0.0)
 
-        return GradientModel(
-            value=Enclosures(*(each[:R] for each in vars(box).values())),
+        rows = GradientModel(
+            value=Enclosures(*(each[:E] for each in vars(box).values())),
             b=scaled(box.c),
-            A=box.a[R:].reshape(R, n, n, lower.shape[1]) * radius[None, :, None],
+            A=box.a[E:].reshape(E, n, n, lower.shape[1]) * radius[None, :, None],
             p=scaled(box.p),
             q=scaled(box.q),
             s=scaled(box.s),
             slope_lo=scaled(box.lo),
             slope_hi=scaled(box.hi),
-            gradient_lo=box.lo[R:].reshape(shape),
-            gradient_hi=box.hi[R:].reshape(shape),
+            gradient_lo=box.lo[E:].reshape(shape),
+            gradient_hi=box.hi[E:].reshape(shape),
         )
+        return with_quotients(rows, self._quotients, R, radius, least)
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.

@@ -121,8 +121,8 @@ class BoxSearch(BoundedSearch[Boxes]):
 
     def _is_contracted_by_value(self, found: Examination) -> bool:
         """Return whether a contraction excluded points because of their value, which is at most the threshold."""
-        count = len(self.form.functions)
-        return any(bool(((why >= 0) & (why < count)).any()) for why in (found.cut_lower, found.cut_upper))
+        count, rest = len(self.form.functions), found.verdict != Verdict.BOUNDED
+        return any(bool(((why >= 0) & (why < count) & rest).any()) for why in (found.cut_lower, found.cut_upper))
 
 
 def reason_without_bound(form: StandardForm, lower: FloatArray, upper: FloatArray, bound: FloatArray) -> str:

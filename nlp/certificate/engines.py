@@ -6,7 +6,6 @@ import itertools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,7 +14,7 @@ import numpy as np
 
 from .bounding import NumpyEngine, search_tape
 from .examination import Examination, Verdict
-from .quotients import QuotientLimbEngine, as_quotient
+from .quotients import search_rows
 from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from .standardform import StandardForm
 from .tape import Tape
@@ -76,6 +75,7 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
+            np.array([(each.function, each.sign) for each in search_rows(form).quotients], dtype=np.int32).ravel(),
             _kernel_tape(search_tape(form)),
         )
 
@@ -87,7 +87,8 @@ class KernelEngine:
         """Return upper models: see :class:`screwsynth.nlp.certificate.limbmodels.LimbEngine`."""
         n, m = lower.shape[0], self._shared
         rows = np.empty((rows_of_models(n, m), lower.shape[1]))
-        found = self._examine(lower, upper, -np.inf, (m, rows))
+        matters = () if least is None else (np.ascontiguousarray(least),)
+        found = self._examine(lower, upper, -np.inf, (m, rows, *matters))
         flags, L, sides = models_from_rows(rows, n, m)
         closed = np.isin(found.verdict, (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED))
         found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
@@ -104,7 +105,6 @@ class KernelEngine:
             stops_down=sides[:, 3] > 0,
             high=found.bound,
             value=found.value,
-            under=replace(L, middle=found.value),
         )
 
     def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
@@ -195,10 +195,6 @@ def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jo
         UncoveredError: an expression holds an operation without a rule.
         ValueError: there is no engine of that name here.
     """
-    quotient = as_quotient(form.functions[0])
-    if quotient is not None and not form.conditions:
-        N, D = (limb_engine_for(replace(form, functions=(each,)), shared, name, jobs) for each in quotient[:2])
-        return QuotientLimbEngine(quotient.sign, N, D, form.lower, form.upper, shared)
     module = chosen_kernel(name, kernel)
     if module is None:
         return NumpyLimbEngine(NumpyEngine(form), shared)

@@ -7,7 +7,7 @@ conditions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -37,7 +37,6 @@ class LimbModels:
         stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
         high: (B,) upper bound of the function.
         value: (B,) lower bound of the function at the centre; -inf where a condition may be violated there.
-        under: lower models of the function where every condition holds.
     """
 
     is_possible: NDArray[np.bool_]
@@ -52,15 +51,13 @@ class LimbModels:
     stops_down: NDArray[np.bool_]
     high: FloatArray
     value: FloatArray
-    under: QuadraticModel
 
     def part(self, which: slice) -> LimbModels:
         """Return the results of some boxes."""
-        parts = {
-            name: values.part(which) if isinstance(values, QuadraticModel) else values[..., which]
-            for name, values in vars(self).items()
-        }
-        return LimbModels(**parts)
+        L = QuadraticModel(**{name: values[..., which] for name, values in vars(self.L).items()})
+        return LimbModels(
+            **{**{name: values[..., which] for name, values in vars(self).items() if name != "L"}, "L": L}
+        )
 
 
 class LimbEngine(Protocol):
@@ -87,17 +84,17 @@ class NumpyLimbEngine:
     def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
         with np.errstate(all="ignore"):
-            return self._limb_models(lower, upper)
+            return self._limb_models(lower, upper, least)
 
     def close(self) -> None:
         """Do nothing: this engine has no threads."""
 
-    def _limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def _limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None) -> LimbModels:
         """Return the models; NumPy's warnings of invalid operations are off."""
         engine, m = self._engine, self._shared
         J = engine.functions
         box = midpoints(lower, upper)
-        model = engine.model(lower, upper, box.radius)
+        model = engine.model(lower, upper, box.radius, least)
         low, high = ranges(model)
         middle, error = model.value.c, model.value.s
         defined = np.asarray((error[:J] < np.inf).all(axis=0))
@@ -110,7 +107,6 @@ class NumpyLimbEngine:
         is_equation = engine.equation[:, None, None]
         g_lo, g_hi = model.gradient_lo[:, :m], model.gradient_hi[:, :m]
         holds = (middle[J:] + error[J:] <= 0).all(axis=0)
-        value = np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf)
         return LimbModels(
             is_possible=~(closed | impossible.any(axis=0)),
             defined=defined,
@@ -123,8 +119,7 @@ class NumpyLimbEngine:
             stops_up=(stops & (is_equation | ~(g_hi < 0))).any(axis=0),
             stops_down=(stops & (is_equation | ~(g_lo > 0))).any(axis=0),
             high=np.where(defined, high[:J].min(axis=0), np.inf),
-            value=value,
-            under=replace(L, middle=value),
+            value=np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf),
         )
 
 

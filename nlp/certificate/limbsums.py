@@ -73,7 +73,7 @@ def first_largest(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
     return np.asarray(np.minimum.reduceat(places, starts))
 
 
-def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> LimbBound:
+def bound_limb(models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int) -> LimbBound:
     """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
 
     An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
@@ -81,6 +81,7 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
     Args:
         models: of the N own boxes.
         good: of a good point of the limb in each of the B shared boxes.
+        fall: upper models of minus the limb's function there.
         own: the own boxes.
         m: number of shared variables.
     """
@@ -93,7 +94,7 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
         finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
         tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
-        reached = np.where(is_known, -without_tilt(good.under, tilt).opposite().bound(), -np.inf)
+        reached = np.where(is_known, -_add(fall, tilt).bound(), -np.inf)
         reached = np.where(np.isnan(reached), -np.inf, reached)
         rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
         bounds = np.where(models.defined, rest.bound(), np.inf)

@@ -5,7 +5,7 @@ See :mod:`screwsynth.nlp.certificate.bounding` for the formula, and ``docs/certi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from .intervals import TINY, ULP
 
 if TYPE_CHECKING:
     from ...models import FloatArray
+    from .quotients import SquareSums
 
 #: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.
 _TANGENT_ROUNDS = 3
@@ -43,6 +44,7 @@ class GradientModel:
         s: (R, n, B) rounding errors of the gradients times ``r_i``.
         slope_lo, slope_hi: (R, n, B) interval gradients times ``r_i``.
         gradient_lo, gradient_hi: (R, n, B) interval gradients.
+        squares: upper models of the functions' quotients, whose ``b`` is in that of the functions; None without them.
     """
 
     value: Enclosures
@@ -55,6 +57,7 @@ class GradientModel:
     slope_hi: FloatArray
     gradient_lo: FloatArray
     gradient_hi: FloatArray
+    squares: SquareSums | None = None
 
     def expression_model(self, r: int, sign: float) -> QuadraticModel:
         """Return the upper model of ``sign`` times one expression."""
@@ -62,7 +65,13 @@ class GradientModel:
         if sign < 0:
             low, high, p, q = -high, -low, -q, -p
         middle, size = sign * self.value.c[r] + self.value.s[r], np.abs(self.value.c[r])
-        return _integrate(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size)
+        H, w = self._squares_of(r)
+        return _integrate(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size, H, w)
+
+    def _squares_of(self, r: int) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return matrix and remainder of the quotients of an expression."""
+        has_squares = self.squares is not None and r < len(self.squares.H)
+        return (self.squares.H[r], self.squares.w[r]) if self.squares is not None and has_squares else (None, None)
 
     def sum_model(self, weights: FloatArray) -> QuadraticModel:
         """Return the upper model of a sum of all expressions with weights (R, B)."""
@@ -85,7 +94,11 @@ class GradientModel:
 
         largest = total(np.where(used, np.abs(self.value.c), 0.0), size)
         p, q = ends(self.p, self.q)
-        return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
+        if self.squares is None:
+            return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
+        J = len(self.squares.H)
+        H, w = total(self.squares.H, weights[:J]), total(self.squares.w, weights[:J])
+        return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest, H, w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +122,6 @@ class QuadraticModel:
     slope_hi: FloatArray
     rounding: FloatArray
 
-    def part(self, which: slice) -> QuadraticModel:
-        """Return the models of some boxes."""
-        return QuadraticModel(**{name: values[..., which] for name, values in vars(self).items()})
-
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         mean = self.middle + np.maximum(np.abs(self.slope_lo), np.abs(self.slope_hi)).sum(axis=0)
@@ -131,12 +140,6 @@ class QuadraticModel:
         tangent = fixed + _tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
         best = np.fmin(mean, np.fmin(separate, tangent))
         return np.asarray(best + self.rounding)
-
-    def opposite(self) -> QuadraticModel:
-        """Return models of minus the functions, upper ones for lower ones."""
-        return replace(
-            self, middle=-self.middle, b=-self.b, H=-self.H, slope_lo=-self.slope_hi, slope_hi=-self.slope_lo
-        )
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
@@ -214,6 +217,8 @@ def _integrate(
     low: FloatArray,
     high: FloatArray,
     largest: FloatArray,
+    H: FloatArray | None = None,
+    w: FloatArray | None = None,
 ) -> QuadraticModel:
     """Return the model whose gradient has a Taylor form, by its integral along rays from the centre.
 
@@ -229,13 +234,19 @@ def _integrate(
         low: (n, B) lower ends of the gradient times ``r_i`` from another enclosure, for an intersection.
         high: (n, B) upper ends likewise.
         largest: (B,) size of the terms of the value at the centre.
+        H, w: (n, n, B) and (n, B) matrix and remainder of an upper model whose linear part is in b; its slopes are in the
+            other enclosure alone.
     """
     across = np.abs(A).sum(axis=1)
     rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
     margin = 64 * ULP * (np.abs(b) + across + q - p + s) + TINY
-    low, high = np.fmax(low, b - across + p - s) - margin, np.fmin(high, b + across + q + s) + margin
-    b, w = b + (p + q) / 6, (q - p) / 6 + s
-    return QuadraticModel(middle, b, 0.5 * (A + np.swapaxes(A, 0, 1)), w, low, high, rounding)
+    symmetric, remainder = 0.5 * (A + np.swapaxes(A, 0, 1)), (q - p) / 6 + s
+    if H is None or w is None:
+        low, high = np.fmax(low, b - across + p - s), np.fmin(high, b + across + q + s)
+    else:
+        symmetric, remainder = symmetric + H, remainder + w
+        rounding = rounding + 64 * ULP * (np.abs(H).sum(axis=(0, 1)) + w.sum(axis=0))
+    return QuadraticModel(middle, b + (p + q) / 6, symmetric, remainder, low - margin, high + margin, rounding)
 
 
 def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArray) -> tuple[FloatArray, FloatArray]:

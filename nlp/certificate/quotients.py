@@ -1,226 +1,301 @@
-"""Upper and lower models of limbs whose function is a squared quotient, from models of numerator and denominator.
+"""Functions that are sums of squared quotients, and their upper models from those of numerators and denominators.
 
-The work rate of a row in a twist is ``N / |d|``, with N a polynomial in joint coordinates and position, and its square
+The work rate of a row in a twist is ``N / |d|``, with N and ``D = |d|^2`` polynomials in joint coordinates and position:
 
-    N^2 / D = rho (2 N - rho D) + (N - rho D)^2 / D     for any number rho, with D > 0.
+    N^2 / D = rho (2 N - rho D) + E^2 / D,    E = N - rho D,    for any number rho, with D > 0.
 
-With ``rho = N / D`` at the centre of a box, the first part is linear in N and D, whose models are accurate, and the
-second is a square that is 0 at the centre. The derivatives of the quotient itself have enclosures that are tens of
-times as wide on large boxes: there the terms of second order of each factor are bounded by themselves.
+With ``rho = N / D`` at the centre of a box, the first part is linear in N and D, whose models are accurate. E is 0 at the
+centre: with ``a.e`` its part of first order and ``|E - a.e| <= rest``,
 
-The gradient of ``N^2 / D`` is ``r (2 grad N - r grad D)`` with ``r = N / D``: where the sign of N is known, its signs are
-those of ``2 grad N - r grad D``, which is linear in r, so that its ends are those of two models.
+    (a.e)^2 - 2 |a.e| rest  <=  E^2  <=  (a.e)^2 + 2 |a.e| rest + rest^2.
+
+Enclosures of the quotient and its derivatives, operation by operation, are tens of times as wide on large boxes: there
+the terms of second order of each factor are bounded by themselves.
+
+The gradient of ``N^2 / D`` is ``r (2 grad N - r grad D)`` with ``r = N / D``. The factor in brackets is linear in r, so that
+its ends are those at the two ends of r, and each of these two is one model.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
+from .enclosure import Enclosures
 from .intervals import TINY, ULP
-from .limbmodels import LimbEngine, LimbModels
-from .quadratic import QuadraticModel
+from .kinks import without_ties
+from .separation import terms_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from casadi import SX
-
     from ...models import FloatArray
+    from .quadratic import GradientModel
+    from .standardform import StandardForm
 
-#: Rounding of sums of fewer than a hundred products, in parts of the sum of their sizes: several times the largest.
+#: Rounding of a sum of fewer than a hundred products, in parts of the sum of their sizes: several times the largest.
 _SUM = 64 * ULP
+#: A minimum's ``E^2`` is kept where the rest is below this part of what is known: elsewhere 0 is the better bound.
+_KNOWN = 0.25
 
 
 class Quotient(NamedTuple):
-    """Parts of an expression ``sign * N^2 / D``."""
+    """A term ``sign * N^2 / D`` of a function.
+
+    Attributes:
+        N, D: (1, 1).
+        sign: 1 or -1.
+        function: number of the function.
+    """
 
     N: SX
     D: SX
     sign: int
-
-
-def as_quotient(expression: SX) -> Quotient | None:
-    """Return the parts of a squared quotient; None for another expression."""
-    sign = 1
-    while expression.is_op(ca.OP_NEG):
-        expression, sign = expression.dep(0), -sign
-    if expression.is_op(ca.OP_DIV) and expression.dep(0).is_op(ca.OP_SQ):
-        return Quotient(expression.dep(0).dep(0), expression.dep(1), sign)
-    return None
+    function: int
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """Models of one expression over B boxes.
+class SearchRows:
+    """A form's expressions as a search encloses them.
 
     Attributes:
-        L: an upper model.
-        least: (B,) lower bound of the expression at the centre.
-        lo, hi: (B,) ends of the expression over the box.
-        g_lo, g_hi: (m, B) gradient along shared variables.
+        expressions: (E, 1) functions without their quotients, conditions, then N and D of each quotient.
+        jacobian: (E, n) derivatives, dense.
+        quotients: the terms that are missing in the functions.
     """
 
-    L: QuadraticModel
-    least: FloatArray
+    expressions: SX
+    jacobian: SX
+    quotients: tuple[Quotient, ...]
+
+
+def search_rows(form: StandardForm) -> SearchRows:
+    """Return the expressions of a form with the squared quotients of its functions taken apart."""
+    found: list[Quotient] = []
+    rests: list[SX] = []
+    for j, function in enumerate(form.functions):
+        rest = SX(0)
+        for term in terms_of(function):
+            quotient = _as_quotient(term, j)
+            if quotient is None:
+                rest = rest + term
+            else:
+                found.append(quotient)
+        rests.append(rest)
+    if not found:
+        return SearchRows(form.expressions, form.jacobian, ())
+    conditions = [each.expression for each in form.conditions]
+    parts = [part for each in found for part in (each.N, each.D)]
+    expressions = ca.densify(ca.vertcat(*rests, *conditions, *parts))
+    jacobian = ca.densify(without_ties(ca.jacobian(expressions, form.x), form.x))
+    return SearchRows(expressions, jacobian, tuple(found))
+
+
+def _as_quotient(term: SX, function: int) -> Quotient | None:
+    """Return a term as a squared quotient; None for another one."""
+    factor = 1.0
+    while True:
+        if term.is_op(ca.OP_NEG):
+            term, factor = term.dep(0), -factor
+        elif term.is_op(ca.OP_TWICE):
+            term, factor = term.dep(0), 2 * factor
+        elif term.is_op(ca.OP_MUL) and term.dep(0).is_constant():
+            term, factor = term.dep(1), factor * float(term.dep(0))
+        elif term.is_op(ca.OP_MUL) and term.dep(1).is_constant():
+            term, factor = term.dep(0), factor * float(term.dep(1))
+        else:
+            break
+    if not (term.is_op(ca.OP_DIV) and term.dep(0).is_op(ca.OP_SQ)) or term.dep(1).is_constant() or factor == 0:
+        return None
+    N, D = term.dep(0).dep(0), term.dep(1)
+    return Quotient(N, D if abs(factor) == 1 else D / abs(factor), 1 if factor > 0 else -1, function)
+
+
+@dataclass(frozen=True, eq=False)
+class SquareSums:
+    """Upper models of the quotients of J functions over B boxes, beside what :class:`GradientModel` has of them.
+
+    Attributes:
+        H: (J, n, n, B) matrices of the models.
+        w: (J, n, B) bounds of their remainders.
+    """
+
+    H: FloatArray
+    w: FloatArray
+
+
+class _Part(NamedTuple):
+    """The model ``c + b e + 1/2 e'He +- w |e| +- s`` of one expression over B boxes, and its ends over the box."""
+
+    c: FloatArray
+    s: FloatArray
+    b: FloatArray
+    H: FloatArray
+    w: FloatArray
     lo: FloatArray
     hi: FloatArray
-    g_lo: FloatArray
-    g_hi: FloatArray
+    slope_lo: FloatArray
+    slope_hi: FloatArray
 
 
-class QuotientLimbEngine:
-    """Upper models of a limb whose function is one squared quotient, without conditions.
+def with_quotients(
+    model: GradientModel, quotients: Sequence[Quotient], R: int, radius: FloatArray, least: FloatArray | None = None
+) -> GradientModel:
+    """Return the model of R expressions, given that of their E rows.
+
+    A function's value at the centre is enclosed as ``c +- s``, c + s being the middle of the upper model. The ends of its
+    gradient, times the radii, are for the whole box; those that are not scaled are for its points that matter.
 
     Args:
-        sign: of the quotient.
-        numerator, denominator: engines of the two expressions as limbs.
-        opposites: engines of minus the expressions, for their lower ends.
-        lower, upper: (n,) ends of the whole box.
-        shared: number m of shared variables.
+        model: of the rows, as in :class:`SearchRows`.
+        quotients: the terms of the functions.
+        R: number of functions and conditions.
+        radius: (n, B) half widths of the boxes.
+        least: (B,) points of the only quotient with a lesser value do not matter; None where all do.
     """
-
-    def __init__(
-        self,
-        sign: int,
-        numerator: LimbEngine,
-        denominator: LimbEngine,
-        lower: FloatArray,
-        upper: FloatArray,
-        shared: int,
-    ) -> None:
-        self._sign, self._N, self._D = sign, numerator, denominator
-        self._lower, self._upper, self._shared = lower[:, None], upper[:, None], shared
-
-    def close(self) -> None:
-        """Stop the engines' threads."""
-        self._N.close()
-        self._D.close()
-
-    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
-        """Return the models of boxes with ends (n, B); points with values below ``least`` (B,) do not matter."""
-        with np.errstate(all="ignore"):
-            return self._models(lower, upper, least)
-
-    def _models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None) -> LimbModels:
-        m = self._shared
-        found_N, found_D = self._N.limb_models(lower, upper), self._D.limb_models(lower, upper)
-        N, D = _part(found_N), _part(found_D)
-        defined = found_N.defined & found_D.defined & (D.lo > 0)
-        rho = N.L.middle / D.L.middle
-        # E = N - rho D: its part of first order at the centre, and a bound of the rest.
-        a = N.L.b - rho * D.L.b
-        HE = N.L.H - rho * D.L.H
-        size = np.abs(N.L.middle) + np.abs(rho * D.L.middle)
-        offset = np.abs(N.L.middle - N.least) + np.abs(rho) * np.abs(D.L.middle - D.least)
-        sizes = size + (np.abs(N.L.b) + np.abs(rho * D.L.b)).sum(axis=0)
-        sizes = sizes + (np.abs(N.L.H) + np.abs(rho * D.L.H)).sum(axis=(0, 1))
-        w = N.L.w + np.abs(rho) * D.L.w
-        rest = 0.5 * np.abs(HE).sum(axis=(0, 1)) + w.sum(axis=0) + offset
-        rest = rest + _SUM * sizes + N.L.rounding + np.abs(rho) * D.L.rounding
-        reach = np.abs(a).sum(axis=0) * (1 + _SUM)
-        # The range of r = N / D.
-        ends = np.stack([N.lo / D.lo, N.lo / D.hi, N.hi / D.lo, N.hi / D.hi])
-        far = (reach + rest) / D.lo
-        r_lo, r_hi = np.fmax(ends.min(axis=0), rho - far), np.fmin(ends.max(axis=0), rho + far)
-        r_lo, r_hi = r_lo - _SUM * np.abs(r_lo), r_hi + _SUM * np.abs(r_hi)
-        # rho (2 N - rho D).
-        b = 2 * rho * N.L.b - rho**2 * D.L.b
-        H = 2 * rho * N.L.H - rho**2 * D.L.H
-        tilt_w = 2 * np.abs(rho) * N.L.w + rho**2 * D.L.w
-        centre = rho * (2 * N.L.middle - rho * D.L.middle)
-        error = 2 * np.abs(rho) * offset + _SUM * (np.abs(rho) * (2 * sizes) )
-        square = a[:, None] * a[None]
-        cross = 2 * reach * rest
-        sign = self._sign
-        over = (centre + error + (cross + rest**2) / D.lo, b, H + square * (2 / D.lo))
-        small = 4 * rest < reach
-        under = (centre - error - np.where(small, cross / D.hi, 0.0), b, H + square * np.where(small, 2 / D.hi, 0.0))
-        least_square = np.where((r_lo > 0) | (r_hi < 0), np.minimum(r_lo**2, r_hi**2), 0.0)
-        most_square = np.maximum(r_lo**2, r_hi**2)
-        value_hi = most_square * D.hi
-        value_hi = np.fmin(value_hi, np.maximum(N.lo**2, N.hi**2) / D.lo)
-        value_lo = np.fmax(least_square * D.lo, np.where((N.lo > 0) | (N.hi < 0), np.minimum(N.lo**2, N.hi**2), 0.0) / D.hi)
-        value_lo, value_hi = value_lo * (1 - _SUM), value_hi * (1 + _SUM)
-        if sign < 0:
-            over, under = ((-u[0], -u[1], -u[2]) for u in (under, over))
-            value_hi = -value_lo
-        # The largest and the smallest r that matter.
-        possible = np.ones(defined.shape, dtype=bool)
-        p_lo, p_hi = r_lo, r_hi
-        if least is not None and sign > 0:
-            edge = np.sqrt(np.maximum(least, 0.0) / D.hi) * (1 - _SUM)
-            edge = np.where(np.isfinite(edge), edge, 0.0)
-            up, down = r_hi >= edge, -r_lo >= edge
-            possible = ~defined | up | down
-            p_lo = np.where(up & ~down, np.maximum(r_lo, edge), r_lo)
-            p_hi = np.where(down & ~up, np.minimum(r_hi, -edge), r_hi)
-        elif least is not None:
-            edge = np.sqrt(np.maximum(-least, 0.0) / D.lo) * (1 + _SUM)
-            edge = np.where(np.isfinite(edge), edge, np.inf)
-            possible = ~defined | ((r_lo <= edge) & (r_hi >= -edge))
-            p_lo, p_hi = np.maximum(r_lo, -edge), np.minimum(r_hi, edge)
-        g_lo, g_hi = _slopes(N, D, r_lo, r_hi)
-        slope_lo, slope_hi = _products(r_lo, r_hi, g_lo, g_hi)
-        if sign < 0:
-            slope_lo, slope_hi = -slope_hi, -slope_lo
-        rounding = _SUM * (np.abs(over[0]) + np.abs(b).sum(axis=0) + np.abs(over[2]).sum(axis=(0, 1)) + tilt_w.sum(axis=0)) + TINY
-        L = QuadraticModel(over[0], over[1], over[2], tilt_w, slope_lo, slope_hi, rounding)
-        U = QuadraticModel(under[0], under[1], under[2], tilt_w, slope_lo, slope_hi, rounding)
-        radius = 0.5 * (upper[:m] - lower[:m])
-        s_lo = np.where(radius > 0, slope_lo[:m] / radius, -np.inf) 
-        s_hi = np.where(radius > 0, slope_hi[:m] / radius, np.inf)
-        s_lo, s_hi = s_lo - _SUM * np.abs(s_lo), s_hi + _SUM * np.abs(s_hi)
-        left_lo, left_hi = lower.copy(), upper.copy()
-        # Own variables along which the function rises, or falls, wherever it matters.
-        G_lo, G_hi = _slopes(N, D, p_lo, p_hi)
-        positive, negative = (p_lo > 0) & defined, (p_hi < 0) & defined
-        rises = np.where(sign > 0, 1, -1) * (np.where(G_lo > 0, 1, np.where(G_hi < 0, -1, 0))) * np.where(positive, 1, np.where(negative, -1, 0))
-        own = np.arange(len(lower))[:, None] >= m
-        moves = own & (upper > lower) & (rises != 0)
-        up, down = moves & (rises > 0), moves & (rises < 0)
-        possible &= ~((up & (upper < self._upper)) | (down & (lower > self._lower))).any(axis=0)
-        left_lo = np.where(up, upper, lower)
-        left_hi = np.where(down, lower, upper)
-        nothing = np.zeros((m, defined.size), dtype=bool)
-        at_centre = np.where(np.sign(N.least) == np.sign(N.L.middle), np.minimum(N.least**2, N.L.middle**2), 0.0) / np.maximum(D.L.middle, D.least) if sign > 0 else -np.maximum(N.least**2, N.L.middle**2) / np.minimum(D.least, D.L.middle)
-        at_centre = at_centre - _SUM * np.abs(at_centre)
-        return LimbModels(
-            is_possible=possible, defined=defined, holds=np.ones(defined.shape, dtype=bool), lower=left_lo, upper=left_hi, L=L,
-            slope_lo=s_lo, slope_hi=s_hi, stops_up=nothing, stops_down=nothing, high=np.where(defined, value_hi, np.inf),
-            value=np.where(defined, at_centre, -np.inf), under=U,
-        )
+    if not quotients:
+        return model
+    rows = {name: values.copy() for name, values in vars(model).items() if isinstance(values, np.ndarray)}
+    value = {name: values[:R].copy() for name, values in vars(model.value).items()}
+    J, n, B = 1 + max(each.function for each in quotients), radius.shape[0], radius.shape[1]
+    sums = SquareSums(np.zeros((J, n, n, B)), np.zeros((J, n, B)))
+    whole = {name: values[:R] for name, values in rows.items()}
+    for k, quotient in enumerate(quotients):
+        N, D = _part(model, R + 2 * k), _part(model, R + 2 * k + 1)
+        _add_square(whole, value, sums, N, D, quotient, radius, least)
+    return replace(model, value=Enclosures(**value), **whole, squares=sums)
 
 
-def _part(found: LimbModels) -> _Part:
-    """Return the models of an expression from those of a limb without conditions."""
-    L = found.L
-    opposite = QuadraticModel(-found.value, -L.b, -L.H, L.w, -L.slope_hi, -L.slope_lo, L.rounding)
-    return _Part(L, found.value, -opposite.bound(), np.fmin(L.bound(), found.high), found.slope_lo, found.slope_hi)
+def _part(model: GradientModel, r: int) -> _Part:
+    """Return the model of a row."""
+    value, p, q = model.value, model.p[r], model.q[r]
+    A = model.A[r]
+    b, w, H = model.b[r] + (p + q) / 6, (q - p) / 6 + model.s[r], 0.5 * (A + np.swapaxes(A, 0, 1))
+    c, s = value.c[r], value.s[r]
+    reach = (np.abs(b) + w).sum(axis=0) + 0.5 * np.abs(H).sum(axis=(0, 1)) + s
+    reach = reach + _SUM * (np.abs(c) + reach)
+    lo, hi = np.fmax(value.lo[r], c - reach), np.fmin(value.hi[r], c + reach)
+    return _Part(c, s, b, H, w, lo, hi, model.slope_lo[r], model.slope_hi[r])
 
 
-def _slopes(N: _Part, D: _Part, r_lo: FloatArray, r_hi: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of ``2 grad N - r grad D``, times the radii, over r in an interval."""
+def _add_square(
+    whole: dict[str, FloatArray],
+    value: dict[str, FloatArray],
+    sums: SquareSums,
+    N: _Part,
+    D: _Part,
+    quotient: Quotient,
+    radius: FloatArray,
+    least: FloatArray | None,
+) -> None:
+    """Add a quotient to the rows of its function; writes to the arrays."""
+    j, sign = quotient.function, quotient.sign
+    rho = N.c / D.c
+    size = np.abs(rho)
+    a, HE = N.b - rho * D.b, N.H - rho * D.H
+    # Sizes of all terms of E, which may cancel.
+    terms = np.abs(N.c) + size * np.abs(D.c) + (np.abs(N.b) + size * np.abs(D.b)).sum(axis=0)
+    terms = terms + (np.abs(N.H) + size * np.abs(D.H)).sum(axis=(0, 1)) + (N.w + size * D.w).sum(axis=0)
+    offset = N.s + size * D.s + _SUM * terms
+    rest = 0.5 * np.abs(HE).sum(axis=(0, 1)) + (N.w + size * D.w).sum(axis=0) + offset
+    reach = np.abs(a).sum(axis=0)
+    reach, rest = reach * (1 + _SUM), rest * (1 + _SUM)
+    # r = N / D = rho + E / D over the box.
+    quotients = np.stack([N.lo / D.lo, N.lo / D.hi, N.hi / D.lo, N.hi / D.hi])
+    far = (reach + rest) / D.lo
+    r_lo, r_hi = np.fmax(quotients.min(axis=0), rho - far), np.fmin(quotients.max(axis=0), rho + far)
+    r_lo, r_hi = r_lo - _SUM * (np.abs(r_lo) + size), r_hi + _SUM * (np.abs(r_hi) + size)
+    # rho (2 N - rho D), and its rounding.
+    b, H, w = 2 * rho * N.b - rho**2 * D.b, 2 * rho * N.H - rho**2 * D.H, 2 * size * N.w + rho**2 * D.w
+    middle = rho * (2 * N.c - rho * D.c)
+    error = 2 * size * offset + 3 * _SUM * size * terms + TINY
+    square, cross = a[:, None] * a[None], 2 * reach * rest
+    numerator = np.maximum(np.abs(N.c) - N.s, 0.0) if sign > 0 else np.abs(N.c) + N.s
+    denominator = D.c + D.s if sign > 0 else D.c - D.s
+    at_centre = sign * numerator**2 / denominator
+    at_centre = at_centre - _SUM * np.abs(at_centre)
+    if sign > 0:
+        kept, more = 2 / D.lo, (cross + rest**2) / D.lo
+    else:
+        known = rest < _KNOWN * reach
+        kept, more = np.where(known, 2 / D.hi, 0.0), np.where(known, cross / D.hi, 0.0)
+    added = square * kept
+    error = error + _SUM * (more + np.abs(added).sum(axis=(0, 1)))
+    high = sign * middle + more + error
+    both = np.maximum(r_lo**2, r_hi**2)
+    none = np.where((r_lo > 0) | (r_hi < 0), np.minimum(r_lo**2, r_hi**2), 0.0)
+    most = np.fmin(both * D.hi, np.maximum(N.lo**2, N.hi**2) / D.lo) * (1 + _SUM)
+    fewest = none * D.lo * (1 - _SUM)
+    g_lo, g_hi = _gradient_factor(N, D, r_lo, r_hi)
+    slope_lo, slope_hi = _product(r_lo, r_hi, g_lo, g_hi, sign)
+    p_lo, p_hi = (r_lo, r_hi) if least is None else _where_it_matters(r_lo, r_hi, D, sign, least)
+    if least is not None:
+        g_lo, g_hi = _gradient_factor(N, D, p_lo, p_hi)
+    matter_lo, matter_hi = _product(p_lo, p_hi, g_lo, g_hi, sign)
+    wide = radius > 0
+    scale = np.where(wide, radius, 1.0)
+    grad_lo = np.where(wide, matter_lo / scale, -np.inf)
+    grad_hi = np.where(wide, matter_hi / scale, np.inf)
+    defined = (D.lo > 0) & (N.s < np.inf) & (D.s < np.inf)
+    defined &= np.isfinite(rho) & np.isfinite(reach) & np.isfinite(rest)
+    half = 0.5 * (high - at_centre) + _SUM * (np.abs(high) + np.abs(at_centre))
+    value["c"][j] += 0.5 * (high + at_centre)
+    value["s"][j] += np.where(defined & ~np.isnan(half), half, np.inf)
+    value["lo"][j] += fewest if sign > 0 else -most
+    value["hi"][j] += most if sign > 0 else -fewest
+    value["a"][j] += sign * b
+    matrix = sign * (H + added)
+    value["q"][j] += (0.5 * np.abs(matrix).sum(axis=(0, 1)) + w.sum(axis=0)) * (1 + _SUM)
+    whole["b"][j] += sign * b
+    sums.H[j] += matrix
+    sums.w[j] += w + _SUM * (np.abs(b) + np.abs(H).sum(axis=1) + w)
+    whole["slope_lo"][j] += slope_lo
+    whole["slope_hi"][j] += slope_hi
+    whole["gradient_lo"][j] += grad_lo - _SUM * np.abs(grad_lo)
+    whole["gradient_hi"][j] += grad_hi + _SUM * np.abs(grad_hi)
+
+
+def _where_it_matters(
+    r_lo: FloatArray, r_hi: FloatArray, D: _Part, sign: int, least: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the ``r`` for which ``sign r^2 D`` can be at least a value (B,)."""
+    if sign < 0:
+        edge = np.sqrt(np.maximum(-least, 0.0) / D.lo) * (1 + _SUM)
+        edge = np.where(np.isnan(edge), np.inf, edge)
+        return np.maximum(r_lo, -edge), np.minimum(r_hi, edge)
+    edge = np.sqrt(np.maximum(least, 0.0) / D.hi) * (1 - _SUM)
+    edge = np.where(np.isnan(edge), 0.0, edge)
+    up, down = r_hi >= edge, -r_lo >= edge
+    low = np.where(up & ~down, np.maximum(r_lo, edge), r_lo)
+    high = np.where(down & ~up, np.minimum(r_hi, -edge), r_hi)
+    return low, high
+
+
+def _gradient_factor(N: _Part, D: _Part, r_lo: FloatArray, r_hi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the ends (n, B) of ``2 grad N - r grad D``, times the radii, over r in an interval."""
     lows, highs = [], []
     for r in (r_lo, r_hi):
-        b = 2 * N.L.b - r * D.L.b
-        H = 2 * N.L.H - r * D.L.H
-        size = 2 * np.abs(N.L.b) + np.abs(r * D.L.b) + (2 * np.abs(N.L.H) + np.abs(r * D.L.H)).sum(axis=1)
-        # The terms of second order of a gradient are in [p, q], w is at least (q - p) / 6, and b has (p + q) / 6 in it.
-        w = 5 * (2 * N.L.w + np.abs(r) * D.L.w)
-        rest = np.abs(H).sum(axis=1) + w + _SUM * (size + w)
-        ends = np.stack([r * D.L.slope_lo, r * D.L.slope_hi])
-        lows.append(np.fmax(b - rest, 2 * N.L.slope_lo - ends.max(axis=0)))
-        highs.append(np.fmin(b + rest, 2 * N.L.slope_hi - ends.min(axis=0)))
+        b, H = 2 * N.b - r * D.b, 2 * N.H - r * D.H
+        size = np.abs(r)
+        # A gradient's terms of second order lie in [p, q]; w is at least (q - p) / 6, and b has (p + q) / 6 in it.
+        w = 5 * (2 * N.w + size * D.w)
+        terms = 2 * np.abs(N.b) + size * np.abs(D.b) + (2 * np.abs(N.H) + size * np.abs(D.H)).sum(axis=1) + w
+        reach = np.abs(H).sum(axis=1) + w + _SUM * terms
+        ends = r * D.slope_lo, r * D.slope_hi
+        lows.append(np.fmax(b - reach, 2 * N.slope_lo - np.maximum(*ends) - _SUM * np.abs(ends).max(axis=0)))
+        highs.append(np.fmin(b + reach, 2 * N.slope_hi - np.minimum(*ends) + _SUM * np.abs(ends).max(axis=0)))
     low, high = np.minimum(*lows), np.maximum(*highs)
     return low - _SUM * np.abs(low), high + _SUM * np.abs(high)
 
 
-def _products(r_lo: FloatArray, r_hi: FloatArray, g_lo: FloatArray, g_hi: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of the products of two intervals, outwards."""
+def _product(
+    r_lo: FloatArray, r_hi: FloatArray, g_lo: FloatArray, g_hi: FloatArray, sign: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of ``sign`` times the product of two intervals, outwards."""
     ends = np.stack([r_lo * g_lo, r_lo * g_hi, r_hi * g_lo, r_hi * g_hi])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    return low - _SUM * np.abs(low), high + _SUM * np.abs(high)
+    low, high = low - _SUM * np.abs(low), high + _SUM * np.abs(high)
+    return (low, high) if sign > 0 else (-high, -low)

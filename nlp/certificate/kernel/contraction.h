@@ -82,7 +82,8 @@ static void reach_expression(Box *x, int r, double sign, double level)
 {
     int n = x->n;
     const double *A = x->gA + r * n * n;
-    double lost = 0.0;
+    double lost = 0.0, more = 0.0;
+    int squares = x->squares && r < x->J;
     reach_affine(x, r, sign, level);
     for (int i = 0; i < n; i++) {
         int at = r * n + i;
@@ -92,8 +93,16 @@ static void reach_expression(Box *x, int r, double sign, double level)
             across += fabs(A[i * n + j]);
         x->fb[i] = sign * x->gb[at];
         lost += finish_model(x->fb + i, x->fw + i, &low, &high, across, p, q, x->gs[at]);
+        if (squares) {
+            x->fw[i] += x->sw[at], more += x->sw[at];
+            for (int j = 0; j < n; j++) {
+                double h = x->sH[at * n + j];
+                x->fH[i * n + j] = A[i * n + j] + h, more += fabs(h);
+            }
+        }
     }
-    reach_quadratic(x, sign, sign * x->c[r] + x->s[r], x->fb, A, x->fw, 64 * ULP * (fabs(x->c[r]) + lost) + TINY, level, r);
+    double rounding = 64 * ULP * (fabs(x->c[r]) + lost) + TINY + 64 * ULP * more;
+    reach_quadratic(x, sign, sign * x->c[r] + x->s[r], x->fb, squares ? x->fH : A, x->fw, rounding, level, r);
 }
 
 #endif

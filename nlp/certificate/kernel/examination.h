@@ -18,6 +18,7 @@ typedef struct {
     double *bound, *value, *left_lower, *left_upper, *centre;
     int shared;     /* number of the first variables that other limbs have too */
     double *models; /* of the Lagrangian and of the function's gradient, limbmodels.py; NULL without them */
+    const double *least; /* (B) points with lesser values do not matter; NULL where all do */
 } Report;
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }

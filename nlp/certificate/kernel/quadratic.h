@@ -20,6 +20,9 @@ typedef struct {
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
+    int squares;          /* whether functions have quotients: quotients.h */
+    double *sH, *sw;      /* (J, n, n), (J, n): matrices and remainders of their models, whose linear part is in gb */
+    double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
 
 /* The gradient is made small in the variables from number first on. */
@@ -108,7 +111,20 @@ static void combine(Box *x)
             across += fabs(H[j]);
         x->qb[i] = b, x->qlo[i] = low, x->qhi[i] = high;
         lost += finish_model(x->qb + i, x->qw + i, x->qlo + i, x->qhi + i, across, p, q, s);
+        if (x->squares) { /* the linear part is that of an upper model: the slopes are in the other enclosure alone */
+            double margin = 64 * ULP * (fabs(b) + across + q - p + s) + TINY;
+            x->qlo[i] = low - margin, x->qhi[i] = high + margin;
+        }
     }
+    for (int r = 0; x->squares && r < x->J; r++)
+        for (int i = 0; i < n && x->weights[r] != 0; i++) {
+            double weight = x->weights[r], w = x->sw[r * n + i] * weight;
+            x->qw[i] += w, lost += w;
+            for (int j = 0; j < n; j++) {
+                double h = x->sH[(r * n + i) * n + j] * weight;
+                x->H[i * n + j] += h, lost += fabs(h);
+            }
+        }
     x->q_rounding = 64 * ULP * (largest + lost) + TINY;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++)

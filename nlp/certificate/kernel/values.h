@@ -38,6 +38,8 @@ typedef struct {
     const int *equation;      /* (R) whether it must be 0 */
     const int *depends;       /* (R, n) whether it depends on a variable */
     const double *low, *high; /* (n) ends of the whole box */
+    int quotients;       /* terms sign N^2 / D of functions: the rows after the expressions are N and D of each */
+    const int *whose;    /* (quotients, 2) function and sign */
     Tape tape;
 } Form;
 
