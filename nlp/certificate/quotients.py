@@ -7,7 +7,10 @@ The work rate of a row in a twist is ``N / |d|``, with N and ``D = |d|^2`` polyn
 With ``rho = N / D`` at the centre of a box, the first part is linear in N and D, whose models are accurate. E is 0 at the
 centre: with ``a.e`` its part of first order and ``|E - a.e| <= rest``,
 
-    (a.e)^2 - 2 |a.e| rest  <=  E^2  <=  (a.e)^2 + 2 |a.e| rest + rest^2.
+    (1 - t) (a.e)^2 - (1 / t - 1) rest^2  <=  E^2  <=  (1 + t) (a.e)^2 + (1 + 1 / t) rest^2    for any t > 0.
+
+With ``t = rest / reach`` and ``reach`` the largest of ``|a.e|``, these are ``(reach -+ rest)^2`` at its corner, the best bounds
+there. A square is at least 0 too, the better bound where rest is larger than reach.
 
 Enclosures of the quotient and its derivatives, operation by operation, are tens of times as wide on large boxes: there
 the terms of second order of each factor are bounded by themselves.
@@ -38,8 +41,6 @@ if TYPE_CHECKING:
 
 #: Rounding of a sum of fewer than a hundred products, in parts of the sum of their sizes: several times the largest.
 _SUM = 64 * ULP
-#: A minimum's ``E^2`` is kept where the rest is below this part of what is known: elsewhere 0 is the better bound.
-_KNOWN = 0.25
 
 
 class Quotient(NamedTuple):
@@ -212,16 +213,17 @@ def _add_square(
     b, H, w = 2 * rho * N.b - rho**2 * D.b, 2 * rho * N.H - rho**2 * D.H, 2 * size * N.w + rho**2 * D.w
     middle = rho * (2 * N.c - rho * D.c)
     error = 2 * size * offset + 3 * _SUM * size * terms + TINY
-    square, cross = a[:, None] * a[None], 2 * reach * rest
+    square = a[:, None] * a[None]
+    part = np.where(reach > 0, rest / reach, 0.0)
     numerator = np.maximum(np.abs(N.c) - N.s, 0.0) if sign > 0 else np.abs(N.c) + N.s
     denominator = D.c + D.s if sign > 0 else D.c - D.s
     at_centre = sign * numerator**2 / denominator
     at_centre = at_centre - _SUM * np.abs(at_centre)
     if sign > 0:
-        kept, more = 2 / D.lo, (cross + rest**2) / D.lo
+        kept, more = 2 * (1 + part) / D.lo, rest * (reach + rest) / D.lo
     else:
-        known = rest < _KNOWN * reach
-        kept, more = np.where(known, 2 / D.hi, 0.0), np.where(known, cross / D.hi, 0.0)
+        known = rest < reach
+        kept, more = np.where(known, 2 * (1 - part) / D.hi, 0.0), np.where(known, rest * (reach - rest) / D.hi, 0.0)
     added = square * kept
     error = error + _SUM * (more + np.abs(added).sum(axis=(0, 1)))
     high = sign * middle + more + error
@@ -251,7 +253,7 @@ def _add_square(
     value["q"][j] += (0.5 * np.abs(matrix).sum(axis=(0, 1)) + w.sum(axis=0)) * (1 + _SUM)
     whole["b"][j] += sign * b
     sums.H[j] += matrix
-    sums.w[j] += w + _SUM * (np.abs(b) + np.abs(H).sum(axis=1) + w)
+    sums.w[j] += np.where(defined, w + _SUM * (np.abs(b) + np.abs(H).sum(axis=1) + w), np.inf)
     whole["slope_lo"][j] += slope_lo
     whole["slope_hi"][j] += slope_hi
     whole["gradient_lo"][j] += grad_lo - _SUM * np.abs(grad_lo)

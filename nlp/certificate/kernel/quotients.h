@@ -5,7 +5,6 @@
 #include "quadratic.h"
 
 #define SUM (64 * ULP)
-#define KNOWN 0.25
 
 /* The model c + b e + 1/2 e'He +- w |e| +- s of one row, with its ends over the box. */
 typedef struct {
@@ -110,12 +109,12 @@ static void add_square(const Form *form, Box *x, int k, const double *radius, co
     r_lo = larger(r_lo, rho - far), r_hi = smaller(r_hi, rho + far);
     r_lo -= SUM * (fabs(r_lo) + size), r_hi += SUM * (fabs(r_hi) + size);
     double middle = rho * (2 * N.c - rho * D.c), error = 2 * size * offset + 3 * SUM * size * terms + TINY;
-    double cross = 2 * reach * rest, numerator = sign > 0 ? larger(fabs(N.c) - N.s, 0.0) : fabs(N.c) + N.s;
+    double part = reach > 0 ? rest / reach : 0.0, numerator = sign > 0 ? larger(fabs(N.c) - N.s, 0.0) : fabs(N.c) + N.s;
     double denominator = sign > 0 ? D.c + D.s : D.c - D.s, at_centre = sign * (numerator * numerator) / denominator;
     at_centre -= SUM * fabs(at_centre);
-    int known = rest < KNOWN * reach;
-    double kept = sign > 0 ? 2 / D.lo : known ? 2 / D.hi : 0.0;
-    double more = sign > 0 ? (cross + rest * rest) / D.lo : known ? cross / D.hi : 0.0;
+    int known = rest < reach;
+    double kept = sign > 0 ? 2 * (1 + part) / D.lo : known ? 2 * (1 - part) / D.hi : 0.0;
+    double more = sign > 0 ? rest * (reach + rest) / D.lo : known ? rest * (reach - rest) / D.hi : 0.0;
     double added = 0.0, whole = 0.0;
     int wide_enough = D.lo > 0 && N.s < INFINITY && D.s < INFINITY && isfinite(rho) && isfinite(reach) && isfinite(rest);
     for (int i = 0; i < n; i++) {
@@ -128,7 +127,7 @@ static void add_square(const Form *form, Box *x, int k, const double *radius, co
             x->sH[at * n + l] += matrix;
             across += fabs(H), added += fabs(square), whole += fabs(matrix);
         }
-        x->sw[at] += remainder + SUM * (fabs(b) + across + remainder);
+        x->sw[at] += wide_enough ? remainder + SUM * (fabs(b) + across + remainder) : INFINITY;
         x->gb[at] += sign * b, x->a[at] += sign * b;
         whole += 2 * remainder;
         double g_lo, g_hi, low, high;
