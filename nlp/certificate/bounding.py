@@ -26,7 +26,7 @@ from .examination import COLLAPSED, UNMOVED, Examination, Verdict
 from .instructions import compile_tape
 from .intervals import ULP
 from .kinks import refuse_jumps
-from .quotients import search_rows, with_quotients
+from .quotients import SearchRows, search_rows, with_quotients
 from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .standardform import StandardForm
 from .tape import Tape
@@ -45,14 +45,14 @@ _LINEAR = 0.3
 _WORTH = 0.1
 
 
-def search_tape(form: StandardForm) -> Tape:
-    """Compile a form's R expressions, then their derivatives, row by row.
+def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
+    """Compile the E rows of a form, then their derivatives, row by row; its expressions where no rows are given.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule, or its value jumps.
     """
     try:
-        rows = search_rows(form)
+        rows = search_rows(form) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
         return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
     except UncoveredError as error:
@@ -104,16 +104,17 @@ class NumpyEngine:
 
     Args:
         form: the form whose box is searched.
+        apart: whether numerators and denominators of the functions are enclosed, and not the quotients.
     """
 
     name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm) -> None:
+    def __init__(self, form: StandardForm, *, apart: bool = True) -> None:
         self.form = form
-        self._tape = search_tape(form)
-        self._quotients = search_rows(form).quotients
+        rows = search_rows(form, apart=apart)
+        self._tape, self._quotients = search_tape(form, rows), rows.quotients
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)

@@ -121,7 +121,9 @@ class BoxSearch(BoundedSearch[Boxes]):
 
     def _is_contracted_by_value(self, found: Examination) -> bool:
         """Return whether a contraction excluded points because of their value, which is at most the threshold."""
-        count, rest = len(self.form.functions), found.verdict != Verdict.BOUNDED
+        # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
+        # checker must show.
+        count, rest = len(self.form.functions), (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
         return any(bool(((why >= 0) & (why < count) & rest).any()) for why in (found.cut_lower, found.cut_upper))
 
 

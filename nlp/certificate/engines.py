@@ -55,17 +55,27 @@ class KernelEngine:
         module: the kernel.
         jobs: threads; one for each processor when left out.
         shared: number of the first variables that the form, a limb's, shares with others.
+        apart: whether numerators and denominators of the functions are enclosed, and not the quotients.
     """
 
     name = "c"
 
-    def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int = 0) -> None:
+    def __init__(
+        self,
+        form: StandardForm,
+        module: ModuleType,
+        jobs: int | None = None,
+        shared: int = 0,
+        *,
+        apart: bool = True,
+    ) -> None:
         self._module, self._shared = module, shared
         self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
+        rows = search_rows(form, apart=apart)
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
@@ -75,8 +85,8 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            np.array([(each.function, each.sign) for each in search_rows(form).quotients], dtype=np.int32).ravel(),
-            _kernel_tape(search_tape(form)),
+            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
+            _kernel_tape(search_tape(form, rows)),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
@@ -172,20 +182,22 @@ def chosen_kernel(name: str | None, built: Callable[[], ModuleType | None]) -> M
     return module
 
 
-def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
+def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None, *, apart: bool = True) -> Engine:
     """Return an engine for a form.
 
     Args:
         form: the form whose box is searched.
         name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         jobs: threads of the C kernel.
+        apart: whether numerators and denominators of the functions are enclosed, and not the quotients: the bounds are
+            sharper, and a checker that does not know them bisects more.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
         ValueError: there is no engine of that name here.
     """
     module = chosen_kernel(name, kernel)
-    return NumpyEngine(form) if module is None else KernelEngine(form, module, jobs)
+    return NumpyEngine(form, apart=apart) if module is None else KernelEngine(form, module, jobs, apart=apart)
 
 
 def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jobs: int | None = None) -> LimbEngine:

@@ -73,11 +73,11 @@ class SearchRows:
     quotients: tuple[Quotient, ...]
 
 
-def search_rows(form: StandardForm) -> SearchRows:
-    """Return the expressions of a form with the squared quotients of its functions taken apart."""
+def search_rows(form: StandardForm, *, apart: bool = True) -> SearchRows:
+    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
     found: list[Quotient] = []
     rests: list[SX] = []
-    for j, function in enumerate(form.functions):
+    for j, function in enumerate(form.functions if apart else ()):
         rest = SX(0)
         for term in terms_of(function):
             quotient = _as_quotient(term, j)
