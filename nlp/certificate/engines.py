@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .bounding import NumpyEngine, search_tape
+from .bounding import NumpyEngine, search_tape, value_tape
 from .examination import Examination, Verdict
 from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from .standardform import StandardForm
@@ -65,6 +65,7 @@ class KernelEngine:
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
+        values = None if shared else value_tape(form)
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
@@ -75,6 +76,7 @@ class KernelEngine:
             form.lower,
             form.upper,
             _kernel_tape(search_tape(form)),
+            None if values is None else _kernel_tape(values),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:

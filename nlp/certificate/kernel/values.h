@@ -38,7 +38,8 @@ typedef struct {
     const int *equation;      /* (R) whether it must be 0 */
     const int *depends;       /* (R, n) whether it depends on a variable */
     const double *low, *high; /* (n) ends of the whole box */
-    Tape tape;
+    Tape tape;   /* the expressions and their derivatives */
+    Tape values; /* the expressions alone; without instructions where forms of second order are not used */
 } Form;
 
 typedef struct {
