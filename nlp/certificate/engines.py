@@ -44,6 +44,8 @@ class Engine(Protocol):
 _BOXES_PER_JOB = 2048
 #: Boxes for each thread below which starting threads costs more than it saves.
 _WORTH_A_THREAD = 64
+#: Boxes that a thread takes at once: a whole number of the kernel's blocks of 32.
+_PIECE = 512
 
 
 class KernelEngine:
@@ -119,11 +121,12 @@ class KernelEngine:
         def examine_part(begin: int, finish: int) -> None:
             self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold, *models)
 
-        pieces = self._jobs if count >= _WORTH_A_THREAD * self._jobs else 1
-        edges = [count * k // pieces for k in range(pieces + 1)]
-        if pieces == 1 or self._pool is None:
+        if self._pool is None or count < _WORTH_A_THREAD * self._jobs:
             examine_part(0, count)
         else:
+            # Boxes cost differently, by what closes them: a thread that is done takes the next piece.
+            size = max(_WORTH_A_THREAD // 2, min(_PIECE, count // (2 * self._jobs)))
+            edges = [*range(0, count, size), count]
             for each in [self._pool.submit(examine_part, *edge) for edge in itertools.pairwise(edges)]:
                 each.result()
         return Examination(*found)
