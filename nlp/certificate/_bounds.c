@@ -5,7 +5,7 @@
  * loops become vector instructions; the boxes are then examined one by one. Every formula is that of the Python
  * modules, in the same order; their docstrings and docs/certificate.md explain them. The headers of kernel/ have an idea
  * each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, enclosure,
- * quadratic, contraction, examination, blocks.
+ * quadratic, contraction, examination, secondorder, firstpass, blocks.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
  * nor with contraction to fused operations, which would make the two engines differ.
@@ -47,15 +47,15 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *equation, *depends, *low, *high, *whose, *arrays[12], *models = NULL, *least = NULL;
+    PyObject *tape, *values, *equation, *depends, *low, *high, *whose, *arrays[12], *models = NULL, *least = NULL;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOOO!)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &whose, &PyTuple_Type, &tape, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!O)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
+                          &high, &whose, &PyTuple_Type, &tape, &values, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
                           &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
                           &report.shared, &models, &least))
@@ -65,6 +65,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && pairs >= 0 && (form.whose = borrow(&all, whose, pairs, sizeof(int), 0));
     form.quotients = (int)(pairs / 2);
     form.expressions = good ? form.tape.outputs / (form.n + 1) - 2 * form.quotients : 0;
+    good = good && (values == Py_None || read_tape(&all, values, &form.values) == 0);
     Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
     good = good && (form.equation = borrow(&all, equation, R, I, 0)) && (form.depends = borrow(&all, depends, R * n, I, 0));
     good = good && (form.low = borrow(&all, low, n, D, 0)) && (form.high = borrow(&all, high, n, D, 0));
@@ -86,33 +87,39 @@ static PyObject *examine(PyObject *module, PyObject *args)
     }
     if (good && models && least)
         good = (report.least = borrow(&all, least, B, D, 0)) != NULL;
-    for (int k = 0; good && k < form.quotients; k++)
-        good = form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
     double *memory = NULL;
-    if (good && (form.functions > R || form.tape.outputs != (R + 2 * form.quotients) * (n + 1) || begin < 0 || finish > B)) {
+    int fits = form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
+    for (int k = 0; good && k < form.quotients; k++)
+        fits = fits && form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
+    if (good && !(fits && (values == Py_None || form.values.outputs == R))) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
     }
-    if (good && !(memory = malloc(memory_needed(&form) * sizeof(double))))
+    Py_ssize_t *open = NULL, count = finish > begin ? finish - begin : 1;
+    if (good && (!(memory = malloc(memory_needed(&form) * sizeof(double))) ||
+                 !(open = malloc((size_t)count * sizeof(Py_ssize_t)))))
         PyErr_NoMemory();
-    if (memory) {
+    if (memory && open) {
         Py_BEGIN_ALLOW_THREADS
-        examine_range(&form, &report, begin, finish, threshold, memory);
+        examine_range(&form, &report, begin, finish, threshold, memory, open);
         Py_END_ALLOW_THREADS
     }
+    int done = memory && open;
     free(memory);
+    free(open);
     for (int i = 0; i < all.count; i++)
         PyBuffer_Release(&all.buffers[i]);
-    if (!memory)
+    if (!done)
         return NULL;
     Py_RETURN_NONE;
 }
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, whose, tape), arrays, B, begin, finish, threshold,\n"
+     "examine((n, functions, equation, depends, low, high, whose, tape, values), arrays, B, begin, finish, threshold,\n"
      "        shared=0, models=None, least=None)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
+     "values is the tape of the expressions without their gradients, or None.\n"
      "With models the first variables are shared with other limbs."},
     {NULL, NULL, 0, NULL},
 };

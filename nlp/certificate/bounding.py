@@ -10,7 +10,7 @@ a quadratic model with a remainder of third order, without second derivatives. W
 ``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
 conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
 
-This module is the reference; the C kernel (``kernel/``) has the same formulas. ``docs/certificate.md`` explains each of them.
+This module is the reference; the C kernel (``kernel/``) has the same formulas. ``docs/certificate.md`` explains them.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ import numpy as np
 
 from .enclosure import Enclosures, Midpoints, enclose, midpoints
 from .examination import COLLAPSED, UNMOVED, Examination, Verdict
+from .firstpass import MOST_VARIABLES, Cuts, first_pass
 from .instructions import compile_tape
 from .intervals import ULP
 from .kinks import refuse_jumps
+from .quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers
 from .quotients import SearchRows, search_rows, with_quotients
-from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .standardform import StandardForm
 from .tape import Tape
 
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 from ..errors import UncoveredError
 
-#: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
-_MULTIPLIER_ROUNDS = 8
 #: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
 _LINEAR = 0.3
 #: Part of a side below which a contraction is not worth its leaf in a proof.
@@ -46,17 +45,24 @@ _WORTH = 0.1
 
 
 def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
-    """Compile the E rows of a form, then their derivatives, row by row; its expressions where no rows are given.
+    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule, or its value jumps.
     """
     try:
-        rows = search_rows(form) if rows is None else rows
+        rows = search_rows(form, apart=False) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
         return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def value_tape(form: StandardForm) -> Tape | None:
+    """Compile a form's R expressions alone, for the first pass; None for a form with too many variables for one."""
+    if form.n > MOST_VARIABLES:
+        return None
+    return compile_tape(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
@@ -104,17 +110,18 @@ class NumpyEngine:
 
     Args:
         form: the form whose box is searched.
-        apart: whether numerators and denominators of the functions are enclosed, and not the quotients.
+        apart: whether N and D of the functions' squared quotients are enclosed, and not the quotients. The first pass
+            over a box does without.
     """
 
     name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm, *, apart: bool = True) -> None:
+    def __init__(self, form: StandardForm, *, apart: bool = False) -> None:
         self.form = form
         rows = search_rows(form, apart=apart)
-        self._tape, self._quotients = search_tape(form, rows), rows.quotients
+        self._tape, self._values, self._quotients = search_tape(form, rows), value_tape(form), rows.quotients
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)
@@ -131,10 +138,38 @@ class NumpyEngine:
             threshold: boxes whose bound is at most this are closed.
         """
         with np.errstate(all="ignore"):
-            return self._examine(lower, upper, threshold)
+            if self._values is None:
+                return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
+            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            rest = np.flatnonzero(first.verdict == Verdict.OPEN)
+            found = self._examine(lower[:, rest], upper[:, rest], threshold, first.cuts.select(rest), first.bound[rest])
+        whole = Remainder.whole(lower, upper)
+        result = Examination(
+            verdict=first.verdict,
+            reason=first.reason,
+            bound=first.bound,
+            lower=whole.lower,
+            upper=whole.upper,
+            cut_lower=whole.cut_lower,
+            cut_upper=whole.cut_upper,
+            split=np.zeros_like(first.reason),
+            value=first.value,
+            centre=midpoints(lower, upper).centre,
+        )
+        for name, values in vars(result).items():
+            if name not in ("value", "centre"):
+                values[..., rest] = getattr(found, name)
+        return result
 
-    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
-        """Examine boxes; NumPy's warnings of invalid operations are off."""
+    def _examine(
+        self,
+        lower: FloatArray,
+        upper: FloatArray,
+        threshold: float,
+        cuts: Cuts,
+        known: FloatArray | float = np.inf,
+    ) -> Examination:
+        """Examine boxes with cuts and bounds that are known; NumPy's warnings of invalid operations are off."""
         J = self.functions
         box = midpoints(lower, upper)
         model = self.model(lower, upper, box.radius)
@@ -143,11 +178,11 @@ class NumpyEngine:
         defined = (error[:J] < np.inf).all(axis=0)
         bound = high[:J].min(axis=0)
         L = model.sum_model(self.multipliers(model, high))
-        bound = np.where(defined, np.fmin(bound, L.bound()), np.inf)
+        bound = np.fmin(np.where(defined, np.fmin(bound, L.bound()), np.inf), known)
 
         impossible, binding = self.states(low, high)
         left = self.collapse_monotone(model, binding, lower, upper)
-        self.contract(model, L, left, box, threshold)
+        self.contract(model, L, left, box, threshold, cuts)
         some = np.asarray(impossible.any(axis=0))
         left.close(some, Verdict.INFEASIBLE, impossible.argmax(axis=0)[some])
         left.verdict[~defined & (left.verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
@@ -201,37 +236,9 @@ class NumpyEngine:
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
 
-        They make its scaled gradient at the centre small in the variables from number ``first`` on, by coordinate
-        descent on the sum of squares.
+        They make its scaled gradient at the centre small in the variables from number ``first`` on.
         """
-        J, R = self.functions, len(self.equation)
-        weights = np.zeros_like(high)
-        weights[0] = 1.0
-        left = model.b[0, first:].copy()
-        directions = model.b[:, first:].copy()
-        directions[:J] -= model.b[0, first:]
-        sizes = np.einsum("rib,rib->rb", directions, directions)
-        usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
-        usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
-        for _ in range(_MULTIPLIER_ROUNDS if R > 1 else 0):
-            for r in range(1, R):
-                step = -np.einsum("ib,ib->b", directions[r], left) / sizes[r]
-                new = weights[r] + step
-                if r < J:
-                    new = np.clip(new, 0.0, weights[r] + weights[0])
-                elif not self.equation[r]:
-                    new = np.minimum(new, 0.0)
-                new = np.where(usable[r] & np.isfinite(new), new, weights[r])
-                change = new - weights[r]
-                left += change * np.where(usable[r], directions[r], 0.0)
-                weights[r] = new
-                if r < J:
-                    weights[0] = np.maximum(weights[0] - change, 0.0)
-        # The weights of the functions must sum to 1 in spite of rounding.
-        weights[0] += 1.0 - weights[:J].sum(axis=0)
-        bad = weights[0] < 0
-        weights[:J, bad], weights[0, bad] = 0.0, 1.0
-        return weights
+        return multipliers(model.b, high, self.equation, self.functions, first)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""
@@ -270,19 +277,22 @@ class NumpyEngine:
         return left
 
     def contract(
-        self, model: GradientModel, L: QuadraticModel, left: Remainder, box: Midpoints, threshold: float
+        self,
+        model: GradientModel,
+        L: QuadraticModel,
+        left: Remainder,
+        box: Midpoints,
+        threshold: float,
+        cuts: Cuts | None = None,
     ) -> None:
-        """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold."""
+        """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold.
+
+        Cuts that are known already are moved further, in place.
+        """
         centre, radius = box
         J = self.functions
-        e_lo, e_hi = np.full(left.lower.shape, -1.0), np.full(left.lower.shape, 1.0)
-        why_lo, why_hi = left.cut_lower.copy(), left.cut_upper.copy()
-
-        def keep(part: Ends, r: int) -> None:
-            raised, lowered = part.low > e_lo, part.high < e_hi
-            e_lo[raised], e_hi[lowered] = part.low[raised], part.high[lowered]
-            why_lo[raised], why_hi[lowered] = r, r
-
+        cuts = Cuts.none(left.lower.shape) if cuts is None else cuts
+        keep = cuts.keep
         for r in range(len(self.equation)):
             for sign in (1.0, -1.0):
                 if (r < J and sign < 0) or (r >= J and sign > 0 and not self.equation[r]):
@@ -292,6 +302,7 @@ class NumpyEngine:
                 keep(model.expression_model(r, sign).ends_reaching(level), r)
         if len(self.equation) > 1:
             keep(L.ends_reaching(threshold), 0)
+        e_lo, e_hi, why_lo, why_hi = cuts
         new_lo = centre + radius * e_lo
         new_lo -= (np.abs(centre) + radius) * (4 * ULP)
         new_hi = centre + radius * e_hi

@@ -81,6 +81,9 @@ class BoxSearch(BoundedSearch[Boxes]):
         closed = found.verdict == Verdict.BOUNDED
         if closed.any():
             self._closed_bound = max(self._closed_bound, float(found.bound[closed].max()))
+            if self._recorder is not None:
+                # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
+                self._closed_bound = max(self._closed_bound, threshold)
         if self._is_contracted_by_value(found):
             self._closed_bound = max(self._closed_bound, threshold)
         self.boxes += boxes.count

@@ -139,7 +139,7 @@ def _method(
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or recorder is not None or form.n <= _WHOLE_BOX:
-        return BoxSearch(form, engine_for(form, engine, jobs, apart=recorder is None), incumbent, recorder)
+        return BoxSearch(form, engine_for(form, engine, jobs), incumbent, recorder)
     return SharedSearch(form, separation, incumbent, engine, jobs)
 
 

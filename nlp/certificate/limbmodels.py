@@ -132,7 +132,7 @@ def models_from_rows(rows: FloatArray, n: int, m: int) -> tuple[FloatArray, Quad
     at = 3 + 4 * n
     H = rows[at : at + n * n].reshape(n, n, -1)
     L = QuadraticModel(rows[1], vectors[0], H, vectors[1], vectors[2], vectors[3], rows[2])
-    return rows[0], L, rows[at + n * n :].reshape(m, 4, -1)
+    return rows[0], L, rows[at + n * n :].reshape(m, 4, rows.shape[1])
 
 
 def rows_of_models(n: int, m: int) -> int:

@@ -97,7 +97,7 @@ class IndependentSearch:
         self._searches = [
             BoxSearch(
                 limb.form,
-                engine_for(limb.form, engine, jobs, apart=recorder is None),
+                engine_for(limb.form, engine, jobs),
                 LimbPoint(limb, incumbent, parts),
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )

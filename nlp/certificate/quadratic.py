@@ -14,9 +14,13 @@ from .enclosure import Enclosures
 from .intervals import TINY, ULP
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ...models import FloatArray
     from .quotients import SquareSums
 
+#: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
+_MULTIPLIER_ROUNDS = 8
 #: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.
 _TANGENT_ROUNDS = 3
 #: Part of its terms by which a quadratic's level is lowered before its roots: far more than their rounding.
@@ -234,8 +238,8 @@ def _integrate(
         low: (n, B) lower ends of the gradient times ``r_i`` from another enclosure, for an intersection.
         high: (n, B) upper ends likewise.
         largest: (B,) size of the terms of the value at the centre.
-        H, w: (n, n, B) and (n, B) matrix and remainder of an upper model whose linear part is in b; its slopes are in the
-            other enclosure alone.
+        H: (n, n, B) matrix of an upper model whose linear part is in b and whose slopes are in the other enclosure.
+        w: (n, B) its remainder.
     """
     across = np.abs(A).sum(axis=1)
     rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
@@ -265,3 +269,47 @@ def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArr
     )
     first = np.where(at_start, 0.0, np.where(at_end | peak, np.clip(small, 0.0, 1.0), 2.0))
     return first, last
+
+
+def multipliers(
+    gradients: FloatArray, high: FloatArray, equation: NDArray[np.bool_], functions: int, first: int = 0
+) -> FloatArray:
+    """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
+
+    They make its gradient small in the variables from number ``first`` on, by coordinate descent on the sum of squares.
+
+    Args:
+        gradients: (R, n, B) of the expressions at the centres, scaled.
+        high: (R, B) upper ends of the expressions.
+        equation: (R,) whether each must be 0.
+        functions: number J of the first expressions, which are functions.
+        first: the first variable.
+    """
+    J, R = functions, len(equation)
+    weights = np.zeros_like(high)
+    weights[0] = 1.0
+    left = gradients[0, first:].copy()
+    directions = gradients[:, first:].copy()
+    directions[:J] -= gradients[0, first:]
+    sizes = np.einsum("rib,rib->rb", directions, directions)
+    usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
+    usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
+    for _ in range(_MULTIPLIER_ROUNDS if R > 1 else 0):
+        for r in range(1, R):
+            step = -np.einsum("ib,ib->b", directions[r], left) / sizes[r]
+            new = weights[r] + step
+            if r < J:
+                new = np.clip(new, 0.0, weights[r] + weights[0])
+            elif not equation[r]:
+                new = np.minimum(new, 0.0)
+            new = np.where(usable[r] & np.isfinite(new), new, weights[r])
+            change = new - weights[r]
+            left += change * np.where(usable[r], directions[r], 0.0)
+            weights[r] = new
+            if r < J:
+                weights[0] = np.maximum(weights[0] - change, 0.0)
+    # The weights of the functions must sum to 1 in spite of rounding.
+    weights[0] += 1.0 - weights[:J].sum(axis=0)
+    bad = weights[0] < 0
+    weights[:J, bad], weights[0, bad] = 0.0, 1.0
+    return weights

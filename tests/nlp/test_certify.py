@@ -362,7 +362,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
         "WORTH": bounding._WORTH,
         "LINEAR": bounding._LINEAR,
         "ROOT_SLACK": quadratic._ROOT_SLACK,
-        "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
+        "MULTIPLIER_ROUNDS": quadratic._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
     }
     for name, value in numbers.items():

@@ -255,7 +255,9 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
                 r.q[l] = larger(down, up) + larger(rule.most * square, 0.0);
                 double steep = fabs(slope) + 2 * larger(fabs(rule.least), fabs(rule.most)) * (moved + x->s[l]);
                 double size = fabs(slope) * moved + fabs(rule.value);
-                r.s[l] = steep * x->s[l] + rule.error * (1 + moved) + (slack * size + TINY);
+                /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
+                double unknown = 0 * (rule.least + rule.most);
+                r.s[l] = steep * x->s[l] + rule.error * (1 + moved) + (slack * size + TINY) + unknown;
             }
             for (int i = first; i < last; i++)
                 EACH t[i][l] = slopes[l] * ax[i][l];

@@ -53,12 +53,13 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     }
 }
 
+/* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results. */
 static void judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
-                  double threshold)
+                  double threshold, int passed)
 {
     int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0, defined = 1, impossible = -1;
     Py_ssize_t B = report->B;
-    double bound = INFINITY, value = INFINITY;
+    double bound = passed ? report->bound[at] : INFINITY, value = passed ? report->value[at] : INFINITY;
     for (int r = 0; r < R; r++) {
         double steep = 0.0, middle = x->c[r], error = x->s[r];
         for (int i = 0; i < n; i++)
@@ -71,11 +72,11 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         if (r < J) {
             defined = defined && error < INFINITY;
             bound = smaller(bound, x->high[r]);
-            value = smaller(value, middle - error);
+            value = passed ? value : smaller(value, middle - error);
         } else {
             if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] && x->high[r] < 0)))
                 impossible = r;
-            if (!(middle + error <= 0))
+            if (!passed && !(middle + error <= 0))
                 value = -INFINITY;
         }
     }
@@ -85,15 +86,16 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         write_model(form, x, report, at, defined);
     double lagrangian = report->models ? INFINITY : quadratic_bound(x);
     bound = lagrangian < bound ? lagrangian : bound;
-    bound = defined ? bound : INFINITY;
+    if (!defined)
+        bound = passed ? report->bound[at] : INFINITY;
 
     for (int i = 0; i < n; i++) {
         Py_ssize_t end = i * B + at;
+        x->e_lo[i] = passed ? report->left_lower[end] : -1.0, x->e_hi[i] = passed ? report->left_upper[end] : 1.0;
+        x->why_lo[i] = passed ? report->cut_lower[end] : -2, x->why_hi[i] = passed ? report->cut_upper[end] : -2;
         report->left_lower[end] = report->lower[end], report->left_upper[end] = report->upper[end];
         report->cut_lower[end] = report->cut_upper[end] = -2;
         report->centre[end] = centre[i];
-        x->e_lo[i] = -1.0, x->e_hi[i] = 1.0;
-        x->why_lo[i] = x->why_hi[i] = -2;
     }
     /* Monotonicity. */
     for (int i = report->shared; i < n && defined; i++)

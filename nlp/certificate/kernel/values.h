@@ -40,7 +40,8 @@ typedef struct {
     const double *low, *high; /* (n) ends of the whole box */
     int quotients;       /* terms sign N^2 / D of functions: the rows after the expressions are N and D of each */
     const int *whose;    /* (quotients, 2) function and sign */
-    Tape tape;
+    Tape tape;   /* the rows and their derivatives */
+    Tape values; /* the expressions alone; without instructions where forms of second order are not used */
 } Form;
 
 typedef struct {
@@ -48,6 +49,7 @@ typedef struct {
     size_t stride; /* doubles of a value with its coefficients */
 } Store;
 
+static inline int rows_of(const Form *form) { return form->expressions + 2 * form->quotients; }
 static inline Value *value_of(Store s, int i) { return (Value *)(s.memory + (size_t)i * s.stride); }
 static inline Lane *terms_of(Value *v) { return (Lane *)(v + 1); }
 static inline double larger(double a, double b) { return a > b ? a : b; }
