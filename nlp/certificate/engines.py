@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .bounding import NumpyEngine, search_tape, value_tape
+from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
+from .firstpass import value_tape
 from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from .standardform import StandardForm
 from .tape import Tape
@@ -67,7 +68,8 @@ class KernelEngine:
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
-        values = None if shared else value_tape(form)
+        tape, values = search_tape(form), None if shared else value_tape(form)
+        objective = objective_tape(form, len(tape))
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
@@ -77,8 +79,9 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            _kernel_tape(search_tape(form)),
+            _kernel_tape(tape),
             None if values is None else _kernel_tape(values),
+            None if values is None or objective is None else _kernel_tape(objective),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:

@@ -40,6 +40,7 @@ typedef struct {
     const double *low, *high; /* (n) ends of the whole box */
     Tape tape;   /* the expressions and their derivatives */
     Tape values; /* the expressions alone; without instructions where forms of second order are not used */
+    Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
 } Form;
 
 typedef struct {
