@@ -47,15 +47,16 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *values, *equation, *depends, *low, *high, *whose, *arrays[12], *models = NULL, *least = NULL;
+    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *arrays[12];
+    PyObject *models = NULL, *least = NULL;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOOO!O)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &whose, &PyTuple_Type, &tape, &values, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OO)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
+                          &high, &whose, &PyTuple_Type, &tape, &values, &objective, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
                           &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
                           &report.shared, &models, &least))
@@ -66,6 +67,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     form.quotients = (int)(pairs / 2);
     form.expressions = good ? form.tape.outputs / (form.n + 1) - 2 * form.quotients : 0;
     good = good && (values == Py_None || read_tape(&all, values, &form.values) == 0);
+    good = good && (objective == Py_None || read_tape(&all, objective, &form.objective) == 0);
     Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
     good = good && (form.equation = borrow(&all, equation, R, I, 0)) && (form.depends = borrow(&all, depends, R * n, I, 0));
     good = good && (form.low = borrow(&all, low, n, D, 0)) && (form.high = borrow(&all, high, n, D, 0));
@@ -91,35 +93,43 @@ static PyObject *examine(PyObject *module, PyObject *args)
     int fits = form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
     for (int k = 0; good && k < form.quotients; k++)
         fits = fits && form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
-    if (good && !(fits && (values == Py_None || form.values.outputs == R))) {
+    fits = fits && (values == Py_None || form.values.outputs == R);
+    if (good && !(fits && (objective == Py_None || form.objective.outputs == form.functions * (n + 1)))) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
     }
-    Py_ssize_t *open = NULL, count = finish > begin ? finish - begin : 1;
-    if (good && (!(memory = malloc(memory_needed(&form) * sizeof(double))) ||
-                 !(open = malloc((size_t)count * sizeof(Py_ssize_t)))))
+    size_t count = finish > begin ? (size_t)(finish - begin) : 1;
+    Kept kept = {NULL, NULL};
+    if (good) {
+        memory = malloc(memory_needed(&form) * sizeof(double));
+        kept.open = malloc(count * sizeof(Py_ssize_t));
+        kept.scores = malloc((form.objective.length ? count * (size_t)n : 1) * sizeof(double));
+    }
+    int ready = memory && kept.open && kept.scores;
+    if (good && !ready)
         PyErr_NoMemory();
-    if (memory && open) {
+    if (ready) {
         Py_BEGIN_ALLOW_THREADS
-        examine_range(&form, &report, begin, finish, threshold, memory, open);
+        examine_range(&form, &report, begin, finish, threshold, memory, &kept);
         Py_END_ALLOW_THREADS
     }
-    int done = memory && open;
     free(memory);
-    free(open);
+    free(kept.open);
+    free(kept.scores);
     for (int i = 0; i < all.count; i++)
         PyBuffer_Release(&all.buffers[i]);
-    if (!done)
+    if (!ready)
         return NULL;
     Py_RETURN_NONE;
 }
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, whose, tape, values), arrays, B, begin, finish, threshold,\n"
-     "        shared=0, models=None, least=None)\n\n"
+     "examine((n, functions, equation, depends, low, high, whose, tape, values, objective), arrays, B,\n"
+     "        begin, finish, threshold, shared=0, models=None, least=None)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
-     "values is the tape of the expressions without their gradients, or None.\n"
+     "values is the tape of the expressions without their gradients, or None; objective that of the functions and\n"
+     "their gradients where conditions are evaluated only if needed, or None.\n"
      "With models the first variables are shared with other limbs."},
     {NULL, NULL, 0, NULL},
 };

@@ -15,15 +15,14 @@ This module is the reference; the C kernel (``kernel/``) has the same formulas. 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from .enclosure import Enclosures, Midpoints, enclose, midpoints
-from .examination import COLLAPSED, UNMOVED, Examination, Verdict
-from .firstpass import MOST_VARIABLES, Cuts, first_pass
+from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
+from .firstpass import LINEAR, MOST_VARIABLES, Cuts, FirstPass, first_pass, value_tape, without_conditions
 from .instructions import compile_tape
 from .intervals import ULP
 from .kinks import refuse_jumps
@@ -38,8 +37,8 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 from ..errors import UncoveredError
 
-#: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
-_LINEAR = 0.3
+#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
+_MANY_CONDITIONS = 4
 #: Part of a side below which a contraction is not worth its leaf in a proof.
 _WORTH = 0.1
 
@@ -58,11 +57,12 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 
 
-def value_tape(form: StandardForm) -> Tape | None:
-    """Compile a form's R expressions alone, for the first pass; None for a form with too many variables for one."""
-    if form.n > MOST_VARIABLES:
+def objective_tape(form: StandardForm, length: int) -> Tape | None:
+    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
+    if form.n > MOST_VARIABLES or not form.conditions:
         return None
-    return compile_tape(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
+    tape = search_tape(without_conditions(form))
+    return tape if len(tape) * _MANY_CONDITIONS <= length else None
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
@@ -77,32 +77,6 @@ def _uncovered_limit(form: StandardForm) -> str | None:
         except UncoveredError:
             return None if key is None else f"limits.{key}"
     return None
-
-
-@dataclass(eq=False)
-class Remainder:
-    """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
-
-    The attributes are those of :class:`Examination`.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    cut_lower: NDArray[np.int32]
-    cut_upper: NDArray[np.int32]
-    verdict: NDArray[np.int32]
-    reason: NDArray[np.int32]
-
-    @classmethod
-    def whole(cls, lower: FloatArray, upper: FloatArray) -> Remainder:
-        """Return whole boxes, all open."""
-        cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
-        open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
-        return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
-
-    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
-        """Close some boxes for a reason."""
-        self.verdict[which], self.reason[which] = verdict, reason
 
 
 class NumpyEngine:
@@ -121,7 +95,10 @@ class NumpyEngine:
     def __init__(self, form: StandardForm, *, apart: bool = False) -> None:
         self.form = form
         rows = search_rows(form, apart=apart)
-        self._tape, self._values, self._quotients = search_tape(form, rows), value_tape(form), rows.quotients
+        self._tape, self._quotients = search_tape(form, rows), rows.quotients
+        self._values = value_tape(form)
+        alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
+        self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)
@@ -141,25 +118,50 @@ class NumpyEngine:
             if self._values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
             first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            whole = Remainder.whole(lower, upper)
+            result = Examination(
+                verdict=first.verdict,
+                reason=first.reason,
+                bound=first.bound,
+                lower=whole.lower,
+                upper=whole.upper,
+                cut_lower=whole.cut_lower,
+                cut_upper=whole.cut_upper,
+                split=np.zeros_like(first.reason),
+                value=first.value,
+                centre=midpoints(lower, upper).centre,
+            )
             rest = np.flatnonzero(first.verdict == Verdict.OPEN)
-            found = self._examine(lower[:, rest], upper[:, rest], threshold, first.cuts.select(rest), first.bound[rest])
-        whole = Remainder.whole(lower, upper)
-        result = Examination(
-            verdict=first.verdict,
-            reason=first.reason,
-            bound=first.bound,
-            lower=whole.lower,
-            upper=whole.upper,
-            cut_lower=whole.cut_lower,
-            cut_upper=whole.cut_upper,
-            split=np.zeros_like(first.reason),
-            value=first.value,
-            centre=midpoints(lower, upper).centre,
-        )
-        for name, values in vars(result).items():
-            if name not in ("value", "centre"):
-                values[..., rest] = getattr(found, name)
+            if self._objective is not None:
+                rest = self._objective.examine_functions(first, result, rest, threshold)
+            cuts, known = first.cuts.select(rest), first.bound[rest]
+            _put(result, rest, self._examine(lower[:, rest], upper[:, rest], threshold, cuts, known))
         return result
+
+    def examine_functions(
+        self, first: FirstPass, result: Examination, rest: NDArray[np.intp], threshold: float
+    ) -> NDArray[np.intp]:
+        """Examine boxes by the functions alone, and return those whose conditions' gradients may decide.
+
+        Those are the boxes in which every function rises, or falls, along a variable. This engine's form has no
+        conditions.
+
+        Args:
+            first: the first pass over all boxes, conditions included.
+            result: results of all boxes, written in place where these are examined; its ends are those of the boxes.
+            rest: places of the boxes.
+            threshold: as for :meth:`examine`.
+        """
+        lower, upper = result.lower[:, rest], result.upper[:, rest]
+        model = self.model(lower, upper, midpoints(lower, upper).radius)
+        rises, falls = (model.gradient_lo > 0).all(axis=0), (model.gradient_hi < 0).all(axis=0)
+        defined = (model.value.s < np.inf).all(axis=0)
+        more = defined & ((rises | falls) & (upper > lower)).any(axis=0)
+        places = rest[~more]
+        cuts, known, scores = first.cuts.select(places), first.bound[places], first.scores[:, places]
+        ends = result.lower[:, places], result.upper[:, places]
+        _put(result, places, self._examine(*ends, threshold, cuts, known, scores))
+        return rest[more]
 
     def _examine(
         self,
@@ -168,8 +170,9 @@ class NumpyEngine:
         threshold: float,
         cuts: Cuts,
         known: FloatArray | float = np.inf,
+        scores: FloatArray | None = None,
     ) -> Examination:
-        """Examine boxes with cuts and bounds that are known; NumPy's warnings of invalid operations are off."""
+        """Examine boxes with cuts, bounds and scores (n, B) that are known; NumPy's warnings are off."""
         J = self.functions
         box = midpoints(lower, upper)
         model = self.model(lower, upper, box.radius)
@@ -198,7 +201,7 @@ class NumpyEngine:
             upper=left.upper,
             cut_lower=left.cut_lower,
             cut_upper=left.cut_upper,
-            split=self._split(L, lower, upper, left),
+            split=self._split(L, lower, upper, left, scores),
             value=np.where(conditions_hold, (middle[:J] - error[:J]).min(axis=0), -np.inf),
             centre=box.centre,
         )
@@ -234,10 +237,7 @@ class NumpyEngine:
         return with_quotients(rows, self._quotients, R, radius, least)
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
-        """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
-
-        They make its scaled gradient at the centre small in the variables from number ``first`` on.
-        """
+        """Return weights (R, B) of the Lagrangian: see :func:`.quadratic.multipliers`."""
         return multipliers(model.b, high, self.equation, self.functions, first)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -318,11 +318,22 @@ class NumpyEngine:
         which = np.asarray(emptied.any(axis=0))
         left.close(which, Verdict.EMPTIED, emptied.argmax(axis=0)[which])
 
-    def _split(self, L: QuadraticModel, lower: FloatArray, upper: FloatArray, left: Remainder) -> NDArray[np.int32]:
-        """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left."""
+    def _split(
+        self,
+        L: QuadraticModel,
+        lower: FloatArray,
+        upper: FloatArray,
+        left: Remainder,
+        scores: FloatArray | None,
+    ) -> NDArray[np.int32]:
+        """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left.
+
+        With scores (n, B) these are the changes, apart from the model's remainder.
+        """
         width = upper - lower
         part = (left.upper - left.lower) / np.where(width > 0, width, 1.0)
-        score = (_LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) + L.w) * part
+        score = LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) if scores is None else scores
+        score = (score + L.w) * part
         relative = (left.upper - left.lower) / (self.form.upper - self.form.lower)[:, None]
         finite = np.isfinite(score).all(axis=0)
         score = np.where(finite, score, relative)
@@ -330,6 +341,13 @@ class NumpyEngine:
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(left.upper > left.lower)] = -1.0
         return np.asarray(score.argmax(axis=0), dtype=np.int32)
+
+
+def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> None:
+    """Write results of some boxes in place; values at centres are those of the first pass."""
+    for name, values in vars(result).items():
+        if name not in ("value", "centre"):
+            values[..., places] = getattr(found, name)
 
 
 def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:

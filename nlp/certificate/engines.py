@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .bounding import NumpyEngine, search_tape, value_tape
+from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
+from .firstpass import value_tape
 from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from .quotients import search_rows
 from .standardform import StandardForm
@@ -71,7 +72,8 @@ class KernelEngine:
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
         rows = search_rows(form, apart=shared is not None)
-        values = None if shared is not None else value_tape(form)
+        tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
+        objective = objective_tape(form, len(tape))
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
@@ -82,8 +84,9 @@ class KernelEngine:
             form.lower,
             form.upper,
             np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
-            _kernel_tape(search_tape(form, rows)),
+            _kernel_tape(tape),
             None if values is None else _kernel_tape(values),
+            None if values is None or objective is None else _kernel_tape(objective),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:

@@ -9,11 +9,14 @@ This module is the reference; the C kernel has the same formulas.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from .examination import UNMOVED, Verdict
+from .instructions import compile_tape
 from .intervals import TINY, ULP
 from .quadratic import Ends, QuadraticModel, multipliers
 from .secondorder import Forms, enclose_second, monomials
@@ -22,10 +25,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...models import FloatArray
+    from .standardform import StandardForm
     from .tape import Tape
 
 #: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
 MOST_VARIABLES = 12
+#: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
+LINEAR = 0.3
+
+
+def value_tape(form: StandardForm) -> Tape | None:
+    """Compile a form's R expressions alone, for the first pass; None for a form with too many variables for one."""
+    if form.n > MOST_VARIABLES:
+        return None
+    return compile_tape(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
+
+
+def without_conditions(form: StandardForm) -> StandardForm:
+    """Return the form of the functions alone."""
+    return replace(form, conditions=(), signs=())
 
 
 class Cuts(NamedTuple):
@@ -54,13 +72,17 @@ class Cuts(NamedTuple):
 
 
 class FirstPass(NamedTuple):
-    """Results of the first pass over B boxes; the names are those of :class:`.examination.Examination`."""
+    """Results of the first pass over B boxes; the names are those of :class:`.examination.Examination`.
+
+    ``scores`` (n, B) are changes of the Lagrangian along each variable.
+    """
 
     verdict: NDArray[np.int32]
     reason: NDArray[np.int32]
     bound: FloatArray
     value: FloatArray
     cuts: Cuts
+    scores: FloatArray
 
 
 def first_pass(
@@ -99,7 +121,7 @@ def first_pass(
         cuts.keep(_where(defined, L.ends_reaching(threshold)), 0)
     holds = (forms.c[J:] + forms.s[J:] <= 0).all(axis=0)
     value = np.where(holds, (forms.c[:J] - forms.s[:J]).min(axis=0), -np.inf)
-    return FirstPass(verdict, reason, bound, value, cuts)
+    return FirstPass(verdict, reason, bound, value, cuts, LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0))
 
 
 def _where(usable: NDArray[np.bool_], ends: Ends) -> Ends:

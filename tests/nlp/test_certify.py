@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate import bounding, quadratic
+from screwsynth.nlp.certificate import bounding, firstpass, quadratic
 from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
@@ -360,7 +360,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
     text = "".join(each.read_text(encoding="utf-8") for each in sources)
     numbers: dict[str, float] = {
         "WORTH": bounding._WORTH,
-        "LINEAR": bounding._LINEAR,
+        "LINEAR": firstpass.LINEAR,
         "ROOT_SLACK": quadratic._ROOT_SLACK,
         "MULTIPLIER_ROUNDS": quadratic._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,

@@ -77,11 +77,13 @@ static size_t larger_size(size_t a, size_t b) { return a > b ? a : b; }
 
 static size_t stride_of_value(const Form *form) { return sizeof(Value) / sizeof(double) + (size_t)form->n * LANES; }
 
-/* Doubles for the registers and the results of the larger of the two tapes, which are run one after the other. */
+/* Doubles for the registers and the results of the largest of the tapes, which are run one after the other. */
 static size_t registers_needed(const Form *form)
 {
     size_t first = (size_t)(form->tape.registers + form->tape.outputs) * stride_of_value(form);
     size_t second = (size_t)(form->values.registers + form->values.outputs) * stride_of_form2(form->n);
+    size_t objective = (size_t)(form->objective.registers + form->objective.outputs) * stride_of_value(form);
+    first = larger_size(first, form->objective.length ? objective : 0);
     return larger_size(first, form->values.length ? second : 0);
 }
 
@@ -90,8 +92,14 @@ static size_t scratch_needed(const Form *form)
     return ((size_t)form->n + (form->values.length ? pairs_of(form->n) : 0)) * LANES;
 }
 
+/* Boxes that are open after the first pass, and the scores of their variables. */
+typedef struct {
+    Py_ssize_t *open;
+    double *scores;
+} Kept;
+
 static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py_ssize_t finish, double threshold,
-                          double *memory, Py_ssize_t *open)
+                          double *memory, Kept *kept)
 {
     size_t n = (size_t)form->n, E = (size_t)rows_of(form), J = form->quotients ? (size_t)form->functions : 0;
     double *rest = memory, *registers = carve(&rest, registers_needed(form));
@@ -116,7 +124,8 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
     x.H = carve(&rest, n * n), x.fH = carve(&rest, n * n);
     x.why_lo = (int *)carve(&rest, n), x.why_hi = (int *)carve(&rest, n);
 
-    int passes = form->values.length > 0 && !report->models;
+    int passes = form->values.length > 0 && !report->models, in_turn = passes && form->objective.length > 0;
+    double *scores = in_turn ? kept->scores : NULL;
     Py_ssize_t count = 0;
     if (passes) {
         size_t stride = stride_of_form2(form->n);
@@ -128,25 +137,34 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
                 for (size_t i = 0; i < n; i++)
                     c[i] = centre[i][l];
                 read_form2(&x, out, l);
-                if (!judge2(form, &x, c, report, start + l, threshold))
-                    open[count++] = start + l;
+                if (!judge2(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
+                    kept->open[count++] = start + l;
             }
         }
     } else
         for (Py_ssize_t at = begin; at < finish; at++)
-            open[count++] = at;
+            kept->open[count++] = at;
+    /* The gradients: of the functions first where there are many conditions, and of the rest where they may decide. */
     size_t stride = stride_of_value(form);
-    Store work = {registers, stride}, out = {registers + (size_t)form->tape.registers * stride, stride};
-    for (Py_ssize_t start = 0; start < count; start += LANES) {
-        load(form, report, open, start, count, centre, radius, lower, upper);
-        run(&form->tape, form->n, work, out, centre, radius, lower, upper, scratch);
-        for (int l = 0; l < LANES && start + l < count; l++) {
-            for (size_t i = 0; i < n; i++)
-                c[i] = centre[i][l], r[i] = radius[i][l];
-            read_forms(&x, E, out, l, r);
-            add_quotients(form, &x, r, report->least ? report->least + open[start + l] : NULL);
-            judge(form, &x, c, r, report, open[start + l], threshold, passes);
+    for (int alone = in_turn; alone >= 0; alone--) {
+        const Tape *tape = alone ? &form->objective : &form->tape;
+        Store work = {registers, stride}, out = {registers + (size_t)tape->registers * stride, stride};
+        Py_ssize_t left = 0;
+        x.R = alone ? form->functions : form->expressions;
+        for (Py_ssize_t start = 0; start < count; start += LANES) {
+            load(form, report, kept->open, start, count, centre, radius, lower, upper);
+            run(tape, form->n, work, out, centre, radius, lower, upper, scratch);
+            for (int l = 0; l < LANES && start + l < count; l++) {
+                Py_ssize_t at = kept->open[start + l];
+                for (size_t i = 0; i < n; i++)
+                    c[i] = centre[i][l], r[i] = radius[i][l];
+                read_forms(&x, (size_t)(x.R + 2 * form->quotients), out, l, r);
+                add_quotients(form, &x, r, report->least ? report->least + at : NULL);
+                if (judge(form, &x, c, r, report, at, threshold, passes, alone ? scores + (size_t)(start + l) * n : NULL))
+                    kept->open[left++] = at;
+            }
         }
+        count = left;
     }
 }
 

@@ -53,9 +53,12 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     }
 }
 
-/* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results. */
-static void judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
-                  double threshold, int passed)
+/* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results.
+ *
+ * With scores, those of the variables from the first pass, x holds the functions alone: returns whether the gradients of
+ * the conditions are needed too, which is where the functions rise along a variable. */
+static int judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
+                 double threshold, int passed, const double *scores)
 {
     int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0, defined = 1, impossible = -1;
     Py_ssize_t B = report->B;
@@ -79,6 +82,13 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
             if (!passed && !(middle + error <= 0))
                 value = -INFINITY;
         }
+    }
+    for (int i = 0; i < n && defined && scores; i++) {
+        int rises = report->upper[i * B + at] > report->lower[i * B + at], falls = rises;
+        for (int r = 0; r < J; r++)
+            rises = rises && x->grad_lo[r * n + i] > 0, falls = falls && x->grad_hi[r * n + i] < 0;
+        if (rises || falls)
+            return 1;
     }
     choose_multipliers(x, form->equation, report->shared);
     combine(x);
@@ -157,7 +167,8 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
         double left = report->left_upper[end] - report->left_lower[end];
         for (int j = 0; j < n; j++)
             sum += fabs(x->H[j * n + i]);
-        x->left[i] = (LINEAR * fabs(x->qb[i]) + sum) * (left / (width > 0 ? width : 1.0));
+        sum = scores ? scores[i] + x->qw[i] : LINEAR * fabs(x->qb[i]) + sum;
+        x->left[i] = sum * (left / (width > 0 ? width : 1.0));
         finite = finite && isfinite(x->left[i]);
         flat = flat && !(x->left[i] > 0);
     }
@@ -170,6 +181,7 @@ static void judge(const Form *form, Box *x, const double *centre, const double *
     }
     report->verdict[at] = verdict, report->reason[at] = reason, report->split[at] = split;
     report->bound[at] = bound, report->value[at] = value;
+    return 0;
 }
 
 #endif

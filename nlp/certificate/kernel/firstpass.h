@@ -31,8 +31,10 @@ static void combine2(Box *x)
     }
 }
 
-/* Whether the box is closed. If not, the report holds what contraction leaves, in parts of the radius, and why. */
-static int judge2(const Form *form, Box *x, const double *centre, Report *report, Py_ssize_t at, double threshold)
+/* Whether the box is closed. If not, the report holds what contraction leaves, in parts of the radius, and why; and
+ * scores, unless NULL, how much the Lagrangian can change along each variable. */
+static int judge2(const Form *form, Box *x, const double *centre, Report *report, Py_ssize_t at, double threshold,
+                  double *scores)
 {
     int n = x->n, J = x->J, R = x->R, defined = 1, impossible = -1;
     Py_ssize_t B = report->B;
@@ -85,6 +87,11 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
             }
         if (R > 1)
             reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, none, x->q_rounding, threshold, 0);
+    }
+    for (int i = 0; i < n && scores; i++) {
+        scores[i] = LINEAR * fabs(x->qb[i]);
+        for (int j = 0; j < n; j++)
+            scores[i] += fabs(x->H[i * n + j]);
     }
     for (int i = 0; i < n; i++) {
         Py_ssize_t end = i * B + at;

@@ -42,6 +42,7 @@ typedef struct {
     const int *whose;    /* (quotients, 2) function and sign */
     Tape tape;   /* the rows and their derivatives */
     Tape values; /* the expressions alone; without instructions where forms of second order are not used */
+    Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
 } Form;
 
 typedef struct {
