@@ -91,8 +91,8 @@ class NumpyEngine:
     def __init__(self, form: StandardForm) -> None:
         self.form = form
         self._tape = search_tape(form)
-        self._values = value_tape(form)
-        alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
+        self.values = value_tape(form)
+        alone = self.values is not None and objective_tape(form, len(self._tape)) is not None
         self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
@@ -110,9 +110,9 @@ class NumpyEngine:
             threshold: boxes whose bound is at most this are closed.
         """
         with np.errstate(all="ignore"):
-            if self._values is None:
+            if self.values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
-            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            first = first_pass(self.values, self.equation, self.functions, lower, upper, threshold)
             whole = Remainder.whole(lower, upper)
             result = Examination(
                 verdict=first.verdict,

@@ -68,7 +68,7 @@ class KernelEngine:
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
-        tape, values = search_tape(form), None if shared else value_tape(form)
+        tape, values = search_tape(form), value_tape(form)
         objective = objective_tape(form, len(tape))
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)

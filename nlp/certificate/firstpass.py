@@ -160,3 +160,23 @@ def _model(middle: FloatArray, b: FloatArray, H: FloatArray, size: FloatArray) -
     rounding = 64 * ULP * size + TINY
     across = np.abs(H).sum(axis=1)
     return QuadraticModel(middle, b, H, np.zeros_like(b), b - across - rounding, b + across + rounding, rounding)
+
+
+def sharper_model(L: QuadraticModel, forms: Forms, weights: FloatArray) -> QuadraticModel:
+    """Return models of the Lagrangian with weights (R, B), by forms of second order where their remainder is smaller.
+
+    Their remainder, taken to both sides, counts as rounding, so that the models hold from below too.
+    """
+    matrices = _matrices(forms, forms.a.shape[1])
+    size = np.abs(forms.c) + (forms.q - forms.p) + forms.s
+    size = size + np.abs(forms.a).sum(axis=1) + np.abs(matrices).sum(axis=(1, 2))
+    used, by = weights != 0, np.abs(weights)
+    rest = np.where(used, np.maximum(-forms.p, forms.q) * by, 0.0).sum(axis=0) * (1 + 64 * ULP)
+    middle = np.where(used, forms.c * weights + forms.s * by, 0.0).sum(axis=0)
+    b = np.where(used[:, None], forms.a * weights[:, None], 0.0).sum(axis=0)
+    H = np.where(used[:, None, None], matrices * weights[:, None, None], 0.0).sum(axis=0)
+    other = _model(middle, b, H, np.where(used, size * by, 0.0).sum(axis=0))
+    rounding = other.rounding + rest
+    better = rounding < L.rounding + L.w.sum(axis=0)
+    other = replace(other, rounding=rounding)
+    return QuadraticModel(**{name: np.where(better, getattr(other, name), each) for name, each in vars(L).items()})

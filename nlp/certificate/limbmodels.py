@@ -15,7 +15,9 @@ import numpy as np
 from .bounding import NumpyEngine, ranges
 from .enclosure import midpoints
 from .examination import Verdict
+from .firstpass import sharper_model
 from .quadratic import QuadraticModel
+from .secondorder import enclose_second
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -98,7 +100,10 @@ class NumpyLimbEngine:
         low, high = ranges(model)
         middle, error = model.value.c, model.value.s
         defined = np.asarray((error[:J] < np.inf).all(axis=0))
-        L = model.sum_model(engine.multipliers(model, high, m))
+        weights = engine.multipliers(model, high, m)
+        L = model.sum_model(weights)
+        if engine.values is not None:
+            L = sharper_model(L, enclose_second(engine.values, lower, upper), weights)
         impossible, binding = engine.states(low, high)
         left = engine.collapse_monotone(model, binding, lower, upper, m)
         engine.contract(model, L, left, box, -np.inf)

@@ -71,7 +71,18 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         root = SharedBoxes(
             self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
         )
+        self._known = -np.inf  # value of the incumbent when the first of the undivided boxes was examined
         super().__init__(root)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether boxes are left to be examined."""
+        return super().is_open or self._waits
+
+    @property
+    def _waits(self) -> bool:
+        """Whether a better point is known than when boxes were left undivided: their bounds may close them now."""
+        return bool(self._undivided) and self._incumbent.value > self._known
 
     @property
     def fault(self) -> str:
@@ -89,6 +100,12 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
 
     def step(self, threshold: float) -> None:
         """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
+        if self._waits:
+            for each in self._undivided:
+                self._opened.push(each)
+            self._undivided = []
+        if not self._undivided:
+            self._known = self._incumbent.value
         self._current = self._opened.pop(_BLOCK if self._turn else 1)
         self._turn += 1
         with np.errstate(all="ignore"):

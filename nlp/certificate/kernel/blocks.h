@@ -50,6 +50,24 @@ static void read_form2(Box *x, Store out, int l)
     }
 }
 
+static size_t limb_forms_needed(const Form *form)
+{
+    size_t n = (size_t)form->n;
+    return form->values.length ? (size_t)form->expressions * (4 + n + n * n) : 0;
+}
+
+/* Keeps the forms of second order of a box, for the models of limbs. */
+static void keep_form2(const Box *x, double *to)
+{
+    int n = x->n;
+    for (int k = 0; k < x->R; k++) {
+        *to++ = x->c[k], *to++ = x->p[k], *to++ = x->q[k], *to++ = x->s[k];
+        memcpy(to, x->gb + k * n, (size_t)n * sizeof(double));
+        memcpy(to += n, x->gA + k * n * n, (size_t)(n * n) * sizeof(double));
+        to += n * n;
+    }
+}
+
 /* Values and gradients of a box, the latter times its radii r. */
 static void read_forms(Box *x, Store out, int l, const double *r)
 {
@@ -123,6 +141,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
 
     int passes = form->values.length > 0 && !report->models, in_turn = passes && form->objective.length > 0;
     double *scores = in_turn ? kept->scores : NULL;
+    double *limbs = report->models && form->values.length ? carve(&rest, LANES * limb_forms_needed(form)) : NULL;
     Py_ssize_t count = 0;
     if (passes) {
         size_t stride = stride_of_form2(form->n);
@@ -150,12 +169,22 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
         x.R = alone ? form->functions : form->expressions;
         for (Py_ssize_t start = 0; start < count; start += LANES) {
             load(form, report, kept->open, start, count, centre, radius, lower, upper);
+            if (limbs) {
+                size_t wide = stride_of_form2(form->n);
+                Store work2 = {registers, wide}, out2 = {registers + (size_t)form->values.registers * wide, wide};
+                run2(&form->values, form->n, work2, out2, centre, radius, lower, upper, scratch);
+                for (int l = 0; l < LANES; l++) {
+                    read_form2(&x, out2, l);
+                    keep_form2(&x, limbs + (size_t)l * limb_forms_needed(form));
+                }
+            }
             run(tape, form->n, work, out, centre, radius, lower, upper, scratch);
             for (int l = 0; l < LANES && start + l < count; l++) {
                 Py_ssize_t at = kept->open[start + l];
                 for (size_t i = 0; i < n; i++)
                     c[i] = centre[i][l], r[i] = radius[i][l];
                 read_forms(&x, out, l, r);
+                x.second = limbs ? limbs + (size_t)l * limb_forms_needed(form) : NULL;
                 if (judge(form, &x, c, r, report, at, threshold, passes, alone ? scores + (size_t)(start + l) * n : NULL))
                     kept->open[left++] = at;
             }
@@ -167,7 +196,8 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
 static size_t memory_needed(const Form *form)
 {
     size_t n = (size_t)form->n, R = (size_t)form->expressions;
-    return registers_needed(form) + 4 * n * LANES + scratch_needed(form) + 10 * R + 9 * R * n + 17 * n + (R + 2) * n * n;
+    return registers_needed(form) + 4 * n * LANES + scratch_needed(form) + 10 * R + 9 * R * n + 17 * n + (R + 2) * n * n +
+           LANES * limb_forms_needed(form);
 }
 
 #endif

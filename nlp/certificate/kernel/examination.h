@@ -22,6 +22,47 @@ typedef struct {
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
 
+/* Replaces the Lagrangian's model by that of the forms of second order where their remainder is smaller. Half of it counts
+ * as rounding, so that the model holds from below too; the weights are those of the first model. */
+static void sharpen_model(Box *x)
+{
+    int n = x->n, R = x->R, each = 4 + n + n * n;
+    double middle = 0.0, size = 0.0, rest = 0.0, before = x->q_rounding;
+    for (int i = 0; i < n; i++)
+        before += x->qw[i];
+    for (int r = 0; r < R; r++) {
+        const double *form = x->second + r * each;
+        double weight = x->weights[r], whole = fabs(form[0]) + (form[2] - form[1]) + form[3];
+        if (weight == 0)
+            continue;
+        for (int i = 4; i < each; i++)
+            whole += fabs(form[i]);
+        middle += form[0] * weight + form[3] * fabs(weight);
+        rest += larger(-form[1], form[2]) * fabs(weight), size += whole * fabs(weight);
+    }
+    double rounding = 64 * ULP * size + TINY, margin = rounding;
+    rounding += rest * (1 + 64 * ULP);
+    if (!(rounding < before))
+        return;
+    memset(x->qb, 0, (size_t)n * sizeof(double));
+    memset(x->H, 0, (size_t)n * (size_t)n * sizeof(double));
+    for (int r = 0; r < R; r++) {
+        const double *gradient = x->second + r * each + 4, *matrix = gradient + n;
+        double weight = x->weights[r];
+        for (int i = 0; i < n && weight != 0; i++)
+            x->qb[i] += gradient[i] * weight;
+        for (int i = 0; i < n * n && weight != 0; i++)
+            x->H[i] += matrix[i] * weight;
+    }
+    x->q_middle = middle, x->q_rounding = rounding;
+    for (int i = 0; i < n; i++) {
+        double across = 0.0;
+        for (int j = 0; j < n; j++)
+            across += fabs(x->H[i * n + j]);
+        x->qw[i] = 0.0, x->qlo[i] = x->qb[i] - across - margin, x->qhi[i] = x->qb[i] + across + margin;
+    }
+}
+
 /* Writes row after row of a box's model: limbmodels.py names them. */
 static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
 {
@@ -91,6 +132,8 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
     }
     choose_multipliers(x, form->equation, report->shared);
     combine(x);
+    if (report->models && x->second)
+        sharpen_model(x);
     if (report->models)
         write_model(form, x, report, at, defined);
     double lagrangian = report->models ? INFINITY : quadratic_bound(x);

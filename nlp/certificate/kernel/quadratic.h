@@ -20,6 +20,7 @@ typedef struct {
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
+    const double *second; /* forms of second order for the models of limbs, R after R: c, p, q, s, gradient, matrix */
 } Box;
 
 /* The gradient is made small in the variables from number first on. */
