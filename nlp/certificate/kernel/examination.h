@@ -22,8 +22,8 @@ typedef struct {
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
 
-/* Replaces the Lagrangian's model by that of the forms of second order where their remainder is smaller. Half of it counts
- * as rounding, so that the model holds from below too; the weights are those of the first model. */
+/* Replaces the Lagrangian's model by that of the forms of second order where their remainder is smaller. That, taken
+ * to both sides, counts as rounding, so that the model holds from below too; the weights are those of the first model. */
 static void sharpen_model(Box *x)
 {
     int n = x->n, R = x->R, each = 4 + n + n * n;
