@@ -10,23 +10,24 @@ a quadratic model with a remainder of third order, without second derivatives. W
 ``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
 conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
 
-This module is the reference; ``_bounds.c`` has the same formulas. ``docs/certificate.md`` explains each of them.
+This module is the reference; the C kernel (``kernel/``) has the same formulas. ``docs/certificate.md`` explains them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from .enclosure import Enclosures, Midpoints, enclose, midpoints
-from .examination import COLLAPSED, UNMOVED, Examination, Verdict
+from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
+from .firstpass import LINEAR, MOST_VARIABLES, Cuts, FirstPass, first_pass, value_tape, without_conditions
 from .instructions import compile_tape
 from .intervals import ULP
 from .kinks import refuse_jumps
-from .quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
+from .quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers
+from .quotients import SearchRows, search_rows, with_quotients
 from .standardform import StandardForm
 from .tape import Tape
 
@@ -36,25 +37,32 @@ if TYPE_CHECKING:
     from ...models import FloatArray
 from ..errors import UncoveredError
 
-#: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
-_MULTIPLIER_ROUNDS = 8
-#: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
-_LINEAR = 0.3
+#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
+_MANY_CONDITIONS = 4
 #: Part of a side below which a contraction is not worth its leaf in a proof.
 _WORTH = 0.1
 
 
-def search_tape(form: StandardForm) -> Tape:
-    """Compile a form's R expressions, then their derivatives, row by row.
+def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
+    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule, or its value jumps.
     """
     try:
-        refuse_jumps(form.expressions, form.x)
-        return compile_tape(ca.Function("search", [form.x], ca.cse([form.expressions, form.jacobian.T])))
+        rows = search_rows(form, apart=False) if rows is None else rows
+        refuse_jumps(rows.expressions, form.x)
+        return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def objective_tape(form: StandardForm, length: int) -> Tape | None:
+    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
+    if form.n > MOST_VARIABLES or not form.conditions:
+        return None
+    tape = search_tape(without_conditions(form))
+    return tape if len(tape) * _MANY_CONDITIONS <= length else None
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
@@ -71,46 +79,26 @@ def _uncovered_limit(form: StandardForm) -> str | None:
     return None
 
 
-@dataclass(eq=False)
-class Remainder:
-    """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
-
-    The attributes are those of :class:`Examination`.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    cut_lower: NDArray[np.int32]
-    cut_upper: NDArray[np.int32]
-    verdict: NDArray[np.int32]
-    reason: NDArray[np.int32]
-
-    @classmethod
-    def whole(cls, lower: FloatArray, upper: FloatArray) -> Remainder:
-        """Return whole boxes, all open."""
-        cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
-        open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
-        return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
-
-    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
-        """Close some boxes for a reason."""
-        self.verdict[which], self.reason[which] = verdict, reason
-
-
 class NumpyEngine:
     """The reference engine: arithmetic on arrays with the boxes last.
 
     Args:
         form: the form whose box is searched.
+        apart: whether N and D of the functions' squared quotients are enclosed, and not the quotients. The first pass
+            over a box does without.
     """
 
     name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm) -> None:
+    def __init__(self, form: StandardForm, *, apart: bool = False) -> None:
         self.form = form
-        self._tape = search_tape(form)
+        rows = search_rows(form, apart=apart)
+        self._tape, self._quotients = search_tape(form, rows), rows.quotients
+        self._values = value_tape(form)
+        alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
+        self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
         self.equation = np.array(form.is_equation)
         self.depends = np.array(form.dependence, dtype=bool)
@@ -127,10 +115,64 @@ class NumpyEngine:
             threshold: boxes whose bound is at most this are closed.
         """
         with np.errstate(all="ignore"):
-            return self._examine(lower, upper, threshold)
+            if self._values is None:
+                return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
+            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            whole = Remainder.whole(lower, upper)
+            result = Examination(
+                verdict=first.verdict,
+                reason=first.reason,
+                bound=first.bound,
+                lower=whole.lower,
+                upper=whole.upper,
+                cut_lower=whole.cut_lower,
+                cut_upper=whole.cut_upper,
+                split=np.zeros_like(first.reason),
+                value=first.value,
+                centre=midpoints(lower, upper).centre,
+            )
+            rest = np.flatnonzero(first.verdict == Verdict.OPEN)
+            if self._objective is not None:
+                rest = self._objective.examine_functions(first, result, rest, threshold)
+            cuts, known = first.cuts.select(rest), first.bound[rest]
+            _put(result, rest, self._examine(lower[:, rest], upper[:, rest], threshold, cuts, known))
+        return result
 
-    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
-        """Examine boxes; NumPy's warnings of invalid operations are off."""
+    def examine_functions(
+        self, first: FirstPass, result: Examination, rest: NDArray[np.intp], threshold: float
+    ) -> NDArray[np.intp]:
+        """Examine boxes by the functions alone, and return those whose conditions' gradients may decide.
+
+        Those are the boxes in which every function rises, or falls, along a variable. This engine's form has no
+        conditions.
+
+        Args:
+            first: the first pass over all boxes, conditions included.
+            result: results of all boxes, written in place where these are examined; its ends are those of the boxes.
+            rest: places of the boxes.
+            threshold: as for :meth:`examine`.
+        """
+        lower, upper = result.lower[:, rest], result.upper[:, rest]
+        model = self.model(lower, upper, midpoints(lower, upper).radius)
+        rises, falls = (model.gradient_lo > 0).all(axis=0), (model.gradient_hi < 0).all(axis=0)
+        defined = (model.value.s < np.inf).all(axis=0)
+        more = defined & ((rises | falls) & (upper > lower)).any(axis=0)
+        places = rest[~more]
+        cuts, known, scores = first.cuts.select(places), first.bound[places], first.scores[:, places]
+        ends = result.lower[:, places], result.upper[:, places]
+        _put(result, places, self._examine(*ends, threshold, cuts, known, scores))
+        return rest[more]
+
+    def _examine(
+        self,
+        lower: FloatArray,
+        upper: FloatArray,
+        threshold: float,
+        cuts: Cuts,
+        known: FloatArray | float = np.inf,
+        scores: FloatArray | None = None,
+    ) -> Examination:
+        """Examine boxes with cuts, bounds and scores (n, B) that are known; NumPy's warnings are off."""
         J = self.functions
         box = midpoints(lower, upper)
         model = self.model(lower, upper, box.radius)
@@ -139,11 +181,11 @@ class NumpyEngine:
         defined = (error[:J] < np.inf).all(axis=0)
         bound = high[:J].min(axis=0)
         L = model.sum_model(self.multipliers(model, high))
-        bound = np.where(defined, np.fmin(bound, L.bound()), np.inf)
+        bound = np.fmin(np.where(defined, np.fmin(bound, L.bound()), np.inf), known)
 
         impossible, binding = self.states(low, high)
         left = self.collapse_monotone(model, binding, lower, upper)
-        self.contract(model, L, left, box, threshold)
+        self.contract(model, L, left, box, threshold, cuts)
         some = np.asarray(impossible.any(axis=0))
         left.close(some, Verdict.INFEASIBLE, impossible.argmax(axis=0)[some])
         left.verdict[~defined & (left.verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
@@ -159,68 +201,44 @@ class NumpyEngine:
             upper=left.upper,
             cut_lower=left.cut_lower,
             cut_upper=left.cut_upper,
-            split=self._split(L, lower, upper, left),
+            split=self._split(L, lower, upper, left, scores),
             value=np.where(conditions_hold, (middle[:J] - error[:J]).min(axis=0), -np.inf),
             centre=box.centre,
         )
 
-    def model(self, lower: FloatArray, upper: FloatArray, radius: FloatArray) -> GradientModel:
-        """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each."""
+    def model(
+        self, lower: FloatArray, upper: FloatArray, radius: FloatArray, least: FloatArray | None = None
+    ) -> GradientModel:
+        """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each.
+
+        The ends of gradients that are not scaled are for points whose values are at least ``least`` (B,).
+        """
         n, R = self.form.n, len(self.equation)
+        E = R + 2 * len(self._quotients)
         box = enclose(self._tape, lower, upper)
-        shape = (R, n, lower.shape[1])
+        shape = (E, n, lower.shape[1])
         r = radius[None]
 
         def scaled(values: FloatArray) -> FloatArray:
-            return np.where(r > 0, values[R:].reshape(shape) * r, 0.0)
+            return np.where(r > 0, values[E:].reshape(shape) * r, 0.0)
 
-        return GradientModel(
-            value=Enclosures(*(each[:R] for each in vars(box).values())),
+        rows = GradientModel(
+            value=Enclosures(*(each[:E] for each in vars(box).values())),
             b=scaled(box.c),
-            A=box.a[R:].reshape(R, n, n, lower.shape[1]) * radius[None, :, None],
+            A=box.a[E:].reshape(E, n, n, lower.shape[1]) * radius[None, :, None],
             p=scaled(box.p),
             q=scaled(box.q),
             s=scaled(box.s),
             slope_lo=scaled(box.lo),
             slope_hi=scaled(box.hi),
-            gradient_lo=box.lo[R:].reshape(shape),
-            gradient_hi=box.hi[R:].reshape(shape),
+            gradient_lo=box.lo[E:].reshape(shape),
+            gradient_hi=box.hi[E:].reshape(shape),
         )
+        return with_quotients(rows, self._quotients, R, radius, least)
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
-        """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
-
-        They make its scaled gradient at the centre small in the variables from number ``first`` on, by coordinate
-        descent on the sum of squares.
-        """
-        J, R = self.functions, len(self.equation)
-        weights = np.zeros_like(high)
-        weights[0] = 1.0
-        left = model.b[0, first:].copy()
-        directions = model.b[:, first:].copy()
-        directions[:J] -= model.b[0, first:]
-        sizes = np.einsum("rib,rib->rb", directions, directions)
-        usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
-        usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
-        for _ in range(_MULTIPLIER_ROUNDS if R > 1 else 0):
-            for r in range(1, R):
-                step = -np.einsum("ib,ib->b", directions[r], left) / sizes[r]
-                new = weights[r] + step
-                if r < J:
-                    new = np.clip(new, 0.0, weights[r] + weights[0])
-                elif not self.equation[r]:
-                    new = np.minimum(new, 0.0)
-                new = np.where(usable[r] & np.isfinite(new), new, weights[r])
-                change = new - weights[r]
-                left += change * np.where(usable[r], directions[r], 0.0)
-                weights[r] = new
-                if r < J:
-                    weights[0] = np.maximum(weights[0] - change, 0.0)
-        # The weights of the functions must sum to 1 in spite of rounding.
-        weights[0] += 1.0 - weights[:J].sum(axis=0)
-        bad = weights[0] < 0
-        weights[:J, bad], weights[0, bad] = 0.0, 1.0
-        return weights
+        """Return weights (R, B) of the Lagrangian: see :func:`.quadratic.multipliers`."""
+        return multipliers(model.b, high, self.equation, self.functions, first)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""
@@ -259,19 +277,22 @@ class NumpyEngine:
         return left
 
     def contract(
-        self, model: GradientModel, L: QuadraticModel, left: Remainder, box: Midpoints, threshold: float
+        self,
+        model: GradientModel,
+        L: QuadraticModel,
+        left: Remainder,
+        box: Midpoints,
+        threshold: float,
+        cuts: Cuts | None = None,
     ) -> None:
-        """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold."""
+        """Move ends of boxes past points where a function is at most the threshold, or a condition cannot hold.
+
+        Cuts that are known already are moved further, in place.
+        """
         centre, radius = box
         J = self.functions
-        e_lo, e_hi = np.full(left.lower.shape, -1.0), np.full(left.lower.shape, 1.0)
-        why_lo, why_hi = left.cut_lower.copy(), left.cut_upper.copy()
-
-        def keep(part: Ends, r: int) -> None:
-            raised, lowered = part.low > e_lo, part.high < e_hi
-            e_lo[raised], e_hi[lowered] = part.low[raised], part.high[lowered]
-            why_lo[raised], why_hi[lowered] = r, r
-
+        cuts = Cuts.none(left.lower.shape) if cuts is None else cuts
+        keep = cuts.keep
         for r in range(len(self.equation)):
             for sign in (1.0, -1.0):
                 if (r < J and sign < 0) or (r >= J and sign > 0 and not self.equation[r]):
@@ -281,6 +302,7 @@ class NumpyEngine:
                 keep(model.expression_model(r, sign).ends_reaching(level), r)
         if len(self.equation) > 1:
             keep(L.ends_reaching(threshold), 0)
+        e_lo, e_hi, why_lo, why_hi = cuts
         new_lo = centre + radius * e_lo
         new_lo -= (np.abs(centre) + radius) * (4 * ULP)
         new_hi = centre + radius * e_hi
@@ -296,11 +318,22 @@ class NumpyEngine:
         which = np.asarray(emptied.any(axis=0))
         left.close(which, Verdict.EMPTIED, emptied.argmax(axis=0)[which])
 
-    def _split(self, L: QuadraticModel, lower: FloatArray, upper: FloatArray, left: Remainder) -> NDArray[np.int32]:
-        """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left."""
+    def _split(
+        self,
+        L: QuadraticModel,
+        lower: FloatArray,
+        upper: FloatArray,
+        left: Remainder,
+        scores: FloatArray | None,
+    ) -> NDArray[np.int32]:
+        """Return the variable (B,) along which the Lagrangian can change most on the part of the box that is left.
+
+        With scores (n, B) these are the changes, apart from the model's remainder.
+        """
         width = upper - lower
         part = (left.upper - left.lower) / np.where(width > 0, width, 1.0)
-        score = (_LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) + L.w) * part
+        score = LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0) if scores is None else scores
+        score = (score + L.w) * part
         relative = (left.upper - left.lower) / (self.form.upper - self.form.lower)[:, None]
         finite = np.isfinite(score).all(axis=0)
         score = np.where(finite, score, relative)
@@ -308,6 +341,13 @@ class NumpyEngine:
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(left.upper > left.lower)] = -1.0
         return np.asarray(score.argmax(axis=0), dtype=np.int32)
+
+
+def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> None:
+    """Write results of some boxes in place; values at centres are those of the first pass."""
+    for name, values in vars(result).items():
+        if name not in ("value", "centre"):
+            values[..., places] = getattr(found, name)
 
 
 def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:

@@ -81,6 +81,9 @@ class BoxSearch(BoundedSearch[Boxes]):
         closed = found.verdict == Verdict.BOUNDED
         if closed.any():
             self._closed_bound = max(self._closed_bound, float(found.bound[closed].max()))
+            if self._recorder is not None:
+                # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
+                self._closed_bound = max(self._closed_bound, threshold)
         if self._is_contracted_by_value(found):
             self._closed_bound = max(self._closed_bound, threshold)
         self.boxes += boxes.count
@@ -121,8 +124,10 @@ class BoxSearch(BoundedSearch[Boxes]):
 
     def _is_contracted_by_value(self, found: Examination) -> bool:
         """Return whether a contraction excluded points because of their value, which is at most the threshold."""
-        count = len(self.form.functions)
-        return any(bool(((why >= 0) & (why < count)).any()) for why in (found.cut_lower, found.cut_upper))
+        # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
+        # checker must show.
+        count, rest = len(self.form.functions), (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
+        return any(bool(((why >= 0) & (why < count) & rest).any()) for why in (found.cut_lower, found.cut_upper))
 
 
 def reason_without_bound(form: StandardForm, lower: FloatArray, upper: FloatArray, bound: FloatArray) -> str:

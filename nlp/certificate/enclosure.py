@@ -15,7 +15,7 @@ All arithmetic is in round to nearest; each operation adds more to ``s``, and to
 (see ``docs/certificate.md``). A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its
 ``s`` and its ends are infinite, and so are those of every value computed from it.
 
-This module is the reference; ``_bounds.c`` has the same formulas.
+This module is the reference; the C kernel (``kernel/``) has the same formulas.
 """
 
 from __future__ import annotations

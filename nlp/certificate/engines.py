@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .bounding import NumpyEngine, search_tape
+from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
+from .firstpass import value_tape
 from .limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
+from .quotients import search_rows
 from .standardform import StandardForm
 from .tape import Tape
 
@@ -44,6 +46,8 @@ class Engine(Protocol):
 _BOXES_PER_JOB = 2048
 #: Boxes for each thread below which starting threads costs more than it saves.
 _WORTH_A_THREAD = 64
+#: Boxes that a thread takes at once: a whole number of the kernel's blocks of 32.
+_PIECE = 512
 
 
 class KernelEngine:
@@ -53,18 +57,23 @@ class KernelEngine:
         form: the form whose box is searched.
         module: the kernel.
         jobs: threads; one for each processor when left out.
-        shared: number of the first variables that the form, a limb's, shares with others.
+        shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
     """
 
     name = "c"
 
-    def __init__(self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int = 0) -> None:
-        self._module, self._shared = module, shared
+    def __init__(
+        self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int | None = None
+    ) -> None:
+        self._module, self._shared = module, shared or 0
         self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
         self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
+        rows = search_rows(form, apart=shared is not None)
+        tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
+        objective = objective_tape(form, len(tape))
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
@@ -74,18 +83,22 @@ class KernelEngine:
             depends,
             form.lower,
             form.upper,
-            _kernel_tape(search_tape(form)),
+            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
+            _kernel_tape(tape),
+            None if values is None else _kernel_tape(values),
+            None if values is None or objective is None else _kernel_tape(objective),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
         """Examine boxes: see :meth:`screwsynth.nlp.certificate.bounding.NumpyEngine.examine`."""
         return self._examine(lower, upper, threshold, ())
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return upper models: see :class:`screwsynth.nlp.certificate.limbmodels.LimbEngine`."""
         n, m = lower.shape[0], self._shared
         rows = np.empty((rows_of_models(n, m), lower.shape[1]))
-        found = self._examine(lower, upper, -np.inf, (m, rows))
+        matters = () if least is None else (np.ascontiguousarray(least),)
+        found = self._examine(lower, upper, -np.inf, (m, rows, *matters))
         flags, L, sides = models_from_rows(rows, n, m)
         closed = np.isin(found.verdict, (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED))
         found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
@@ -117,11 +130,12 @@ class KernelEngine:
         def examine_part(begin: int, finish: int) -> None:
             self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold, *models)
 
-        pieces = self._jobs if count >= _WORTH_A_THREAD * self._jobs else 1
-        edges = [count * k // pieces for k in range(pieces + 1)]
-        if pieces == 1 or self._pool is None:
+        if self._pool is None or count < _WORTH_A_THREAD * self._jobs:
             examine_part(0, count)
         else:
+            # Boxes cost differently, by what closes them: a thread that is done takes the next piece.
+            size = max(_WORTH_A_THREAD // 2, min(_PIECE, count // (2 * self._jobs)))
+            edges = [*range(0, count, size), count]
             for each in [self._pool.submit(examine_part, *edge) for edge in itertools.pairwise(edges)]:
                 each.result()
         return Examination(*found)
@@ -194,5 +208,5 @@ def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jo
     """
     module = chosen_kernel(name, kernel)
     if module is None:
-        return NumpyLimbEngine(NumpyEngine(form), shared)
+        return NumpyLimbEngine(NumpyEngine(form, apart=True), shared)
     return KernelEngine(form, module, jobs, shared)

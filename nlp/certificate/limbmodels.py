@@ -63,7 +63,7 @@ class LimbModels:
 class LimbEngine(Protocol):
     """Upper models of one limb."""
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
 
     def close(self) -> None:
@@ -81,20 +81,20 @@ class NumpyLimbEngine:
     def __init__(self, engine: NumpyEngine, shared: int) -> None:
         self._engine, self._shared = engine, shared
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
         with np.errstate(all="ignore"):
-            return self._limb_models(lower, upper)
+            return self._limb_models(lower, upper, least)
 
     def close(self) -> None:
         """Do nothing: this engine has no threads."""
 
-    def _limb_models(self, lower: FloatArray, upper: FloatArray) -> LimbModels:
+    def _limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None) -> LimbModels:
         """Return the models; NumPy's warnings of invalid operations are off."""
         engine, m = self._engine, self._shared
         J = engine.functions
         box = midpoints(lower, upper)
-        model = engine.model(lower, upper, box.radius)
+        model = engine.model(lower, upper, box.radius, least)
         low, high = ranges(model)
         middle, error = model.value.c, model.value.s
         defined = np.asarray((error[:J] < np.inf).all(axis=0))
@@ -132,7 +132,7 @@ def models_from_rows(rows: FloatArray, n: int, m: int) -> tuple[FloatArray, Quad
     at = 3 + 4 * n
     H = rows[at : at + n * n].reshape(n, n, -1)
     L = QuadraticModel(rows[1], vectors[0], H, vectors[1], vectors[2], vectors[3], rows[2])
-    return rows[0], L, rows[at + n * n :].reshape(m, 4, -1)
+    return rows[0], L, rows[at + n * n :].reshape(m, 4, rows.shape[1])
 
 
 def rows_of_models(n: int, m: int) -> int:

@@ -73,7 +73,7 @@ def first_largest(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
     return np.asarray(np.minimum.reduceat(places, starts))
 
 
-def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> LimbBound:
+def bound_limb(models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int) -> LimbBound:
     """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
 
     An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
@@ -81,6 +81,7 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
     Args:
         models: of the N own boxes.
         good: of a good point of the limb in each of the B shared boxes.
+        fall: upper models of minus the limb's function there.
         own: the own boxes.
         m: number of shared variables.
     """
@@ -93,7 +94,7 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
         finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
         tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
-        reached = np.where(is_known, good.value - _spread(without_tilt(good.L, tilt)), -np.inf)
+        reached = np.where(is_known, -_add(fall, tilt).bound(), -np.inf)
         reached = np.where(np.isnan(reached), -np.inf, reached)
         rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
         bounds = np.where(models.defined, rest.bound(), np.inf)
@@ -113,12 +114,6 @@ def bound_limb(models: LimbModels, good: LimbModels, own: OwnBoxes, m: int) -> L
         np.maximum.reduceat(bounds, own.starts),
         first_largest(bounds, own),
     )
-
-
-def _spread(L: QuadraticModel) -> FloatArray:
-    """Return how far (B,) a modelled function may fall below its value at the centre."""
-    spread = (np.abs(L.b) + L.w).sum(axis=0) + 0.5 * np.abs(L.H).sum(axis=(0, 1))
-    return np.asarray(spread * (1 + 64 * ULP) + L.rounding)
 
 
 def without_tilt(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:

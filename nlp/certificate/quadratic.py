@@ -14,8 +14,13 @@ from .enclosure import Enclosures
 from .intervals import TINY, ULP
 
 if TYPE_CHECKING:
-    from ...models import FloatArray
+    from numpy.typing import NDArray
 
+    from ...models import FloatArray
+    from .quotients import SquareSums
+
+#: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
+_MULTIPLIER_ROUNDS = 8
 #: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.
 _TANGENT_ROUNDS = 3
 #: Part of its terms by which a quadratic's level is lowered before its roots: far more than their rounding.
@@ -43,6 +48,7 @@ class GradientModel:
         s: (R, n, B) rounding errors of the gradients times ``r_i``.
         slope_lo, slope_hi: (R, n, B) interval gradients times ``r_i``.
         gradient_lo, gradient_hi: (R, n, B) interval gradients.
+        squares: upper models of the functions' quotients, whose ``b`` is in that of the functions; None without them.
     """
 
     value: Enclosures
@@ -55,6 +61,7 @@ class GradientModel:
     slope_hi: FloatArray
     gradient_lo: FloatArray
     gradient_hi: FloatArray
+    squares: SquareSums | None = None
 
     def expression_model(self, r: int, sign: float) -> QuadraticModel:
         """Return the upper model of ``sign`` times one expression."""
@@ -62,7 +69,13 @@ class GradientModel:
         if sign < 0:
             low, high, p, q = -high, -low, -q, -p
         middle, size = sign * self.value.c[r] + self.value.s[r], np.abs(self.value.c[r])
-        return _integrate(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size)
+        H, w = self._squares_of(r)
+        return _integrate(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size, H, w)
+
+    def _squares_of(self, r: int) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return matrix and remainder of the quotients of an expression."""
+        has_squares = self.squares is not None and r < len(self.squares.H)
+        return (self.squares.H[r], self.squares.w[r]) if self.squares is not None and has_squares else (None, None)
 
     def sum_model(self, weights: FloatArray) -> QuadraticModel:
         """Return the upper model of a sum of all expressions with weights (R, B)."""
@@ -85,7 +98,11 @@ class GradientModel:
 
         largest = total(np.where(used, np.abs(self.value.c), 0.0), size)
         p, q = ends(self.p, self.q)
-        return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
+        if self.squares is None:
+            return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
+        J = len(self.squares.H)
+        H, w = total(self.squares.H, weights[:J]), total(self.squares.w, weights[:J])
+        return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest, H, w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +221,8 @@ def _integrate(
     low: FloatArray,
     high: FloatArray,
     largest: FloatArray,
+    H: FloatArray | None = None,
+    w: FloatArray | None = None,
 ) -> QuadraticModel:
     """Return the model whose gradient has a Taylor form, by its integral along rays from the centre.
 
@@ -219,13 +238,19 @@ def _integrate(
         low: (n, B) lower ends of the gradient times ``r_i`` from another enclosure, for an intersection.
         high: (n, B) upper ends likewise.
         largest: (B,) size of the terms of the value at the centre.
+        H: (n, n, B) matrix of an upper model whose linear part is in b and whose slopes are in the other enclosure.
+        w: (n, B) its remainder.
     """
     across = np.abs(A).sum(axis=1)
     rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
     margin = 64 * ULP * (np.abs(b) + across + q - p + s) + TINY
-    low, high = np.fmax(low, b - across + p - s) - margin, np.fmin(high, b + across + q + s) + margin
-    b, w = b + (p + q) / 6, (q - p) / 6 + s
-    return QuadraticModel(middle, b, 0.5 * (A + np.swapaxes(A, 0, 1)), w, low, high, rounding)
+    symmetric, remainder = 0.5 * (A + np.swapaxes(A, 0, 1)), (q - p) / 6 + s
+    if H is None or w is None:
+        low, high = np.fmax(low, b - across + p - s), np.fmin(high, b + across + q + s)
+    else:
+        symmetric, remainder = symmetric + H, remainder + w
+        rounding = rounding + 64 * ULP * (np.abs(H).sum(axis=(0, 1)) + w.sum(axis=0))
+    return QuadraticModel(middle, b + (p + q) / 6, symmetric, remainder, low - margin, high + margin, rounding)
 
 
 def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -244,3 +269,47 @@ def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArr
     )
     first = np.where(at_start, 0.0, np.where(at_end | peak, np.clip(small, 0.0, 1.0), 2.0))
     return first, last
+
+
+def multipliers(
+    gradients: FloatArray, high: FloatArray, equation: NDArray[np.bool_], functions: int, first: int = 0
+) -> FloatArray:
+    """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
+
+    They make its gradient small in the variables from number ``first`` on, by coordinate descent on the sum of squares.
+
+    Args:
+        gradients: (R, n, B) of the expressions at the centres, scaled.
+        high: (R, B) upper ends of the expressions.
+        equation: (R,) whether each must be 0.
+        functions: number J of the first expressions, which are functions.
+        first: the first variable.
+    """
+    J, R = functions, len(equation)
+    weights = np.zeros_like(high)
+    weights[0] = 1.0
+    left = gradients[0, first:].copy()
+    directions = gradients[:, first:].copy()
+    directions[:J] -= gradients[0, first:]
+    sizes = np.einsum("rib,rib->rb", directions, directions)
+    usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
+    usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
+    for _ in range(_MULTIPLIER_ROUNDS if R > 1 else 0):
+        for r in range(1, R):
+            step = -np.einsum("ib,ib->b", directions[r], left) / sizes[r]
+            new = weights[r] + step
+            if r < J:
+                new = np.clip(new, 0.0, weights[r] + weights[0])
+            elif not equation[r]:
+                new = np.minimum(new, 0.0)
+            new = np.where(usable[r] & np.isfinite(new), new, weights[r])
+            change = new - weights[r]
+            left += change * np.where(usable[r], directions[r], 0.0)
+            weights[r] = new
+            if r < J:
+                weights[0] = np.maximum(weights[0] - change, 0.0)
+    # The weights of the functions must sum to 1 in spite of rounding.
+    weights[0] += 1.0 - weights[:J].sum(axis=0)
+    bad = weights[0] < 0
+    weights[:J, bad], weights[0, bad] = 0.0, 1.0
+    return weights

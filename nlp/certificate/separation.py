@@ -69,7 +69,7 @@ def separate(form: StandardForm) -> Separation | None:
     """Return the separation of a form; None where it has several functions, or no parts smaller than itself."""
     if len(form.functions) != 1:
         return None
-    terms = _terms_of(form.functions[0])
+    terms = terms_of(form.functions[0])
     of_terms = _dependence(terms, form.x)
     of_conditions = _dependence([each.expression for each in form.conditions], form.x)
     choice = _choose(form.n, of_terms, of_conditions)
@@ -149,7 +149,7 @@ def _dependence(expressions: Sequence[SX], x: SX) -> list[frozenset[int]]:
     return [frozenset(each) for each in found]
 
 
-def _terms_of(expression: SX) -> list[SX]:
+def terms_of(expression: SX) -> list[SX]:
     """Return the terms of a sum (1, 1), constant factors multiplied in."""
     terms: list[SX] = []
     waiting = [(expression, 1.0)]

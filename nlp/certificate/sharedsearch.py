@@ -8,6 +8,7 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from .standardform import StandardForm
 
 #: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
-_BLOCK = 48
+_BLOCK = 256
 #: Own boxes of one list above which the shared box is bisected instead.
 _LONGEST = 512
 #: Part of the widest limb's spread from which on a limb's list is refined too.
@@ -63,6 +64,11 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         self._common = NumpyEngine(separation.common)
         m = self._m = len(separation.shared)
         self._engines = [limb_engine_for(limb.form, m, engine, jobs) for limb in separation.limbs]
+        # Minus a limb's function, for lower models.
+        self._opposites = [
+            limb_engine_for(replace(limb.form, functions=(-limb.form.functions[0],)), m, engine, jobs)
+            for limb in separation.limbs
+        ]
         own = tuple(
             OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64))
             for limb in separation.limbs
@@ -84,31 +90,40 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
 
     def close(self) -> None:
         """Stop the engines."""
-        for each in self._engines:
+        for each in (*self._engines, *self._opposites):
             each.close()
 
     def step(self, threshold: float) -> None:
         """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
         self._current = self._opened.pop(_BLOCK if self._turn else 1)
         self._turn += 1
+        before = self._incumbent.value
         with np.errstate(all="ignore"):
             sums = self._examine(self._current)
             self._improve(self._current, sums)
             self._branch(self._current, sums, threshold)
+        if self._incumbent.value > before:
+            # What was too small to bisect may be closed by the better point.
+            for boxes in self._undivided:
+                self._opened.push(boxes)
+            self._undivided.clear()
         self._current = None
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""
         models, parts = [], []
-        for engine, own, good in zip(self._engines, boxes.own, boxes.good, strict=True):
-            # The own boxes, then the good points.
-            of = np.concatenate([own.of, np.arange(boxes.count)])
-            lower = np.concatenate([boxes.lower[:, of], np.concatenate([own.lower, good], axis=1)])
-            upper = np.concatenate([boxes.upper[:, of], np.concatenate([own.upper, good], axis=1)])
-            found = engine.limb_models(lower, upper)
-            self.boxes += of.size
-            models.append(found.part(slice(own.of.size)))
-            parts.append(bound_limb(models[-1], found.part(slice(own.of.size, None)), own, self._m))
+        every = zip(self._engines, self._opposites, boxes.own, boxes.good, strict=True)
+        for engine, opposite, own, good in every:
+            place = [np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)]
+            at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
+            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+            known = at_good.holds & at_good.defined
+            least = np.where(known, -fall.bound(), -np.inf)
+            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
+            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
+            models.append(engine.limb_models(lower, upper, least[own.of]))
+            self.boxes += own.of.size + boxes.count
+            parts.append(bound_limb(models[-1], at_good, fall, own, self._m))
         radius = midpoints(boxes.lower, boxes.upper).radius
         common = self._common.model(boxes.lower, boxes.upper, radius)
         low, high = ranges(common)

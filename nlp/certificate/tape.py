@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Op(enum.IntEnum):
     """Operations on registers ``r``: ``r[to] = ...`` from ``r[a]``, ``r[b]`` and the constant ``k``.
 
-    The numbers are those of ``_bounds.c``.
+    The numbers are those of ``kernel/values.h``.
     """
 
     CONSTANT = 0  # k

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate import bounding, quadratic
+from screwsynth.nlp.certificate import bounding, firstpass, quadratic
 from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
@@ -353,16 +353,16 @@ def test_progress_and_history_shrink_to_the_gap() -> None:
 
 
 def test_rules_use_every_constant_of_the_kernel_alike() -> None:
-    """The numbers that both engines must share are written in both files."""
-    source = find_case("paper-4.1-helical").parents[1] / "nlp" / "certificate" / "_bounds.c"
-    if not source.exists():
+    """The numbers that both engines must share are written in both."""
+    sources = sorted((find_case("paper-4.1-helical").parents[1] / "nlp" / "certificate" / "kernel").glob("*.h"))
+    if not sources:
         pytest.skip("an installed package has no source of the kernel")
-    text = source.read_text(encoding="utf-8")
+    text = "".join(each.read_text(encoding="utf-8") for each in sources)
     numbers: dict[str, float] = {
         "WORTH": bounding._WORTH,
-        "LINEAR": bounding._LINEAR,
+        "LINEAR": firstpass.LINEAR,
         "ROOT_SLACK": quadratic._ROOT_SLACK,
-        "MULTIPLIER_ROUNDS": bounding._MULTIPLIER_ROUNDS,
+        "MULTIPLIER_ROUNDS": quadratic._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
     }
     for name, value in numbers.items():
@@ -401,6 +401,10 @@ def test_the_kernel_is_built_without_what_would_break_it() -> None:
         assert "-ffp-contract=off" in flags
         assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
         assert extension["optional"] is True
+    # A header that is not listed would be missing in a source distribution, and the kernel could not be built from it.
+    folder = path.parent / "nlp" / "certificate" / "kernel"
+    (listed,) = [each["depends"] for each in extensions if each["name"].endswith("._bounds")]
+    assert {path.parent / each for each in listed} == set(folder.glob("*.h"))
 
 
 @pytest.mark.parametrize("engine", ENGINES)

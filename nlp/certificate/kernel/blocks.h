@@ -1,0 +1,178 @@
+/* Blocks of LANES boxes: their tape, then the examination of each. */
+#ifndef BLOCKS_H
+#define BLOCKS_H
+
+#include "firstpass.h"
+#include "quotients.h"
+#include "secondorder.h"
+
+static double *carve(double **rest, size_t count)
+{
+    double *part = *rest;
+    *rest += count;
+    return part;
+}
+
+/* Loads LANES boxes, of numbers first[0], first[1], ... or, without a list, from number start on; the last one again
+ * where there are fewer. */
+static void load(const Form *form, const Report *report, const Py_ssize_t *list, Py_ssize_t start, Py_ssize_t finish,
+                 Lane *centre, Lane *radius, Lane *lower, Lane *upper)
+{
+    EACH
+    {
+        Py_ssize_t place = start + l < finish ? start + l : finish - 1, at = list ? list[place] : place;
+        for (int i = 0; i < form->n; i++, at += report->B) {
+            double lo = report->lower[at], hi = report->upper[at], middle = 0.5 * lo + 0.5 * hi;
+            middle = smaller(larger(middle, lo), hi);
+            double half = larger(hi - middle, middle - lo);
+            lower[i][l] = lo, upper[i][l] = hi, centre[i][l] = middle;
+            radius[i][l] = half > 0 ? half * (1 + ULP) + TINY : 0.0;
+        }
+    }
+}
+
+/* The forms of second order of a box: centre, gradient and matrix of every expression. */
+static void read_form2(Box *x, Store out, int l)
+{
+    int n = x->n;
+    for (int k = 0; k < x->R; k++) {
+        Form2 *v = form2_of(out, k);
+        const Lane *a = terms_of_form2(v), *Q = a + n;
+        x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
+        x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
+        double *H = x->gA + k * n * n;
+        for (int i = 0; i < n; i++) {
+            x->gb[k * n + i] = a[i][l];
+            for (int j = i; j < n; j++) {
+                double entry = Q[row_of(n, i) + j][l];
+                H[i * n + j] = H[j * n + i] = i == j ? 2 * entry : entry;
+            }
+        }
+    }
+}
+
+/* Values and gradients of E rows over a box, the latter times its radii r. */
+static void read_forms(Box *x, size_t E, Store out, int l, const double *r)
+{
+    size_t n = (size_t)x->n;
+    for (size_t k = 0; k < E; k++) {
+        Value *v = value_of(out, (int)k);
+        x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
+        x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
+        for (size_t i = 0, at = k * n; i < n; i++, at++) {
+            Value *g = value_of(out, (int)(E + at));
+            int wide = r[i] > 0;
+            x->a[at] = terms_of(v)[i][l];
+            x->gb[at] = wide ? g->c[l] * r[i] : 0.0, x->gs[at] = wide ? g->s[l] * r[i] : 0.0;
+            x->gp[at] = wide ? g->p[l] * r[i] : 0.0, x->gq[at] = wide ? g->q[l] * r[i] : 0.0;
+            x->grad_lo[at] = g->lo[l], x->grad_hi[at] = g->hi[l];
+            x->slope_lo[at] = wide ? g->lo[l] * r[i] : 0.0, x->slope_hi[at] = wide ? g->hi[l] * r[i] : 0.0;
+            for (size_t j = 0; j < n; j++)
+                x->gA[at * n + j] = terms_of(g)[j][l] * r[i];
+        }
+    }
+}
+
+static size_t larger_size(size_t a, size_t b) { return a > b ? a : b; }
+
+static size_t stride_of_value(const Form *form) { return sizeof(Value) / sizeof(double) + (size_t)form->n * LANES; }
+
+/* Doubles for the registers and the results of the largest of the tapes, which are run one after the other. */
+static size_t registers_needed(const Form *form)
+{
+    size_t first = (size_t)(form->tape.registers + form->tape.outputs) * stride_of_value(form);
+    size_t second = (size_t)(form->values.registers + form->values.outputs) * stride_of_form2(form->n);
+    size_t objective = (size_t)(form->objective.registers + form->objective.outputs) * stride_of_value(form);
+    first = larger_size(first, form->objective.length ? objective : 0);
+    return larger_size(first, form->values.length ? second : 0);
+}
+
+static size_t scratch_needed(const Form *form)
+{
+    return ((size_t)form->n + (form->values.length ? pairs_of(form->n) : 0)) * LANES;
+}
+
+/* Boxes that are open after the first pass, and the scores of their variables. */
+typedef struct {
+    Py_ssize_t *open;
+    double *scores;
+} Kept;
+
+static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py_ssize_t finish, double threshold,
+                          double *memory, Kept *kept)
+{
+    size_t n = (size_t)form->n, E = (size_t)rows_of(form), J = form->quotients ? (size_t)form->functions : 0;
+    double *rest = memory, *registers = carve(&rest, registers_needed(form));
+    Lane *lanes[4];
+    for (int i = 0; i < 4; i++)
+        lanes[i] = (Lane *)carve(&rest, n * LANES);
+    Lane *centre = lanes[0], *radius = lanes[1], *lower = lanes[2], *upper = lanes[3];
+    Lane *scratch = (Lane *)carve(&rest, scratch_needed(form));
+    Box x = {.n = form->n, .J = form->functions, .R = form->expressions, .squares = J > 0};
+    double **singles[] = {&x.c, &x.p, &x.q, &x.s, &x.lo, &x.hi, &x.weights, &x.size, &x.high, &x.low};
+    for (size_t i = 0; i < sizeof singles / sizeof *singles; i++)
+        *singles[i] = carve(&rest, E);
+    double **rows[] = {&x.a, &x.gb, &x.gp, &x.gq, &x.gs, &x.slope_lo, &x.slope_hi, &x.grad_lo, &x.grad_hi};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        *rows[i] = carve(&rest, E * n);
+    double *c, *r, **vectors[] = {&x.left, &x.qb, &x.qw, &x.qlo, &x.qhi, &x.sign, &x.fb, &x.fw, &x.diagonal, &x.t,
+                                  &x.gradient, &x.e_lo, &x.e_hi, &c, &r, &x.aE, &x.bN, &x.bD, &x.wN, &x.wD};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        *vectors[i] = carve(&rest, n);
+    x.gA = carve(&rest, E * n * n), x.HN = carve(&rest, n * n), x.HD = carve(&rest, n * n);
+    x.sH = carve(&rest, J * n * n), x.sw = carve(&rest, J * n);
+    x.H = carve(&rest, n * n), x.fH = carve(&rest, n * n);
+    x.why_lo = (int *)carve(&rest, n), x.why_hi = (int *)carve(&rest, n);
+
+    int passes = form->values.length > 0 && !report->models, in_turn = passes && form->objective.length > 0;
+    double *scores = in_turn ? kept->scores : NULL;
+    Py_ssize_t count = 0;
+    if (passes) {
+        size_t stride = stride_of_form2(form->n);
+        Store work = {registers, stride}, out = {registers + (size_t)form->values.registers * stride, stride};
+        for (Py_ssize_t start = begin; start < finish; start += LANES) {
+            load(form, report, NULL, start, finish, centre, radius, lower, upper);
+            run2(&form->values, form->n, work, out, centre, radius, lower, upper, scratch);
+            for (int l = 0; l < LANES && start + l < finish; l++) {
+                for (size_t i = 0; i < n; i++)
+                    c[i] = centre[i][l];
+                read_form2(&x, out, l);
+                if (!judge2(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
+                    kept->open[count++] = start + l;
+            }
+        }
+    } else
+        for (Py_ssize_t at = begin; at < finish; at++)
+            kept->open[count++] = at;
+    /* The gradients: of the functions first where there are many conditions, and of the rest where they may decide. */
+    size_t stride = stride_of_value(form);
+    for (int alone = in_turn; alone >= 0; alone--) {
+        const Tape *tape = alone ? &form->objective : &form->tape;
+        Store work = {registers, stride}, out = {registers + (size_t)tape->registers * stride, stride};
+        Py_ssize_t left = 0;
+        x.R = alone ? form->functions : form->expressions;
+        for (Py_ssize_t start = 0; start < count; start += LANES) {
+            load(form, report, kept->open, start, count, centre, radius, lower, upper);
+            run(tape, form->n, work, out, centre, radius, lower, upper, scratch);
+            for (int l = 0; l < LANES && start + l < count; l++) {
+                Py_ssize_t at = kept->open[start + l];
+                for (size_t i = 0; i < n; i++)
+                    c[i] = centre[i][l], r[i] = radius[i][l];
+                read_forms(&x, (size_t)(x.R + 2 * form->quotients), out, l, r);
+                add_quotients(form, &x, r, report->least ? report->least + at : NULL);
+                if (judge(form, &x, c, r, report, at, threshold, passes, alone ? scores + (size_t)(start + l) * n : NULL))
+                    kept->open[left++] = at;
+            }
+        }
+        count = left;
+    }
+}
+
+static size_t memory_needed(const Form *form)
+{
+    size_t n = (size_t)form->n, E = (size_t)rows_of(form), J = (size_t)form->functions;
+    size_t vectors = 10 * E + 9 * E * n + 22 * n, matrices = (E + 4) * n * n + J * n * (n + 1);
+    return registers_needed(form) + 4 * n * LANES + scratch_needed(form) + vectors + matrices;
+}
+
+#endif
