@@ -18,7 +18,7 @@ from ..errors import InputError, nearest
 from ..program.layout import Layout
 
 if TYPE_CHECKING:
-    from .worst import Worst
+    from .worstnumber import Worst
 
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
 OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")

@@ -19,8 +19,7 @@ The mounting axes of joints are those of the design.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -30,35 +29,10 @@ from casadi import SX
 from ...models import FloatArray, RobotInstance
 from .machine import INSIDE, LEGS, JointErrors, Legs
 from .posebox import PoseNumbers
+from .worstnumber import Worst
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
-
-#: Errors of the machine that is worst at a pose, to first order.
-ErrorsAt = Callable[[PoseNumbers], JointErrors]
-#: The number, as people read it, of an exact machine at a pose.
-ValueOf = Callable[[Legs, PoseNumbers], float]
-
-
-@dataclass(frozen=True, eq=False)
-class Worst:
-    """How far a number goes over all machines within the tolerance.
-
-    Attributes:
-        errors: of the worst machine at a pose.
-        value: the number of a machine.
-        expression: (1, 1) bound of the number over the machines, in the terms of a program; None for the number of the
-            exact machine.
-        allowance: further change of the number as people read it, not negative.
-        least, most: ends of what the number can be.
-    """
-
-    errors: ErrorsAt
-    value: ValueOf
-    expression: SX | None = None
-    allowance: float = 0.0
-    least: float = -math.inf
-    most: float = math.inf
 
 
 class Spans(NamedTuple):

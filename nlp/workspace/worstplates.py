@@ -14,7 +14,8 @@ from casadi import SX
 from ...models import FloatArray
 from .machine import INSIDE, LEGS, JointErrors, Legs
 from .posebox import PoseNumbers
-from .worst import Worst, of_leg, unit
+from .worst import of_leg, unit
+from .worstnumber import Worst
 
 #: Part of itself by which a bound moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
