@@ -30,7 +30,6 @@ from .posebox import PoseNumbers, pose_box
 from .worst import (
     LegAngle,
     Rates,
-    Worst,
     rates_of,
     spans,
     worst_angle,
@@ -39,6 +38,7 @@ from .worst import (
     worst_share,
     worst_sum,
 )
+from .worstnumber import Worst
 from .worstplates import worst_radius, worst_ratio, worst_spacing
 
 #: Reasons for claims that are open because errors of joint centres are not covered.
