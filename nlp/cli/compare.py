@@ -9,6 +9,7 @@ import typer
 
 from .numbers import Number
 from .options import (
+    CLEAR_LINE,
     CaseName,
     Jobs,
     JsonFile,
@@ -23,9 +24,6 @@ from .options import (
 
 if TYPE_CHECKING:
     from ..comparison.compare import Comparison
-
-#: Leaves the cursor at the beginning of an empty line.
-_CLEAR_LINE = "\r\033[K"
 
 
 def compare(
@@ -86,7 +84,7 @@ def compare(
     show_progress = sys.stderr.isatty()
 
     def write_progress(label: str, done: int, total: int) -> None:
-        sys.stderr.write(f"{_CLEAR_LINE}{done} of {total} robots done: {label}")
+        sys.stderr.write(f"{CLEAR_LINE}{done} of {total} robots done: {label}")
         sys.stderr.flush()
 
     try:
@@ -105,7 +103,7 @@ def compare(
         )
     finally:
         if show_progress:
-            sys.stderr.write(_CLEAR_LINE)
+            sys.stderr.write(CLEAR_LINE)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
     raise typer.Exit(0 if found.ranked and is_proved else 1)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
 
+#: Leaves the cursor at the beginning of an empty line.
+CLEAR_LINE = "\r\033[K"
+
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
     str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")

@@ -9,6 +9,7 @@ import typer
 
 from .numbers import WholeNumber
 from .options import (
+    CLEAR_LINE,
     CaseName,
     CurveFile,
     Jobs,
@@ -24,9 +25,6 @@ from .options import (
 
 if TYPE_CHECKING:
     from ..front.front import Front
-
-#: Leaves the cursor at the beginning of an empty line.
-_CLEAR_LINE = "\r\033[K"
 
 
 def pareto(
@@ -68,7 +66,7 @@ def pareto(
     show = sys.stderr.isatty()
 
     def show_progress(done: int, total: int) -> None:
-        sys.stderr.write(f"{_CLEAR_LINE}{done} of {total} points")
+        sys.stderr.write(f"{CLEAR_LINE}{done} of {total} points")
         sys.stderr.flush()
 
     try:
@@ -85,7 +83,7 @@ def pareto(
         raise InputError(f"--certify: {error}") from None
     finally:
         if show:
-            sys.stderr.write(_CLEAR_LINE)
+            sys.stderr.write(CLEAR_LINE)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
     raise typer.Exit(0 if is_proved else 1)

@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .numbers import Number, WholeNumber
-from .options import CaseName, Jobs, JsonFile, Seed, SettingTexts, check_picture, read_settings, write_json
+from .options import CLEAR_LINE, CaseName, Jobs, JsonFile, Seed, SettingTexts, check_picture, read_settings, write_json
 
 if TYPE_CHECKING:
     from ..sweeps.points import Points
     from ..sweeps.sweep import Sweep
-
-#: Leaves the cursor at the beginning of an empty line.
-_CLEAR_LINE = "\r\033[K"
 
 
 def sweep(
@@ -111,7 +108,7 @@ def sweep(
                 notice=lambda text: typer.echo(text, err=True),
             )
             if show:
-                sys.stderr.write(_CLEAR_LINE)
+                sys.stderr.write(CLEAR_LINE)
             write_table(out, found, journal.rows())
             journal.remove()
     if json_file is not None or html is not None:
@@ -219,5 +216,5 @@ def _show_progress(before: int, done: int, total: int, seconds: float) -> None:
     """Write how far the sweep is, and the time left, on one line of standard error."""
     left = seconds * (total - done) / done
     words = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 100 else f"{left:.0f} s"
-    sys.stderr.write(f"{_CLEAR_LINE}{before + done:,} of {before + total:,} points, {words} left")
+    sys.stderr.write(f"{CLEAR_LINE}{before + done:,} of {before + total:,} points, {words} left")
     sys.stderr.flush()

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from .options import (
+    CLEAR_LINE,
     CaseName,
     CurveFile,
     Jobs,
@@ -23,8 +24,6 @@ from .options import (
 
 #: Largest number of values.
 _MOST = 200
-#: Leaves the cursor at the beginning of an empty line.
-_CLEAR_LINE = "\r\033[K"
 
 
 def tradeoff(
@@ -73,7 +72,7 @@ def tradeoff(
         progress=_write_progress if show_progress else None,
     )
     if show_progress:
-        sys.stderr.write(_CLEAR_LINE)
+        sys.stderr.write(CLEAR_LINE)
     if is_requested() and not found.unsolved:
         typer.echo("interrupted: every value is solved, but not all from the optima beside it", err=True)
     loaded, result = found.points[0].solution.case, tradeoff_result(found)

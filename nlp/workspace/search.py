@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 #: than their rounding.
 _LEAST_WIDTH = 2.0**-30
 #: Seconds between two reports of progress.
-_REPORT_EVERY = 0.1
+REPORT_EVERY = 0.1
 
 #: Callback with seconds, number of boxes examined, and number of boxes open.
 RankProgress = Callable[[float, int, int], None]
@@ -112,7 +112,7 @@ class _Search:
                 return f"stopped after {seconds:.3g} s"
             if most_boxes is not None and self._boxes >= most_boxes:
                 return f"stopped after {self._boxes:,} boxes"
-            if progress is not None and seconds - reported >= _REPORT_EVERY:
+            if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
             lower, upper = self._stack[-1]

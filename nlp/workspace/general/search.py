@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, is_requested, reached
+from ..search import REPORT_EVERY, RankProgress
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
@@ -27,13 +27,8 @@ _LEAST_WIDTH = 2.0**-24
 _SMALL, _MOST = 0.1, 24
 #: Part of the value before at which it tries again.
 _SMALLER = 0.6
-#: Seconds between two reports of progress.
-_REPORT_EVERY = 0.1
 #: How a singular pose of this search is known.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
-
-#: Callback with seconds, number of boxes examined, and number of boxes open.
-RankProgress = Callable[[float, int, int], None]
 
 
 def prove_rank(
@@ -105,7 +100,7 @@ class _Search:
             reason = self._reason_to_stop(seconds, time_limit, most_boxes)
             if reason:
                 return reason
-            if progress is not None and seconds - reported >= _REPORT_EVERY:
+            if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
             cells = self._in_workspace(self._next())
