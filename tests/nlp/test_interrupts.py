@@ -27,7 +27,7 @@ CASE = "\n".join(
         *(f"[[pose]]\nposition = [{10 * k}, {-5 * k}, {300 + 6 * k}]" for k in range(8)),
         "[limits]\nleg_length = { min = 100, max = 500 }",
         '[[task]]\nsense = "max"\naxis = [0, 1, 2]\npoint = [0, 0, 300]\npitch = 2',
-        "[solve]\nstarts = 3000",
+        "[solve]\nstarts = 60000",
     ]
 )
 OVER = ("--over", "limits.leg_length.max=400:500:200")
