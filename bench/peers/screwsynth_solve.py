@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.solver.ipopt import ipopt
 
 from .interface import Peer, Problem
 
@@ -18,11 +17,12 @@ def search_by_default(problem: Problem) -> FloatArray:
     return _answer(problem, solution)
 
 
-def search_with(problem: Problem, solver: object) -> FloatArray:
-    """Return the answer of a solve by a local solver from every start, on one thread."""
+def search_without_screening(problem: Problem) -> FloatArray:
+    """Return the answer of a solve by Ipopt from every start, as by ``screen = false`` in the case, on one thread."""
     from screwsynth.nlp import solve  # noqa: PLC0415 - counted as a line of the call
 
-    solution = solve(problem.case, seed=problem.seed, jobs=1, solver=solver)  # type: ignore[arg-type]
+    case = replace(problem.case, search=replace(problem.case.search, screen=False))
+    solution = solve(case, seed=problem.seed, jobs=1)
     return _answer(problem, solution)
 
 
@@ -37,7 +37,7 @@ PEERS = (
     Peer(
         "screwsynth solve, Ipopt from every start",
         "screwsynth",
-        partial(search_with, solver=ipopt),
+        search_without_screening,
         "exact",
         kind="many starts",
     ),
