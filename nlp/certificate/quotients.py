@@ -142,14 +142,6 @@ class RowModel(NamedTuple):
     lo: FloatArray
     hi: FloatArray
 
-    @classmethod
-    def with_ends(cls, *parts: FloatArray) -> RowModel:
-        """Return a model whose ends are the tighter ones of those given and its own."""
-        found = cls(*parts)
-        reach = (np.abs(found.b) + found.w).sum(axis=0) + 0.5 * np.abs(found.H).sum(axis=(0, 1)) + found.s
-        reach = reach + _SUM * (np.abs(found.c) + reach)
-        return found._replace(lo=np.fmax(found.lo, found.c - reach), hi=np.fmin(found.hi, found.c + reach))
-
 
 class _Ratio(NamedTuple):
     """N, D, and ``r = N / D`` over B boxes.
@@ -294,7 +286,9 @@ def _row(model: GradientModel, r: int) -> RowModel:
     value, p, q, A = model.value, model.p[r], model.q[r], model.A[r]
     b, w, H = model.b[r] + (p + q) / 6, (q - p) / 6 + model.s[r], 0.5 * (A + np.swapaxes(A, 0, 1))
     c, s = value.c[r], value.s[r]
-    return RowModel.with_ends(c, s, b, H, w, value.lo[r], value.hi[r])
+    reach = (np.abs(b) + w).sum(axis=0) + 0.5 * np.abs(H).sum(axis=(0, 1)) + s
+    reach = reach + _SUM * (np.abs(c) + reach)
+    return RowModel(c, s, b, H, w, np.fmax(value.lo[r], c - reach), np.fmin(value.hi[r], c + reach))
 
 
 def _where_it_matters(ratio: _Ratio, sign: int, least: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -122,8 +122,8 @@ def judge_workspace(
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
-    ranks = partial(_ranks, case, closed, box, legs, engine=engine, time_limit=time_limit, progress=rank_progress)
-    judged = Judgement(case, workspace, *_in_order(ranks(paper=paper)))
+    ranks = _ranks(case, closed, box, legs, engine=engine, time_limit=time_limit, progress=rank_progress, paper=paper)
+    judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
         return judged
     numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper)
@@ -132,11 +132,6 @@ def judge_workspace(
         if until_fault and outcome is not Outcome.PROVED:
             break
     return replace(judged, extremes=tuple(found))
-
-
-def _in_order(ranks: Ranks) -> tuple[Regularity, tuple[Extreme, ...], Regularity | None]:
-    """Return verdicts as a judgement without numbers takes them."""
-    return ranks.regular, (), ranks.constraints
 
 
 def _ranks(

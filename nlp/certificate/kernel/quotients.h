@@ -13,34 +13,26 @@ typedef struct {
     double *b, *w, *H;
 } RowModel;
 
-static void take_ends(const Box *x, int r, RowModel *to)
-{
-    int n = x->n;
-    double linear = 0.0, curved = 0.0;
-    for (int i = 0; i < n; i++)
-        linear += fabs(to->b[i]) + to->w[i];
-    for (int i = 0; i < n * n; i++)
-        curved += fabs(to->H[i]);
-    to->c = x->c[r], to->s = x->s[r];
-    double reach = linear + 0.5 * curved + to->s;
-    reach = reach + SUM * (fabs(to->c) + reach);
-    to->lo = x->lo[r] > to->c - reach || isnan(to->c - reach) ? x->lo[r] : to->c - reach;
-    to->hi = x->hi[r] < to->c + reach || isnan(to->c + reach) ? x->hi[r] : to->c + reach;
-}
-
 /* From the form of the row's gradient. */
 static void read_row(const Box *x, int r, RowModel *to)
 {
     int n = x->n;
     const double *A = x->gA + (size_t)r * n * n;
+    double linear = 0.0, curved = 0.0;
     for (int i = 0; i < n; i++) {
         int at = r * n + i;
         to->b[i] = x->gb[at] + (x->gp[at] + x->gq[at]) / 6, to->w[i] = (x->gq[at] - x->gp[at]) / 6 + x->gs[at];
-        for (int j = 0; j < n; j++)
+        linear += fabs(to->b[i]) + to->w[i];
+        for (int j = 0; j < n; j++) {
             to->H[i * n + j] = 0.5 * (A[i * n + j] + A[j * n + i]);
+            curved += fabs(to->H[i * n + j]);
+        }
     }
-    to->slope_lo = x->slope_lo + r * n, to->slope_hi = x->slope_hi + r * n;
-    take_ends(x, r, to);
+    to->c = x->c[r], to->s = x->s[r], to->slope_lo = x->slope_lo + r * n, to->slope_hi = x->slope_hi + r * n;
+    double reach = linear + 0.5 * curved + to->s;
+    reach = reach + SUM * (fabs(to->c) + reach);
+    to->lo = x->lo[r] > to->c - reach || isnan(to->c - reach) ? x->lo[r] : to->c - reach;
+    to->hi = x->hi[r] < to->c + reach || isnan(to->c + reach) ? x->hi[r] : to->c + reach;
 }
 
 /* Ends of 2 grad N - r grad D along variable i, times its radius, over r in an interval. */
