@@ -76,6 +76,17 @@ def prove_regular(
     return search.verdict(reason)
 
 
+def reason_to_stop(seconds: float, boxes: int, time_limit: float | None, most_boxes: int | None) -> str:
+    """Return the reason for stopping a search before its end; empty for none."""
+    if is_requested():
+        return "interrupted"
+    if time_limit is not None and seconds >= time_limit:
+        return f"stopped after {seconds:.3g} s"
+    if most_boxes is not None and boxes >= most_boxes:
+        return f"stopped after {boxes:,} boxes"
+    return ""
+
+
 class _Search:
     """The state of a search.
 
@@ -106,12 +117,9 @@ class _Search:
         reached(Milestone.BOUND)
         while self._stack:
             seconds = time.perf_counter() - self._began
-            if is_requested():
-                return "interrupted"
-            if time_limit is not None and seconds >= time_limit:
-                return f"stopped after {seconds:.3g} s"
-            if most_boxes is not None and self._boxes >= most_boxes:
-                return f"stopped after {self._boxes:,} boxes"
+            reason = reason_to_stop(seconds, self._boxes, time_limit, most_boxes)
+            if reason:
+                return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)

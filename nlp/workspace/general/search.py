@@ -8,8 +8,8 @@ import time
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ...interruption import Milestone, is_requested, reached
-from ..search import REPORT_EVERY, RankProgress
+from ...interruption import Milestone, reached
+from ..search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
@@ -97,7 +97,7 @@ class _Search:
         reached(Milestone.BOUND)
         while self._stack:
             seconds = time.perf_counter() - self._began
-            reason = self._reason_to_stop(seconds, time_limit, most_boxes)
+            reason = reason_to_stop(seconds, self._boxes, time_limit, most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:
@@ -118,16 +118,6 @@ class _Search:
             return "the boxes that are left are too small to be divided"
         self._is_one = not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
         return "" if self._is_one else "the assemblies in two neighbouring boxes are not proved to be the same"
-
-    def _reason_to_stop(self, seconds: float, time_limit: float | None, most_boxes: int | None) -> str:
-        """Return the reason for stopping now; empty for none."""
-        if is_requested():
-            return "interrupted"
-        if time_limit is not None and seconds >= time_limit:
-            return f"stopped after {seconds:.3g} s"
-        if most_boxes is not None and self._boxes >= most_boxes:
-            return f"stopped after {self._boxes:,} boxes"
-        return ""
 
     def _next(self) -> Cells:
         """Return the next boxes, and take them off the stack."""
