@@ -83,8 +83,9 @@ def inverse_over(legs: Legs, box: PoseBox, lower: FloatArray, upper: FloatArray)
 
 
 def inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, 6, 6); NaN for singular ones."""
-    good = np.isfinite(matrices).all(axis=(1, 2)) & (np.linalg.det(np.nan_to_num(matrices)) != 0)
+    """Return the inverses of matrices (B, k, k); NaN for singular ones."""
+    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
     found: FloatArray = np.full_like(matrices, np.nan)
     found[good] = np.linalg.inv(matrices[good])
     return found

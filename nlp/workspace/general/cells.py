@@ -9,11 +9,12 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from ..inverse import inverses
 from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .problem import Problem
 from .rank import RankTest
-from .relation import Relation, are_contractions, inverses, relation_of
+from .relation import Relation, are_contractions, relation_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ....models import FloatArray
+from ..inverse import inverses
 from .enclosing import Forms
 
 if TYPE_CHECKING:
@@ -65,15 +66,6 @@ def relation_of(equations: Forms, independent: list[int], dependent: list[int]) 
         rho += ROUNDING * (size @ terms[:, :, None])[:, :, 0]
     rho = np.where(np.isfinite(rho), rho, np.inf)
     return Relation(np.nan_to_num(off), np.nan_to_num(T), rho)
-
-
-def inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, k, k); NaN for singular ones."""
-    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
-    found: FloatArray = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
-    return found
 
 
 def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
