@@ -10,9 +10,9 @@ from collections.abc import Iterable
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solve
+from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import Certificate
-from screwsynth.nlp.certificate.engines import kernel
 
 LIMIT = 60.0
 

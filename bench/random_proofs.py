@@ -14,8 +14,8 @@ import tomllib
 import numpy as np
 
 from screwsynth.nlp import case_from_tables
-from screwsynth.nlp.certificate.proof import ProofError
-from screwsynth.nlp.certificate.proofcheck import check_proof
+from screwsynth.nlp.certificate.paper.proof import ProofError
+from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 #: Bytes of a tree above which its check is left out: it takes too long for a run of hundreds.

@@ -13,12 +13,12 @@ from tempfile import TemporaryDirectory
 from screwsynth.nlp import Case, Free, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.engines import kernel
-from screwsynth.nlp.workspace.extremes import prove_extreme
 from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.numbers.extremes import prove_extreme
 from screwsynth.nlp.workspace.posebox import pose_box
 from screwsynth.nlp.workspace.posed import posed_layout
-from screwsynth.nlp.workspace.search import prove_regular
+from screwsynth.nlp.workspace.regular.engines import kernel
+from screwsynth.nlp.workspace.regular.search import prove_regular
 
 # The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """

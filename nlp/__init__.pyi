@@ -116,9 +116,9 @@ from .solver.tradeoff import tradeoff as tradeoff
 from .sweeps.columns import SweepColumns as SweepColumns
 from .sweeps.data import sweep_result as sweep_result
 from .units import Units as Units
-from .workspace.extremes import Extreme as Extreme
 from .workspace.judge import Judgement as Judgement
 from .workspace.judge import judge_workspace as judge_workspace
+from .workspace.numbers.extremes import Extreme as Extreme
 from .workspace.scale import Scale as Scale
 from .workspace.scale import largest_scale as largest_scale
 from .workspace.verdict import Outcome as Outcome

@@ -1,9 +1,9 @@
 """A proven bound of the global optimum, by branch and bound over the whole box.
 
-Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.bounding`, or by the C kernel with the same formulas. A
-box is closed when its bound does not exceed the incumbent by more than the gap, when a condition cannot hold in it, or
-when no maximum can lie in it; otherwise it is bisected. A search that stops early has a bound too, from the boxes that
-are open: it is wider, and as certain as that at the end.
+Boxes are examined in blocks by :mod:`screwsynth.nlp.certificate.boxes.bounding`, or by the C kernel with the same
+formulas. A box is closed when its bound does not exceed the incumbent by more than the gap, when a condition cannot
+hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that stops early has a bound too,
+from the boxes that are open: it is wider, and as certain as that at the end.
 
 No solver is trusted: the value of an incumbent is that of the program's own functions at the point.
 """
@@ -22,14 +22,14 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
 from ..interruption import Milestone, is_requested, reached
 from ..program.nlp import Nlp
-from .boxsearch import BoxSearch
+from .boxes.boxsearch import BoxSearch
+from .boxes.engines import engine_for, engine_name
+from .boxes.proofwriter import ProofWriter
 from .certificate import Certificate, CertificateStatus
-from .engines import engine_for, engine_name
 from .incumbent import Incumbent, IncumbentError
-from .limbsearch import IndependentSearch
-from .proofwriter import ProofWriter
+from .limbs.limbsearch import IndependentSearch
+from .limbs.sharedsearch import SharedSearch
 from .separation import separate
-from .sharedsearch import SharedSearch
 from .standardform import StandardForm, is_in_home_mode, standard_form
 
 #: The gap asked for when none is given: a ten-thousandth.

@@ -69,7 +69,7 @@ def verify_paper(proof: PaperProof, case: Case) -> None:
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..certificate.proof import ProofError
+    from ..certificate.paper.proof import ProofError
     from ..errors import one_line
     from ..workspace.paper.check import check_paper
 

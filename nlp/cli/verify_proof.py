@@ -19,8 +19,8 @@ def verify_proof(
     ] = None,
 ) -> None:
     """Check a proof anew, with nothing of what made it."""
-    from ..certificate.proof import ProofError, read_proof
-    from ..certificate.proofcheck import check_proof
+    from ..certificate.paper.proof import ProofError, read_proof
+    from ..certificate.paper.proofcheck import check_proof
     from ..errors import one_line
     from ..output.files import read_text
     from ..solver.certified import program_of
@@ -58,7 +58,7 @@ def _case_of(text: str, name: str, proof: str, case: str | None) -> Case:
     import tomllib
 
     from ..case.reader import case_from_tables, load_case
-    from ..certificate.proof import ProofError
+    from ..certificate.paper.proof import ProofError
 
     if case is not None:
         return load_case(case)

@@ -14,9 +14,9 @@ from .point import head_data, versions
 
 if TYPE_CHECKING:
     from ..solver.exchange import WorkspaceProof
-    from ..workspace.extremes import Extreme
     from ..workspace.judge import Judgement
     from ..workspace.machine import JointErrors
+    from ..workspace.numbers.extremes import Extreme
     from ..workspace.posebox import PoseNumbers
     from ..workspace.verdict import Regularity
 

@@ -9,11 +9,11 @@ from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
-from ..certificate.bounding import search_tape
+from ..certificate.boxes.bounding import search_tape
+from ..certificate.boxes.proofwriter import ProofWriter
 from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
 from ..certificate.certificate import Certificate, CertificateStatus
-from ..certificate.proof import Proof, Statement, fingerprint
-from ..certificate.proofwriter import ProofWriter
+from ..certificate.paper.proof import Proof, Statement, fingerprint
 from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
 from ..program.epigraph import formulate_worst

@@ -26,7 +26,7 @@ from .general.search import BY_NEWTON, prove_rank
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
 from .posed import posed_layout
-from .search import RankProgress
+from .regular.search import RankProgress
 from .verdict import Outcome, Regularity
 
 #: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.

@@ -15,19 +15,19 @@ from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
 from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
-from .askedvalues import SPECTRAL, spectral_extremes
-from .builtclaims import NO_LEGS, built_claims
+from .built.builtclaims import NO_LEGS, built_claims
+from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of
 from .closedform import ClosedForm, closed_form
-from .extremes import GAP, Extreme, prove_extreme
 from .machine import Legs, legs_of, workspace_of_case
-from .ownsearches import own_searches, pose_errors
+from .numbers.askedvalues import SPECTRAL, spectral_extremes
+from .numbers.extremes import GAP, Extreme, prove_extreme
+from .numbers.ownsearches import own_searches, pose_errors
+from .numbers.strokes import with_strokes
 from .posebox import PoseBox, pose_box
 from .posed import posed_layout
-from .search import RankProgress, prove_regular
-from .strokes import with_strokes
+from .regular.search import RankProgress, prove_regular
 from .verdict import Outcome, Regularity
-from .worst import Directions, length_beside
 
 if TYPE_CHECKING:
     from .paper.record import PaperRecord

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate import enclosure, intervals, univariate
-from screwsynth.nlp.certificate.bounding import search_tape
-from screwsynth.nlp.certificate.enclosure import enclose, midpoints
-from screwsynth.nlp.certificate.instructions import compile_tape
+from screwsynth.nlp.certificate.boxes.bounding import search_tape
+from screwsynth.nlp.certificate.enclosing import enclosure, intervals, univariate
+from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
+from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
+from screwsynth.nlp.certificate.enclosing.tape import Op, Tape
 from screwsynth.nlp.certificate.kinks import without_ties
-from screwsynth.nlp.certificate.slopes import SlopeArithmetic
+from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
 from screwsynth.nlp.certificate.standardform import standard_form
-from screwsynth.nlp.certificate.tape import Op, Tape
 from screwsynth.nlp.errors import UncoveredError
 
 pytest.importorskip("flint")

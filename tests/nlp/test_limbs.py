@@ -9,19 +9,20 @@ import pytest
 from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import Case, formulate, load_case, solve
-from screwsynth.nlp.certificate import branchandbound, sharedsearch
+from screwsynth.nlp.certificate import branchandbound
+from screwsynth.nlp.certificate.boxes.engines import kernel, limb_engine_for
+from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.engines import kernel, limb_engine_for
 from screwsynth.nlp.certificate.incumbent import Incumbent
-from screwsynth.nlp.certificate.limbmodels import LimbModels
-from screwsynth.nlp.certificate.limbsums import LimbBound, bound_limb
-from screwsynth.nlp.certificate.ownboxes import OwnBoxes
-from screwsynth.nlp.certificate.proof import Proof, Statement, fingerprint
-from screwsynth.nlp.certificate.proofcheck import check_proof
-from screwsynth.nlp.certificate.proofwriter import ProofWriter
+from screwsynth.nlp.certificate.limbs import sharedsearch
+from screwsynth.nlp.certificate.limbs.limbmodels import LimbModels
+from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb
+from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
+from screwsynth.nlp.certificate.limbs.sharedcuts import LeftOwn
+from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.sharedcuts import LeftOwn
 from screwsynth.nlp.certificate.standardform import standard_form
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")

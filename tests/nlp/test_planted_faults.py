@@ -21,8 +21,7 @@ import pytest
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Free
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.proof import ProofError
-from screwsynth.nlp.workspace.engines import KernelRankEngine
+from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.workspace.machine import Legs
 from screwsynth.nlp.workspace.paper.ballrows import Joints
 from screwsynth.nlp.workspace.paper.exactly import exact_rows
@@ -31,7 +30,8 @@ from screwsynth.nlp.workspace.paper.poseroot import pose_root
 from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
 from screwsynth.nlp.workspace.paper.tree import Leaves
 from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
-from screwsynth.nlp.workspace.regularity import Rank
+from screwsynth.nlp.workspace.regular.engines import KernelRankEngine
+from screwsynth.nlp.workspace.regular.regularity import Rank
 
 SOURCE = Path(__file__).parents[2] / "nlp" / "workspace" / "_workspace.c"
 COMPILER = shutil.which("gcc") or shutil.which("cc")

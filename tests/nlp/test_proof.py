@@ -16,9 +16,9 @@ import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
-from screwsynth.nlp.certificate.proofcheck import check_proof
-from screwsynth.nlp.certificate.prooftree import TreeReader, read_claims
+from screwsynth.nlp.certificate.paper.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
+from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+from screwsynth.nlp.certificate.paper.prooftree import TreeReader, read_claims
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 

@@ -10,12 +10,12 @@ import pytest
 from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate import quotients
-from screwsynth.nlp.certificate.bounding import NumpyEngine, search_tape
-from screwsynth.nlp.certificate.enclosure import midpoints
-from screwsynth.nlp.certificate.engines import kernel, limb_engine_for
-from screwsynth.nlp.certificate.quadratic import GradientModel
-from screwsynth.nlp.certificate.quotients import search_rows
+from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine, search_tape
+from screwsynth.nlp.certificate.boxes.engines import kernel, limb_engine_for
+from screwsynth.nlp.certificate.enclosing import quotients
+from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
+from screwsynth.nlp.certificate.enclosing.quadratic import GradientModel
+from screwsynth.nlp.certificate.enclosing.quotients import search_rows
 from screwsynth.nlp.certificate.separation import terms_of
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 

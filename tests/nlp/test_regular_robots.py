@@ -16,9 +16,8 @@ from screwsynth.models import FloatArray, Substitution
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.engines import kernel
+from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.workspace.boundsearch import prove_minimum
 from screwsynth.nlp.workspace.closedform import closed_form
 from screwsynth.nlp.workspace.general import rank
 from screwsynth.nlp.workspace.general.cells import Cells, Examiner
@@ -29,6 +28,7 @@ from screwsynth.nlp.workspace.general.search import BY_NEWTON, prove_rank
 from screwsynth.nlp.workspace.general.spectrum import Spectrum
 from screwsynth.nlp.workspace.judge import judge_workspace
 from screwsynth.nlp.workspace.machine import legs_of
+from screwsynth.nlp.workspace.numbers.boundsearch import prove_minimum
 from screwsynth.nlp.workspace.posebox import pose_box
 from screwsynth.nlp.workspace.verdict import Outcome
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate import secondorder
-from screwsynth.nlp.certificate.bounding import NumpyEngine
-from screwsynth.nlp.certificate.enclosure import midpoints
-from screwsynth.nlp.certificate.engines import KernelEngine, kernel
-from screwsynth.nlp.certificate.examination import Examination, Verdict
-from screwsynth.nlp.certificate.firstpass import value_tape
-from screwsynth.nlp.certificate.instructions import compile_tape
-from screwsynth.nlp.certificate.secondorder import Forms, enclose_second, monomials
+from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
+from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
+from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
+from screwsynth.nlp.certificate.boxes.firstpass import value_tape
+from screwsynth.nlp.certificate.enclosing import secondorder
+from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
+from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
+from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
+from screwsynth.nlp.certificate.enclosing.tape import Tape
 from screwsynth.nlp.certificate.standardform import Condition, StandardForm, standard_form
-from screwsynth.nlp.certificate.tape import Tape
 from screwsynth.nlp.errors import UncoveredError
 
 flint = pytest.importorskip("flint")

@@ -21,19 +21,19 @@ from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
-from screwsynth.nlp.workspace import rows
-from screwsynth.nlp.workspace.boundsearch import Oracle, prove_minimum
-from screwsynth.nlp.workspace.clearance import Clearance
-from screwsynth.nlp.workspace.engines import kernel, rank_engine
 from screwsynth.nlp.workspace.judge import judge_workspace
 from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.numbers.boundsearch import Oracle, prove_minimum
+from screwsynth.nlp.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.workspace.numbers.poseerror import WorstError
+from screwsynth.nlp.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.workspace.posebox import PoseBox, pose_box, scaled
-from screwsynth.nlp.workspace.poseerror import WorstError
-from screwsynth.nlp.workspace.regularity import Rank
+from screwsynth.nlp.workspace.regular import rows
+from screwsynth.nlp.workspace.regular.engines import kernel, rank_engine
+from screwsynth.nlp.workspace.regular.regularity import Rank
+from screwsynth.nlp.workspace.regular.search import prove_regular
 from screwsynth.nlp.workspace.scale import largest_scale
-from screwsynth.nlp.workspace.search import prove_regular
-from screwsynth.nlp.workspace.singular import SingularValues
-from screwsynth.nlp.workspace.slices import Region, slices_of
+from screwsynth.nlp.workspace.slices.slices import Region, slices_of
 from screwsynth.nlp.workspace.verdict import Outcome
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")

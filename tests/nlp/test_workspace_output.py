@@ -23,10 +23,10 @@ from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.output.pictures.workspaceslices import slices_legend
 from screwsynth.nlp.results.workspace import WorkspaceResult
 from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
-from screwsynth.nlp.workspace.limitcells import LimitCells, LimitState
 from screwsynth.nlp.workspace.machine import legs_of
 from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.slices import UNDECIDED, slices_of
+from screwsynth.nlp.workspace.slices.slices import UNDECIDED, slices_of
+from screwsynth.nlp.workspace.slices.slices.limitcells import LimitCells, LimitState
 
 Run = Callable[..., tuple[int, str, str]]
 

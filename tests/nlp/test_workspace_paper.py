@@ -22,11 +22,13 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.proof import ProofError
-from screwsynth.nlp.workspace.boundsearch import Oracle
-from screwsynth.nlp.workspace.clearance import Clearance
+from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.numbers.boundsearch import Oracle
+from screwsynth.nlp.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.workspace.numbers.poseerror import PoseErrors, WorstError, with_rest
+from screwsynth.nlp.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.workspace.paper import ballrows, check
 from screwsynth.nlp.workspace.paper.ballslopes import BallSlopes, coordinates
 from screwsynth.nlp.workspace.paper.clearanceclaim import ClearanceClaim
@@ -43,9 +45,7 @@ from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
 from screwsynth.nlp.workspace.paper.tree import Leaves, PoseNode, read_leaves, split_bytes
 from screwsynth.nlp.workspace.paper.written import paper_of
 from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.poseerror import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.workspace.search import prove_regular
-from screwsynth.nlp.workspace.singular import SingularValues
+from screwsynth.nlp.workspace.regular.search import prove_regular
 from screwsynth.nlp.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ....models import Dimension, FloatArray
 from ...case.case import Case
 from ...results.rounding import number
-from ...workspace.slices import KEPT, UNDECIDED, Region, Slice
+from ...workspace.slices.slices import KEPT, UNDECIDED, Region, Slice
 from .canvas import INK, MUTED
 from .figures import picture_of
 from .fonts import legible

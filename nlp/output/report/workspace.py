@@ -15,7 +15,7 @@ from ...results.text import Line, TextTable
 from ...results.workspace import WorkspacePose, WorkspaceResult
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, workspace_summary
-from ...workspace.slices import Slice
+from ...workspace.slices.slices import Slice
 from ...workspace.verdict import Outcome
 from ..pictures.figures import picture
 from ..pictures.workspacepose import drawing_at

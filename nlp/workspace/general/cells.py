@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
-from ..inverse import inverses
+from ..regular.inverse import inverses
 from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .problem import Problem

@@ -14,10 +14,10 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from ...certificate.enclosure import enclose
-from ...certificate.engines import chosen_kernel, kernel
-from ...certificate.instructions import compile_tape
-from ...certificate.tape import Tape
+from ...certificate.boxes.engines import chosen_kernel, kernel
+from ...certificate.enclosing.enclosure import enclose
+from ...certificate.enclosing.instructions import compile_tape
+from ...certificate.enclosing.tape import Tape
 
 #: Part of its parts by which a sum of two doubles may be off, several times.
 _ULP = 2.0**-51

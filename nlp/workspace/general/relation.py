@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ....models import FloatArray
-from ..inverse import inverses
+from ..regular.inverse import inverses
 from .enclosing import Forms
 
 if TYPE_CHECKING:

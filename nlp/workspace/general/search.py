@@ -9,7 +9,7 @@ import numpy as np
 
 from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached
-from ..search import REPORT_EVERY, RankProgress, reason_to_stop
+from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected

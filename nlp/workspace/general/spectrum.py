@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
-from ..boundsearch import Bounds
+from ..numbers.boundsearch import Bounds
 from .enclosing import Encloser
 from .problem import Problem
 

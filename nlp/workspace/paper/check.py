@@ -16,8 +16,8 @@ import numpy as np
 from ....models import Dimension
 from ...case.case import Case
 from ...case.task import Sense
-from ...certificate.proof import Proof, ProofError, Statement
-from ...certificate.proofcheck import check_proof
+from ...certificate.paper.proof import Proof, ProofError, Statement
+from ...certificate.paper.proofcheck import check_proof
 from ...errors import ScrewsynthError
 from ...program.layout import Layout
 from ..machine import Legs, legs_of, workspace_of_case

@@ -20,7 +20,7 @@ from typing import Any
 
 from ...case.pose import Free
 from ...case.workspace import Workspace
-from ...certificate.proof import ProofError
+from ...certificate.paper.proof import ProofError
 
 FORMAT = "screwsynth-workspace-proof"
 _VERSION = 1

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ....models import FloatArray
-from ...certificate.proof import ProofError
+from ...certificate.paper.proof import ProofError
 from .poseroot import PoseRoot
 from .tree import Leaves
 

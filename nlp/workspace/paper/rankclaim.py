@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....models import FloatArray
-from ...certificate.proof import ProofError
+from ...certificate.paper.proof import ProofError
 from .ballrows import Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
 from .exactly import determinant_sign

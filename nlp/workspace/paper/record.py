@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...certificate.boxes.proofwriter import ProofWriter
 from ...certificate.certificate import CertificateStatus
-from ...certificate.proof import Node
-from ...certificate.proofwriter import ProofWriter
+from ...certificate.paper.proof import Node
 from .tree import PoseNode, split_bytes
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...certificate.certificate import Certificate
     from ...program.nlp import Nlp
     from ..claims import Claim
-    from ..regularity import RankExamination
+    from ..regular.regularity import RankExamination
 
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12

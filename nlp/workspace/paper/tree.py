@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...certificate.proof import ProofError
+from ...certificate.paper.proof import ProofError
 from .document import COORDINATES
 
 if TYPE_CHECKING:

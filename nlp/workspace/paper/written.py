@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ...certificate.proof import fingerprint
+from ...certificate.paper.proof import fingerprint
 from ..closedform import closed_form
 from ..machine import Legs, legs_of
 from ..posed import posed_layout
@@ -16,8 +16,8 @@ from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
 
 if TYPE_CHECKING:
-    from ..extremes import Extreme
     from ..judge import Judgement
+    from ..numbers.extremes import Extreme
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6

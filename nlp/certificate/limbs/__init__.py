@@ -1,0 +1,5 @@
+"""Searches that take F apart into limbs.
+
+The modules import each other in this order: ``limbsearch`` (limbs that share no variable); ``limbmodels`` (upper models
+of limbs), ``ownboxes``, ``limbsums``, ``sharedcuts`` and ``sharedsearch`` (limbs that share some).
+"""

@@ -1,0 +1,215 @@
+"""Search of a box of poses for a singular one: bisection until every box is proved regular.
+
+Boxes are searched depth first, in blocks. Where the determinant of the rows has one sign at the centre of a box and the
+other at that of another, both signs are computed again without rounding. The workspace is connected, and convex in its
+coordinates: on the segment between the two poses the determinant is 0, and the claim is refuted.
+
+With a tolerance on joint centres a box is closed only if every machine within it is regular at every pose of the box. A
+machine whose determinant at a pose has the other sign than that of the exact machine refutes the claim
+(:mod:`.builtrank`).
+
+Where the determinant is 0 without a change of sign, no box that holds the place is ever closed, and the claim stays
+open.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ....models import FloatArray, frozen_array
+from ...interruption import Milestone, is_requested, reached
+from ..built.builtrank import SingularMachine, singular_machine
+from ..machine import Legs
+from ..posebox import PoseBox
+from ..verdict import Outcome, Regularity
+from .engines import RankEngine, rank_engine
+from .exact import determinant_sign, singular_between
+from .regularity import Rank, RankExamination
+
+if TYPE_CHECKING:
+    from ..paper.record import TreeRecord
+
+#: Width of a box, in parts of the whole box, below which it is not bisected: the rows over it differ by little more
+#: than their rounding.
+_LEAST_WIDTH = 2.0**-30
+#: Seconds between two reports of progress.
+REPORT_EVERY = 0.1
+
+#: Callback with seconds, number of boxes examined, and number of boxes open.
+RankProgress = Callable[[float, int, int], None]
+
+
+def prove_regular(
+    legs: Legs,
+    box: PoseBox,
+    *,
+    engine: str | None = None,
+    time_limit: float | None = None,
+    most_boxes: int | None = None,
+    progress: RankProgress | None = None,
+    recorder: TreeRecord | None = None,
+) -> Regularity:
+    """Prove that J has full rank at every pose of a box, or find a pose at which it has not.
+
+    Args:
+        legs: joint centres of the robot.
+        box: the poses.
+        engine: ``"c"`` or ``"numpy"``; left out, the C kernel where it was built.
+        time_limit: seconds after which the search stops.
+        most_boxes: number of boxes after which it stops.
+        progress: called about ten times a second.
+        recorder: records the boxes for a proof.
+
+    Raises:
+        ValueError: there is no engine of that name here.
+    """
+    search = _Search(legs, box, rank_engine(legs, box, engine), recorder)
+    try:
+        reason = search.run(time_limit, most_boxes, progress)
+    except KeyboardInterrupt:
+        reason = "interrupted"
+    return search.verdict(reason)
+
+
+def reason_to_stop(seconds: float, boxes: int, time_limit: float | None, most_boxes: int | None) -> str:
+    """Return the reason for stopping a search before its end; empty for none."""
+    if is_requested():
+        return "interrupted"
+    if time_limit is not None and seconds >= time_limit:
+        return f"stopped after {seconds:.3g} s"
+    if most_boxes is not None and boxes >= most_boxes:
+        return f"stopped after {boxes:,} boxes"
+    return ""
+
+
+class _Search:
+    """The state of a search.
+
+    Args:
+        legs: joint centres.
+        box: the whole box.
+        engine: examines boxes.
+        recorder: records them; None without a proof.
+    """
+
+    def __init__(self, legs: Legs, box: PoseBox, engine: RankEngine, recorder: TreeRecord | None = None) -> None:
+        self._legs, self._box, self._engine, self._recorder = legs, box, engine, recorder
+        self._began = time.perf_counter()
+        self._stack: list[tuple[FloatArray, FloatArray]] = [(box.lower[None], box.upper[None])]
+        self._small: list[tuple[FloatArray, FloatArray]] = []
+        self._boxes = 0
+        self._points: dict[int, FloatArray] = {}
+        self._sides: FloatArray | None = None
+        self._built: SingularMachine | None = None
+
+    @property
+    def _open(self) -> int:
+        return sum(len(lower) for lower, _ in (*self._stack, *self._small))
+
+    def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
+        """Search until no box is open; return the reason for stopping earlier, or an empty text."""
+        reported = -math.inf
+        reached(Milestone.BOUND)
+        while self._stack:
+            seconds = time.perf_counter() - self._began
+            reason = reason_to_stop(seconds, self._boxes, time_limit, most_boxes)
+            if reason:
+                return reason
+            if progress is not None and seconds - reported >= REPORT_EVERY:
+                reported = seconds
+                progress(seconds, self._boxes, self._open)
+            lower, upper = self._stack[-1]
+            block = self._engine.block
+            if len(lower) > block:
+                self._stack[-1:] = [(lower[block:], upper[block:]), (lower[:block], upper[:block])]
+            # The boxes stay where they are until their parts are there too: an interrupt between leaves them open.
+            place = len(self._stack) - 1
+            found = self._engine.examine(lower[:block], upper[:block])
+            self._boxes += len(found.verdict)
+            if self._recorder is not None:
+                self._recorder.ranks(lower[:block], upper[:block], found)
+            self._branch(found)
+            del self._stack[place]
+            if self._is_refuted(found) or self._is_refuted_as_built(found):
+                return ""
+        return "boxes are left that are too small to bisect" if self._small else ""
+
+    def _branch(self, found: RankExamination) -> None:
+        """Bisect the open boxes."""
+        rows = np.flatnonzero(found.verdict == Rank.OPEN)
+        if not rows.size:
+            return
+        lower, upper, split = found.lower[rows], found.upper[rows], found.split[rows]
+        whole = np.where(self._box.upper > self._box.lower, self._box.upper - self._box.lower, np.inf)
+        every = np.arange(rows.size)
+        low, high = lower[every, split], upper[every, split]
+        middle = 0.5 * low + 0.5 * high
+        small = (((upper - lower) / whole).max(axis=1) < _LEAST_WIDTH) | ~((low < middle) & (middle < high))
+        if small.any():
+            self._small.append((lower[small], upper[small]))
+        cut = ~small
+        left, right = upper[cut].copy(), lower[cut].copy()
+        columns = np.arange(len(left))
+        left[columns, split[cut]] = right[columns, split[cut]] = middle[cut]
+        if len(left):
+            self._stack.append((np.concatenate([lower[cut], right]), np.concatenate([left, upper[cut]])))
+
+    def _is_refuted(self, found: RankExamination) -> bool:
+        """Return whether two poses with determinants of opposite sign are known, from this block or an earlier one."""
+        for sign in (-1, 1):
+            if sign in self._points:
+                continue
+            for k in np.flatnonzero((found.sign == sign) & (found.verdict != Rank.OUTSIDE))[:4]:
+                y = 0.5 * found.lower[k] + 0.5 * found.upper[k]
+                if self._box.holds(y) and determinant_sign(self._legs, self._box, y) == sign:
+                    self._points[sign] = y
+                    break
+        if len(self._points) < 2:
+            return False
+        self._sides = frozen_array([self._points[1], self._points[-1]], (2, 6))
+        return True
+
+    def _is_refuted_as_built(self, found: RankExamination) -> bool:
+        """Return whether a machine within the tolerance is known that is singular in an open box of this block."""
+        if self._legs.tolerance > 0:
+            rows = found.verdict == Rank.OPEN
+            self._built = singular_machine(self._legs, self._box, 0.5 * found.lower[rows] + 0.5 * found.upper[rows])
+        return self._built is not None
+
+    def verdict(self, reason: str) -> Regularity:
+        """Return the verdict at this state of the search."""
+        outcome, y = Outcome.PROVED, None
+        if self._sides is not None:
+            outcome = Outcome.REFUTED
+            y = singular_between(self._legs, self._box, *self._sides)
+        elif self._built is not None:
+            outcome, y = Outcome.REFUTED, self._built.y
+        elif self._open:
+            outcome = Outcome.OPEN
+            lower, upper = max((*self._stack, *self._small), key=lambda each: float((each[1] - each[0]).max()))
+            widest = int(np.argmax((upper - lower).max(axis=1)))
+            y = 0.5 * lower[widest] + 0.5 * upper[widest]
+        free = list(self._box.free)
+        whole = (self._box.upper - self._box.lower)[free]
+        share = sum(
+            float(((upper - lower)[:, free] / whole).prod(axis=1).sum())
+            for lower, upper in (*self._stack, *self._small)
+        )
+        return Regularity(
+            outcome=outcome,
+            box=self._box,
+            y=None if y is None else frozen_array(y, (6,)),
+            sides=self._sides,
+            engine=self._engine.name,
+            boxes=self._boxes,
+            open=self._open,
+            share=share,
+            seconds=time.perf_counter() - self._began,
+            reason="" if outcome is Outcome.PROVED else reason,
+            errors=None if self._built is None else self._built.errors,
+        )

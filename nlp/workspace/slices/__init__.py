@@ -1,0 +1,1 @@
+"""Slices through a workspace: ``limitcells`` decides limits on boxes, ``slices`` covers planes by boxes."""
