@@ -11,10 +11,10 @@ import sys
 import time
 
 from screwsynth.models.catalog import gallery_names
+from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.workspace.closedform import closed_form
 from screwsynth.nlp.workspace.general.problem import NotJudgedError, build_problem
 from screwsynth.nlp.workspace.general.search import prove_rank
 from screwsynth.nlp.workspace.posebox import pose_box

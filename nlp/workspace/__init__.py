@@ -7,7 +7,7 @@ The rooms and modules import each other in this order:
 * ``built`` (machines within a tolerance), ``regular`` (regular poses of six straight legs), ``general`` (of any
   robot);
 * ``numbers`` (their extremes over the box);
-* ``closedform`` (unknowns that follow from the pose), ``anyrobot`` (ranks and reach of any robot);
+* ``anyrobot`` (ranks and reach of any robot);
 * ``judge`` (all claims about a machine), ``scale`` (the largest box), ``slices`` (for pictures), and ``paper``
   (proofs as files and their checker).
 """

@@ -10,6 +10,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import Dimension, Model, Substitution, frozen_array
+from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..case.limits.constraint import Reading
 from ..case.limits.limits import Limits
@@ -19,7 +20,6 @@ from ..case.workspace import Workspace
 from ..errors import UncoveredError
 from ..program.layout import Layout
 from .claims import Claim
-from .closedform import ClosedForm
 from .general.matrices import RankMatrix
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
+from ...models.joints.closedform import ClosedForm, closed_form
 from ..case.case import Case
 from ..case.limits.constraint import LENGTH
 from ..case.task import Sense
@@ -18,7 +19,6 @@ from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, wit
 from .built.builtclaims import NO_LEGS, built_claims
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of
-from .closedform import ClosedForm, closed_form
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme

@@ -13,12 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray, Substitution
+from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.workspace.closedform import closed_form
 from screwsynth.nlp.workspace.general import rank
 from screwsynth.nlp.workspace.general.cells import Cells, Examiner
 from screwsynth.nlp.workspace.general.enclosing import Encloser, Forms

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ....models.joints.closedform import closed_form
 from ...certificate.paper.proof import fingerprint
-from ..closedform import closed_form
 from ..machine import Legs, legs_of
 from ..posed import posed_layout
 from ..verdict import Outcome

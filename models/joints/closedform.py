@@ -23,9 +23,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Closure, Dimension, Model, Substitution, Unknown, Wrench
-from ...models.drawing import Scene
-from ...models.limbjoints import expressions_of
+from .. import Closure, Dimension, Model, Substitution, Unknown, Wrench
+from ..drawing import Scene
+from ..limbjoints import expressions_of
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
 _SAME = 1e-9
