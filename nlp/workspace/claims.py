@@ -18,6 +18,7 @@ from ..errors import InputError, nearest
 from ..program.layout import Layout
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from .worstnumber import Worst
 
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
@@ -53,6 +54,25 @@ class Claim:
     quantity: str = ""
     worst: Worst | None = None
     uncovered: str = ""
+
+
+def exact_length_name(leg: str) -> str:
+    """Return the name of the shortest length of a leg of the exact machine, on which bounds of other machines rest."""
+    return f"exact leg_length limb {leg}"
+
+
+def one_machine_name(claim: str) -> str:
+    """Return the name of the lengths from which a claim about one machine at two poses follows."""
+    return f"{claim}, lengths of one machine"
+
+
+def asked_name(case: Case, name: str) -> str:
+    """Return the name in proofs of a measure of the singular values of J that is asked for, and not limited.
+
+    A limit on it divides moments by a length of its own, and has the shorter name.
+    """
+    is_limited = any(limit.key == name for limit in case.limits)
+    return f"{name} with the characteristic length" if is_limited else name
 
 
 def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective: bool = True) -> list[Claim]:

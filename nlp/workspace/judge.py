@@ -18,7 +18,7 @@ from ..program.layout import Layout
 from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
 from .built.builtclaims import NO_LEGS, built_claims
 from .built.worst import Directions, length_beside
-from .claims import Claim, claims_of
+from .claims import Claim, claims_of, exact_length_name, one_machine_name
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
@@ -206,17 +206,18 @@ class _Numbers:
                 layout = posed_layout(replace(case, model=model), self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
-        shortest, claims = _as_built(layout, self.workspace, legs, claims, prove)
+        shortest, claims = _as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         yield from self._add_proved(found, layout, claims)
         if legs is not None:
-            refine = partial(_refined, layout, legs, shortest, claims, partial(prove, paper=self.paper, again=True))
+            again = partial(prove, paper=self.paper, again=True)
+            refine = partial(_refined, layout, legs, shortest, claims, again, self.paper)
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
             yield from (each.outcome for each in found[before:])
             own = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, own(case, legs, box, shortest=shortest, paper=self.paper))
         spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-        yield from _add(found, spectral(case, self.closed.model, box, asked))
+        yield from _add(found, spectral(case, self.closed.model, box, asked, shortest=shortest, paper=self.paper))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
@@ -266,7 +267,13 @@ def _as_built(
         return _AsBuilt(0.0, [replace(each, uncovered=NO_LEGS) for each in claims])
     if legs is None or not legs.tolerance or not claims:
         return _AsBuilt(0.0, claims)
-    lengths = [replace(each, limit=None) for each in claims if each.leg is not None and each.sense is Sense.MIN]
+    # A proof on paper has these searches beside those of the same lengths that are claims, which have other gaps.
+    names = {k: exact_length_name(leg.name) for k, leg in enumerate(layout.robots[0].legs)}
+    lengths = [
+        replace(each, limit=None, name=names[each.leg])
+        for each in claims
+        if each.leg is not None and each.sense is Sense.MIN
+    ]
     shortest = min(prove(each, gap=_ROUGH).bound for each in lengths)
     return _AsBuilt(shortest, built_claims(layout, workspace, legs, claims, shortest))
 
@@ -277,6 +284,7 @@ def _refined(
     shortest: float,
     claims: Sequence[Claim],
     prove: Callable[..., Extreme],
+    paper: PaperRecord | None,
     leg: int,
     sense: Sense,
     gap: float,
@@ -292,4 +300,7 @@ def _refined(
         return None
     sign = 1.0 if sense is Sense.MAX else -1.0
     expression = length_beside(legs, leg, layout.robots[0], sign, shortest, about)
-    return prove(Claim(claim.name, sense, expression, LENGTH), gap=gap)
+    name = one_machine_name(about.claim)
+    if paper is not None:
+        paper.directions[name] = about.base, about.platform
+    return prove(Claim(name, sense, expression, LENGTH), gap=gap)

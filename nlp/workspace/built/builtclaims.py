@@ -81,8 +81,9 @@ def built_claims(
     limited = {each.item.constraint.name: each for each in context.limited()}
     found = [context.built(each, limited) for each in claims]
     # Of limits that are the same number of the exact machine, one is a claim about it. Where a number changes with the
-    # pose, those of other machines may differ.
-    known = {each.name for each in claims}
+    # pose, those of other machines may differ. A measure that is asked for has the name of the limit on it, and is no
+    # claim about the limit.
+    known = {each.name for each in claims if each.key}
     missing = [each for name, each in limited.items() if name not in known and each.changes]
     added = [context.built(each, limited) for each in claims_of_items([each.item for each in missing])]
     first_without = next((k for k, each in enumerate(claims) if not each.key or each.leg is not None), len(claims))

@@ -89,10 +89,14 @@ def worst_length(legs: Legs, i: int, sign: float) -> Worst:
 
 
 class Directions(NamedTuple):
-    """Vectors that stand for a leg's direction over a workspace: (3,) in the world frame, and in the platform frame."""
+    """Vectors that stand for a leg's direction over a workspace: (3,) in the world frame, and in the platform frame.
+
+    The last attribute is the name of the claim that they serve.
+    """
 
     base: FloatArray
     platform: FloatArray
+    claim: str
 
 
 def length_beside(legs: Legs, i: int, robot: RobotInstance, sign: float, shortest: float, about: Directions) -> SX:

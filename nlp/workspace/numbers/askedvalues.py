@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ....models import Dimension, Model
 from ...case.case import Case
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.task import Sense
 from ...errors import UncoveredError
+from ..built.builtclaims import NO_LEGS
 from ..general.problem import NotJudgedError, build_problem
 from ..general.spectrum import Spectrum
+from ..claims import asked_name
 from ..machine import legs_of
 from ..posebox import PoseBox
 from ..verdict import Outcome
 from .boundsearch import Oracle, prove_minimum
 from .extremes import Extreme
 from .singular import SingularValues
+
+if TYPE_CHECKING:
+    from ..paper.record import PaperRecord
 
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
@@ -32,6 +39,8 @@ def spectral_extremes(
     gap: float,
     time_limit: float | None,
     interrupted: Callable[[], bool],
+    shortest: float = 0.0,
+    paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the smallest singular value, or the largest condition number, of J over a box of poses.
 
@@ -45,35 +54,45 @@ def spectral_extremes(
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
+        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of its legs alone.
+        paper: records the searches for a proof.
     """
     for name in names:
         is_condition = name == ConditionNumber.key
         sense = Sense.MAX if is_condition else Sense.MIN
         sign = -1.0 if is_condition else 1.0
         try:
-            oracle = _oracle(case, model, box, is_condition=is_condition)
+            oracle = _oracle(case, model, box, shortest, is_condition=is_condition)
         except (UncoveredError, NotJudgedError) as error:
             nothing = (sign * -math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, str(error))
             yield Extreme(name, sense, Dimension.NUMBER, "", None, *nothing)
             continue
         middle = abs(float(oracle.values((0.5 * (box.lower + box.upper))[None])[0]))
-        found = prove_minimum(oracle, box, gap=gap * (middle or 1.0), time_limit=time_limit, interrupted=interrupted)
+        allowed, is_of_legs = gap * (middle or 1.0), isinstance(oracle, SingularValues)
+        recorder = paper.own(asked_name(case, name)) if paper is not None and is_of_legs else None
+        found = prove_minimum(
+            oracle, box, gap=allowed, time_limit=time_limit, interrupted=interrupted, recorder=recorder
+        )
         outcome = Outcome.OPEN if found.reason else Outcome.PROVED
         reached = (sign * found.bound, sign * found.value, box.pose(found.y), outcome)
-        yield Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, found.reason)
+        extreme = Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, found.reason)
+        if case.joint_centre_tolerance and isinstance(oracle, SingularValues):
+            extreme = replace(extreme, errors=oracle.errors(found.y))
+        yield extreme
 
 
-def _oracle(case: Case, model: Model, box: PoseBox, *, is_condition: bool) -> Oracle:
+def _oracle(case: Case, model: Model, box: PoseBox, shortest: float, *, is_condition: bool) -> Oracle:
     """Return bounds of a number over boxes.
 
     Raises:
-        NotJudgedError: the robot has loops without a closed form, or other machines are meant too.
+        NotJudgedError: the robot has loops without a closed form, or other machines than that of a robot without six
+            straight legs are meant.
     """
-    if case.joint_centre_tolerance:
-        raise NotJudgedError("measures that no limit asks for are bounded for the exact machine alone: give a limit")
     legs, length = legs_of(case), case.characteristic_length
     if legs is not None:
-        return SingularValues(legs, box, length, is_condition=is_condition)
+        return SingularValues(legs, box, length, is_condition=is_condition, shortest=shortest)
+    if case.joint_centre_tolerance:
+        raise NotJudgedError(NO_LEGS)
     problem = build_problem(case, model, box)
     if problem.dependent:
         raise NotJudgedError("the robot has loops that are not solved in closed form")

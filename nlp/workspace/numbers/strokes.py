@@ -97,10 +97,10 @@ def _of_one_machine(
         return extreme
     at = [spans(legs, pose).n[i] for pose in poses]
     turned = [n @ pose.rotation for n, pose in zip(at, poses, strict=True)]
-    about = Directions(0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]))
+    about = Directions(0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]), extreme.name)
     sign = 1.0 if kind.sense is Sense.MAX else -1.0
     # What does not cancel: nothing in a stroke.
-    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about)
+    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[:2])
     for gap in _GAPS:
         short, long = (refine(i, sense, gap, about) for sense in (Sense.MIN, Sense.MAX))
         if short is None or long is None:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from casadi import SX
 
 from ....models import Dimension
 from ...case.case import Case
@@ -23,6 +24,7 @@ from ...program.layout import Layout
 from ..machine import Legs, legs_of, workspace_of_case
 from ..posed import extreme_program, posed_layout
 from .ballrows import Joints
+from .built.built import Built
 from .clearanceclaim import ClearanceClaim
 from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
 from .errorclaim import ErrorClaim, whole_errors
@@ -41,10 +43,10 @@ _SAME = 1e-9
 _ROUNDING = 1e-15
 #: Reason that each kind of claim must have.
 _REASONS = {
-    "regular": ("regular", "singular"),
+    "regular": ("regular", "singular", "singular machine"),
     "number": ("program",),
-    "stroke": ("lengths",),
-    "dead length": ("lengths",),
+    "stroke": ("lengths", "one machine"),
+    "dead length": ("lengths", "one machine"),
 }
 #: Callback with the name of a claim, the number of claims checked, and of all.
 PaperProgress = Callable[[str, int, int], None]
@@ -58,7 +60,7 @@ class CheckedClaim:
         name, sense: of the claim.
         bound: proven bound of the number as it reads in results, radians for angles; None without a number.
         limit: limit of the case that it keeps, read in the same way; None without one.
-        is_refuted: whether the opposite is shown: a singular pose.
+        is_refuted: whether the opposite is shown: a singular pose, of the exact machine or of one within the tolerance.
         dimension: of the number.
     """
 
@@ -141,6 +143,9 @@ class _Checker:
         _compare_legs(self._legs, proof)
         self._layout: Layout = posed_layout(case, workspace)
         self._root: PoseRoot = pose_root(workspace)
+        self._tolerance = case.joint_centre_tolerance or 0.0
+        if self._tolerance != proof.tolerance:
+            raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
         self._eps = leg_error_of(case, proof.leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
@@ -150,6 +155,14 @@ class _Checker:
             raise
         except ScrewsynthError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
+        self._built = self._built_machines()
+
+    def _built_machines(self) -> Built | None:
+        """Return all machines within the tolerance; None for the exact one."""
+        if self._legs is None or not self._tolerance:
+            return None
+        lemmas = {(each.name, each.sense): each for each in self._proof.lemmas}
+        return Built(self._layout, self._root, self._legs, lemmas, self._bound_of)
 
     def check(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
         """Check one claim.
@@ -159,27 +172,37 @@ class _Checker:
         """
         if given.reason not in _REASONS.get(each.kind, ("boxes",)):
             raise ProofError(f"'{given.reason}' is no reason of this claim")
+        if self._tolerance and self._built is None:
+            raise ProofError("errors of joint centres are covered for six straight legs alone")
+        if given.reason == "singular machine":
+            return self._check_machine(each, given)
         if given.reason == "singular":
             return self._check_sides(each, given)
         if each.kind == "regular":
-            self._show(RankClaim(self._root, self._joints), given.tree)
+            self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
             return CheckedClaim(each.name, each.sense)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
         if each.kind == "number":
             return self._check_program(each, given)
         if each.kind in ("stroke", "dead length"):
-            return self._check_stroke(each)
+            return self._check_stroke(each, given)
         if each.kind == "error":
             return self._check_error(each, given)
         bound = float(given.bound)
         _keep_limit(each, bound)
         claim: BoxClaim
         if each.kind == "clearance":
-            claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), bound)
+            # Two legs that are moved towards each other are nearer by twice the tolerance.
+            nearer = 2 * self._tolerance
+            least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
+            claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), least)
         else:
             is_condition = each.kind == "condition"
-            claim = SingularClaim(self._root, self._joints, each.length, bound, is_condition=is_condition)
+            change = 0.0 if self._built is None else self._built.change(self._joints, each.length)
+            claim = SingularClaim(
+                self._root, self._joints, each.length, bound, is_condition=is_condition, change=change
+            )
         self._show(claim, given.tree)
         dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
         return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
@@ -213,24 +236,43 @@ class _Checker:
             raise ProofError("the determinant has not opposite signs at the two poses")
         return CheckedClaim(each.name, each.sense, is_refuted=True)
 
+    def _check_machine(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check that a machine within the tolerance is singular at a pose of the workspace."""
+        if self._built is None:
+            raise ProofError("the claim is about the exact machine")
+        self._built.refuse_unless_singular(self._root, given.sides)
+        return CheckedClaim(each.name, each.sense, is_refuted=True)
+
+    def _bound_of(self, expression: SX, sense: Sense, given: PaperClaim) -> float:
+        """Return the bound of an expression that a tree of ``certify`` proves."""
+        if given.reason != "program" or given.bound is None or not math.isfinite(given.bound):
+            raise ProofError("the claim has no bound")
+        nlp = extreme_program(self._layout, expression, sense)
+        checked = check_proof(Proof("", given.name, Statement(), given.graph, given.bound, given.tree), nlp)
+        self.leaves += checked.leaves
+        self.pieces += checked.pieces
+        return -nlp.sign * checked.bound
+
     def _check_program(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
         """Check a tree of ``certify`` for a number."""
         claim = each.claim
-        if claim is None or given.bound is None:
-            raise ProofError("the claim has no bound")
-        nlp = extreme_program(self._layout, claim.expression, claim.sense)
-        checked = check_proof(Proof("", each.name, Statement(), given.graph, given.bound, given.tree), nlp)
-        self.leaves += checked.leaves
-        self.pieces += checked.pieces
-        bound = -nlp.sign * checked.bound
-        _keep_limit(each, bound)
-        self._bounds[each.key] = bound
+        if claim is None:
+            raise ProofError("the claim has no number")
         read = claim.reading.from_value
+        if self._built is None:
+            bound = value = self._bound_of(claim.expression, claim.sense, given)
+            shown = read(bound)
+        else:
+            number = self._built.number(claim)
+            bound = self._bound_of(number.expression, claim.sense, given)
+            shown, value = self._built.shown(claim, number, bound)
+        _keep_limit(each, value)
+        self._bounds[each.key] = bound
         limit = None if claim.limit is None else read(claim.limit)
-        return CheckedClaim(each.name, each.sense, claim.reading.dimension, read(bound), limit)
+        return CheckedClaim(each.name, each.sense, claim.reading.dimension, shown, limit)
 
     def _length(self, leg: str, sense: str) -> float:
-        """Return the proven shortest or longest length of a leg.
+        """Return the proven shortest or longest length of a leg of the exact machine.
 
         Raises:
             ProofError: there is no proof of it.
@@ -241,12 +283,19 @@ class _Checker:
         outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
-    def _check_stroke(self, each: ExpectedClaim) -> CheckedClaim:
+    def _check_stroke(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
         """Check a limit on a telescoping leg from the lengths of the leg."""
-        leg = self._case.model.legs[each.legs[0]].name
-        short, long = self._length(leg, "min"), self._length(leg, "max")
-        off = _ROUNDING * long
-        bound = long - short + off if each.kind == "stroke" else 2 * short - long - off
+        leg, is_stroke = each.legs[0], each.kind == "stroke"
+        if given.reason == "one machine":
+            if self._built is None:
+                raise ProofError("the claim is about the exact machine")
+            bound = self._built.stroke(each.name, leg, each.sense, (1.0, -1.0) if is_stroke else (-1.0, 2.0), given)
+        else:
+            name = self._case.model.legs[leg].name
+            short = self._length(name, "min") - 2 * self._tolerance
+            long = self._length(name, "max") + 2 * self._tolerance
+            off = 8 * _ROUNDING * long
+            bound = long - short + off if is_stroke else 2 * short - long - off
         _keep_limit(each, bound)
         return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
 
@@ -259,7 +308,8 @@ class _Checker:
         is_rotation = each.name == ERRORS[1]
         most = rotation if is_rotation else position
         self._show(ErrorClaim(self._root, self._joints, most, is_rotation=is_rotation), given.tree)
-        shortest = min(self._length(leg.name, "min") for leg in self._case.model.legs)
+        lengths = (self._length(leg.name, "min") for leg in self._case.model.legs)
+        shortest = min(lengths) if self._built is None else self._built.shortest
         reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):

@@ -7,6 +7,14 @@ A claim is proved by one of
     program     a tree of ``certify`` for one number, with its bound
     boxes       a tree of boxes on each of which a number is not below (above) its bound
     lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
+
+and, where it is about every machine within a tolerance on joint centres, also by
+
+    one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
+    singular machine    the opposite: a pose, and a machine at which the determinant has another sign there
+
+Lemmas are claims of their own that others rest on: the shortest lengths of the exact machine's legs, and those of
+``one machine``. Each is proved by a tree of ``certify``.
 """
 
 from __future__ import annotations
@@ -23,11 +31,11 @@ from ...case.workspace import Workspace
 from ...certificate.paper.proof import ProofError
 
 FORMAT = "screwsynth-workspace-proof"
-_VERSION = 1
+_VERSION = 2
 #: Number of coordinates of a pose.
 COORDINATES = 6
 #: Reasons of claims.
-REASONS = ("regular", "singular", "program", "boxes", "lengths")
+REASONS = ("regular", "singular", "program", "boxes", "lengths", "one machine", "singular machine")
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,8 @@ class PaperClaim:
             unit of length off; None without a number.
         graph: fingerprint of the program; empty for other reasons.
         tree: nodes in bytes; empty for a claim without a tree.
-        sides: two poses (6,) with determinants of opposite signs; empty for other reasons.
+        sides: two poses (6,) with determinants of opposite signs; two directions (3,) of a leg, in the world frame and
+            in the platform frame; a pose (6,) and joint centres (12, 3); empty for other reasons.
     """
 
     name: str
@@ -53,6 +62,19 @@ class PaperClaim:
     graph: str = ""
     tree: bytes = b""
     sides: tuple[tuple[float, ...], ...] = ()
+
+    def as_data(self) -> dict[str, object]:
+        """Return the JSON object."""
+        return {
+            "name": self.name,
+            "sense": self.sense,
+            "reason": self.reason,
+            "bound": self.bound,
+            "graph": self.graph,
+            "sides": self.sides,
+            "digest": hashlib.sha256(self.tree).hexdigest(),
+            "tree": base64.b64encode(zlib.compress(self.tree, 9)).decode("ascii"),
+        }
 
 
 @dataclass(frozen=True)
@@ -77,6 +99,8 @@ class PaperProof:
         leg_error: largest error of a leg's length.
         claims: the claims that are proved.
         unproved: the others.
+        tolerance: largest error of each joint centre in the machines that the claims are about; 0 for the exact machine.
+        lemmas: claims that others rest on.
     """
 
     case: str
@@ -87,6 +111,8 @@ class PaperProof:
     leg_error: float
     claims: tuple[PaperClaim, ...]
     unproved: tuple[Unproved, ...]
+    tolerance: float = 0.0
+    lemmas: tuple[PaperClaim, ...] = ()
 
     def as_text(self) -> str:
         """Return the JSON text."""
@@ -99,19 +125,9 @@ class PaperProof:
             "legs": self.legs,
             "quantities": self.quantities,
             "leg_error": self.leg_error,
-            "claims": [
-                {
-                    "name": each.name,
-                    "sense": each.sense,
-                    "reason": each.reason,
-                    "bound": each.bound,
-                    "graph": each.graph,
-                    "sides": each.sides,
-                    "digest": hashlib.sha256(each.tree).hexdigest(),
-                    "tree": base64.b64encode(zlib.compress(each.tree, 9)).decode("ascii"),
-                }
-                for each in self.claims
-            ],
+            "joint_centre": self.tolerance,
+            "claims": [each.as_data() for each in self.claims],
+            "lemmas": [each.as_data() for each in self.lemmas],
             "not_on_paper": [vars(each) for each in self.unproved],
         }
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -158,6 +174,8 @@ def read_paper(text: str, source: str) -> PaperProof:
             quantities=tuple(map(str, content["quantities"])),
             leg_error=float(content["leg_error"]),
             claims=claims,
+            tolerance=float(content["joint_centre"]),
+            lemmas=tuple(_claim(each, source) for each in content["lemmas"]),
             unproved=tuple(
                 Unproved(str(each["name"]), str(each["sense"]), str(each["reason"])) for each in content["not_on_paper"]
             ),

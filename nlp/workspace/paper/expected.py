@@ -11,8 +11,9 @@ from ...case.limits.clearance import LegClearance
 from ...case.limits.legs import Actuator
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...program.layout import Layout
-from ..claims import Claim, claims_of
+from ..claims import Claim, asked_name, claims_of
 from ..machine import Legs
+from .built.statement import with_further
 
 #: Names of the errors of the pose: of its position and of its rotation.
 ERRORS = ("position error", "rotation error")
@@ -72,9 +73,9 @@ def expected_claims(
     found = [ExpectedClaim(REGULAR, "", "regular")]
     # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
     numbers: dict[tuple[str, str], Claim] = {}
-    # Singular values that no limit asks for have no proof on paper.
-    named = [name for name in quantities if name not in (SmallestSingularValue.key, ConditionNumber.key)]
-    for each in claims_of(layout, named):
+    spectral = (SmallestSingularValue.key, ConditionNumber.key)
+    claims = claims_of(layout, [name for name in quantities if name not in spectral])
+    for each in with_further(layout, claims) if legs is not None and legs.tolerance else claims:
         numbers.setdefault((each.name, each.sense.value), each)
     found += [ExpectedClaim(*key, "number", each.limit, each) for key, each in numbers.items()]
     if legs is None:
@@ -94,6 +95,10 @@ def expected_claims(
             for pair in itertools.combinations(range(len(names)), 2):
                 name = f"leg_clearance limbs {names[pair[0]]} and {names[pair[1]]}"
                 found.append(ExpectedClaim(name, "min", "clearance", limit.min, legs=pair))
+    length = case.characteristic_length
+    for name in dict.fromkeys(name for name in quantities if name in spectral):
+        sense, kind = ("max", "condition") if name == ConditionNumber.key else ("min", "singular value")
+        found.append(ExpectedClaim(asked_name(case, name), sense, kind, length=length))
     if leg_error_of(case, leg_error) > 0:
         found += [ExpectedClaim(name, "max", "error") for name in ERRORS]
     return found

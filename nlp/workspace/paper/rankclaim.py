@@ -4,6 +4,8 @@ With the rows ``A(y) in A(c) + sum_k S_k (y_k - c_k)`` and C near the inverse of
 where
 
     |I - C A(c)| + sum_k h_k |C S_k|     has a spectral radius below 1.
+
+With a tolerance on joint centres ``|C| D`` is added, D the change of the rows by their errors.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from ....models import FloatArray
 from ...certificate.paper.proof import ProofError
 from .ballrows import Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
+from .built.changes import change_of_rows
 from .exactly import determinant_sign
 from .pieces import Attempt
 from .poseroot import PoseRoot
@@ -39,14 +42,14 @@ class Preconditioned(NamedTuple):
     B: FloatArray
 
 
-def preconditioned(rows: BallSlopes) -> Preconditioned:
-    """Return the rows (B, 6, 6) times a matrix near the inverse at the centre."""
+def preconditioned(rows: BallSlopes, change: FloatArray | float = 0.0) -> Preconditioned:
+    """Return the rows (B, 6, 6), which may change by these sizes, times a matrix near the inverse at the centre."""
     with np.errstate(all="ignore"):
         C = inverses(rows.c)
         size = np.abs(C)
         count, h = len(C), rows.h
         T = (C @ rows.s.reshape(count, 6, 36)).reshape(count, 6, 6, 6)
-        radius = rows.ce + PRODUCT * np.abs(rows.c)
+        radius = rows.ce + PRODUCT * np.abs(rows.c) + change
         radius = radius + ((rows.se + PRODUCT * np.abs(rows.s)) @ h[:, None, :, None])[..., 0]
         B = np.abs(np.eye(6) - C @ rows.c) * (1 + 2 * UNIT) + 2 * UNIT + size @ radius
         B = B + (np.abs(T) @ h[:, None, :, None])[..., 0]
@@ -59,10 +62,11 @@ class RankClaim:
     Args:
         root: the whole box.
         joints: joint centres.
+        tolerance: largest error of each joint centre in the machines that are meant.
     """
 
-    def __init__(self, root: PoseRoot, joints: Joints) -> None:
-        self._root, self._joints = root, joints
+    def __init__(self, root: PoseRoot, joints: Joints, tolerance: float = 0.0) -> None:
+        self._root, self._joints, self._tolerance = root, joints, tolerance
         self._signs: dict[int, FloatArray] = {}
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
@@ -71,8 +75,10 @@ class RankClaim:
         Raises:
             ProofError: two poses are known at which the determinant has opposite signs.
         """
-        rows = ball_rows(self._root, self._joints, lower, upper).rows
-        found = preconditioned(rows)
+        whole = ball_rows(self._root, self._joints, lower, upper)
+        rows = whole.rows
+        change = change_of_rows(whole, self._joints, self._tolerance) if self._tolerance else 0.0
+        found = preconditioned(rows, change)
         holds, v = contraction(found.B)
         with np.errstate(all="ignore"):
             parts = np.abs(found.T) * v[:, None, :, None] / v[:, :, None, None]

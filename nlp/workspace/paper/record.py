@@ -134,12 +134,15 @@ class PaperRecord:
         programs: of numbers, by name and sense.
         boxes: of searches of their own, by name.
         firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
+        directions: fixed directions (3,) of a leg, in the world frame and in the platform frame, by the name of lengths
+            of one machine.
     """
 
     rank: TreeRecord = field(default_factory=TreeRecord)
     programs: dict[tuple[str, str], ProgramRecord] = field(default_factory=dict)
     boxes: dict[str, TreeRecord] = field(default_factory=dict)
     firsts: dict[str, float] = field(default_factory=dict)
+    directions: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def own(self, name: str) -> TreeRecord:
         """Return the record of a search of its own."""

@@ -10,6 +10,9 @@ squares of the sizes of the forces, the largest singular value is at most t wher
 K is affine too but for a rest. It is first multiplied by a matrix W near the inverse of its factor of Cholesky's at the
 centre, from both sides. A condition number is at most k where the smallest singular value is at least t and the largest
 at most k t, for any t.
+
+With a tolerance on joint centres every singular value changes by at most a number (:mod:`.built.changes`), so that the
+smallest is claimed to be larger by it, and the largest to be smaller by it.
 """
 
 from __future__ import annotations
@@ -42,17 +45,20 @@ class SingularClaim:
         length: L.
         bound: the smallest singular value, or the condition number, that is claimed.
         is_condition: whether the condition number is meant.
+        change: by how much a singular value changes in the machines that are meant.
     """
 
-    def __init__(self, root: PoseRoot, joints: Joints, length: float, bound: float, *, is_condition: bool) -> None:
-        self._root, self._joints, self._length = root, joints, length
+    def __init__(
+        self, root: PoseRoot, joints: Joints, length: float, bound: float, *, is_condition: bool, change: float = 0.0
+    ) -> None:
+        self._root, self._joints, self._length, self._change = root, joints, length, change
         self._bound, self._is_condition = bound, is_condition
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
         rows = ball_rows(self._root, self._joints, lower, upper).rows
         if not self._is_condition:
-            return self._of_inverse(rows, np.full(len(lower), self._bound))
+            return self._of_inverse(rows, np.full(len(lower), self._with_change(self._bound)))
         A = rows.times(np.array([*[self._length] * 3, 1.0, 1.0, 1.0]))
         gram = (A[:, _PAIRS[:, 0]] * A[:, _PAIRS[:, 1]]).sum(2)
         forces = rows[:, :, :3]
@@ -62,15 +68,20 @@ class SingularClaim:
             values = np.linalg.svd(np.nan_to_num(unit), compute_uv=False)
             low, high = values[:, -1] / self._length, values[:, 0] / self._length
             # The smallest singular value changes more: most of the room between the two is left to it.
-            least = high / self._bound
-            t = least * np.sqrt(np.sqrt(low / least))
-            most = (t * self._bound * self._length) ** 2 * (1 - 16 * UNIT)
-        one, other = self._of_inverse(rows, t), _positive(_difference(gram, squares, most))
+            least = (high + self._change) / self._bound
+            t = least * np.sqrt(np.sqrt((low - self._change) / least))
+            largest = (t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT)
+            most = (np.maximum(largest, 0.0) * self._length) ** 2 * (1 - 16 * UNIT)
+        one, other = self._of_inverse(rows, self._with_change(t)), _positive(_difference(gram, squares, most))
         shares = one.shares + np.where(other.holds, 0.0, 1.0)[:, None] * other.shares
         return Attempt(one.holds & other.holds, shares, high > low * self._bound * (1 + WRONG))
 
-    def _of_inverse(self, rows: BallSlopes, t: FloatArray) -> Attempt:
-        """Try to show that the smallest singular value is at least t (B,)."""
+    def _with_change(self, t: FloatArray | float) -> FloatArray | float:
+        """Return the smallest singular value of the exact machine that one of t in all others needs."""
+        return (t + self._change) * (1 + 4 * UNIT) if self._change else t
+
+    def _of_inverse(self, rows: BallSlopes, t: FloatArray | float) -> Attempt:
+        """Try to show that the smallest singular value is at least t, one number or (B,)."""
         found = inverse_rows(rows)
         scale = np.array([1.0, 1.0, 1.0, *[self._length] * 3])[:, None]
         with np.errstate(all="ignore"):
@@ -86,7 +97,7 @@ class SingularClaim:
             moved = np.abs(found.T * scale[..., None]).sum(axis=(1, 2))
             shares = moved + found.shares * rest.sum(axis=(1, 2))[:, None]
             at_centre = np.linalg.norm(np.nan_to_num(found.P0 * scale), 2, axis=(1, 2))
-            is_wrong = found.known & (at_centre * t > 1 + WRONG)
+            is_wrong = found.known & (at_centre * (t - self._change) > 1 + WRONG)
         return Attempt(np.asarray(holds), shares, np.asarray(is_wrong))
 
 

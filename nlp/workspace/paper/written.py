@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ....models.joints.closedform import closed_form
+from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...certificate.paper.proof import fingerprint
 from ..machine import Legs, legs_of
 from ..posed import posed_layout
 from ..verdict import Outcome
+from ..claims import asked_name, exact_length_name, one_machine_name
 from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
@@ -21,11 +23,11 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
-#: Reason of every claim about a case with a tolerance for joint centres.
-_AS_BUILT = "it is about every machine within the tolerance of joint centres, and proofs are about the exact machine"
 #: Reasons of claims about other robots than six straight legs.
+_AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
 _NO_RULES = "claims of this kind have no proof on paper"
 _CLOSED = "it was bounded with passive joints in closed form, which the checker of proofs does not know"
+_NO_BOUND = "its search has no bound"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
@@ -44,13 +46,14 @@ def paper_of(
     legs = legs_of(judged.case)
     layout = posed_layout(judged.case, judged.workspace)
     # Of numbers of one name the first counts, and of strokes, which come later, that over all poses.
-    last = {(each.name, each.sense.value): each for each in judged.extremes}
-    first = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
+    keys = [_key(judged, each) for each in judged.extremes]
+    last = dict(zip(keys, judged.extremes, strict=True))
+    first = dict(zip(reversed(keys), reversed(judged.extremes), strict=True))
     proved: dict[tuple[str, str], PaperClaim] = {}
     unproved = []
     expected = expected_claims(judged.case, layout, legs, quantities, leg_error)
     for each in expected:
-        if judged.case.joint_centre_tolerance:
+        if judged.case.joint_centre_tolerance and legs is None:
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
             continue
         if each.kind == "number" and legs is None and closed_form(judged.case.model).reaches:
@@ -58,14 +61,15 @@ def paper_of(
             continue
         extremes = first if each.kind == "number" else last
         found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
+        if each.kind == "error" and not _has_lengths(judged, record, proved):
+            found = _NO_LENGTHS
         if isinstance(found, PaperClaim):
             proved[each.key] = found
         else:
             unproved.append(Unproved(each.name, each.sense, found))
     known = {each.key for each in expected}
     names = [] if judged.constraints is None else [("constraints regular", "")]
-    names += [(each.name, each.sense.value) for each in judged.extremes]
-    unproved += [Unproved(*key, _NO_RULES) for key in names if key not in known]
+    unproved += [Unproved(*key, _NO_RULES) for key in (*names, *keys) if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
     missing = [each for each in ERRORS if (each, "max") not in proved]
     if len(missing) == 1:
@@ -81,6 +85,8 @@ def paper_of(
         leg_error=leg_error,
         claims=tuple(proved.values()),
         unproved=tuple(unproved),
+        tolerance=judged.case.joint_centre_tolerance or 0.0,
+        lemmas=tuple(_lemmas(judged, record, proved)),
     )
 
 
@@ -89,15 +95,45 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
+def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
+    """Return the name in proofs, and the sense, of an extreme."""
+    spectral = each.name in (SmallestSingularValue.key, ConditionNumber.key) and not each.key
+    return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
+
+
+def _lemmas(
+    judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]
+) -> Iterator[PaperClaim]:
+    """Yield the claims that those about every machine rest on."""
+    keys = [(exact_length_name(leg.name), "min") for leg in judged.case.model.legs]
+    machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]
+    keys += [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
+    for key in keys:
+        program = record.programs.get(key)
+        if program is not None and program.tree is not None:
+            yield PaperClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
+
+
+def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]) -> bool:
+    """Return whether the shortest lengths of the exact machine's legs have proofs."""
+    names = [leg.name for leg in judged.case.model.legs]
+    if judged.case.joint_centre_tolerance:
+        return all((exact_length_name(name), "min") in record.programs for name in names)
+    return all((f"leg_length limb {name}", "min") in proved for name in names)
+
+
 def _regular(judged: Judgement, record: PaperRecord) -> PaperClaim | str:
     """Return the claim that J has full rank with its proof, or why there is none."""
-    found = judged.regularity
-    if legs_of(judged.case) is None:
+    found, legs = judged.regularity, legs_of(judged.case)
+    if legs is None:
         return "proofs of regular poses are written for robots with six straight legs"
     if found.outcome is Outcome.PROVED:
         return PaperClaim("regular", "", "regular", tree=record.rank.tree())
     if found.outcome is Outcome.REFUTED and found.sides is not None:
         return PaperClaim("regular", "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+    if found.outcome is Outcome.REFUTED and found.errors is not None and found.y is not None:
+        machine = found.errors.applied(legs)
+        return PaperClaim("regular", "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
 
 
@@ -116,32 +152,35 @@ def _number(
     if each.kind == "number":
         return _program(each, record)
     if each.kind in ("stroke", "dead length"):
+        directions = record.directions.get(one_machine_name(each.name))
+        if directions is not None:
+            sides = tuple(tuple(each.tolist()) for each in directions)
+            return PaperClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
         leg = each.name.partition(" ")[2].removeprefix("limb ")
         missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
         return _NO_LENGTHS if missing else PaperClaim(each.name, each.sense, "lengths", found.bound)
-    return _boxes(each, found.bound, record, proved)
+    return _boxes(each, found.bound, record)
 
 
 def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
     """Return a claim with a tree of the search of ``certify``, or why there is none."""
     program = record.programs.get(each.key)
     if program is None or program.tree is None:
-        return "its search has no bound"
+        return _NO_BOUND
     return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
 
 
-def _boxes(
-    each: ExpectedClaim, reached: float, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]
-) -> PaperClaim | str:
+def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> PaperClaim | str:
     """Return a claim with a tree of a search of its own, or why there is none."""
     if each.name not in record.boxes:
         return "its search was not recorded"
     if each.kind == "error":
-        if not any(name.startswith("leg_length limb ") and sense == "min" for name, sense in proved):
-            return _NO_LENGTHS
         bound = record.firsts[each.name] * (1 + _OUTWARDS)
     else:
-        limit = math.inf if each.limit is None else each.limit
+        sign = 1.0 if each.sense == "max" else -1.0
         # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
-        bound = max(limit, reached) if each.sense == "max" else min(limit, reached)
+        limit = reached + sign * _OUTWARDS * abs(reached) if each.limit is None else each.limit
+        bound = sign * max(sign * limit, sign * reached)
+        if not math.isfinite(bound):
+            return _NO_BOUND
     return PaperClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())

@@ -1,0 +1,165 @@
+"""Claims about numbers of every machine within a tolerance: which there are, and the rule of each."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from .....models import matrix_from_axis_angle
+from ....case.limits.actuator_rate import ActuatorRate
+from ....case.limits.constraint import BoundedConstraint
+from ....case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
+from ....case.limits.limit import PosedRobot
+from ....case.limits.plates import Footprint, JointSpacing, RadiusRatio
+from ....case.limits.rate_share import RateShare
+from ....case.limits.relation import Relations
+from ....case.task import Sense
+from ....certificate.paper.proof import ProofError
+from ....program.layout import Layout
+from ...claims import Claim, claims_of_items
+from .rules import Machines, TaskRates, angle, minus_cosine, radius_ratio, task_rates
+
+#: Limits on numbers that change with the pose: where those of two legs are the same number of the exact machine, they
+#: differ for others.
+_CHANGING = (JointAngle, RateShare, ActuatorRate)
+
+
+class BuiltNumber(NamedTuple):
+    """A number over all machines.
+
+    Attributes:
+        expression: (1, 1) bound of the number over the machines, in the terms of a program.
+        allowance: further change of the number as people read it, not negative.
+        least, most: ends of what the number can be.
+    """
+
+    expression: SX
+    allowance: float = 0.0
+    least: float = -math.inf
+    most: float = math.inf
+
+
+def with_further(layout: Layout, claims: Sequence[Claim]) -> list[Claim]:
+    """Return the claims about a case, with those that other machines than the exact one need.
+
+    Args:
+        layout: the case as symbols of the pose.
+        claims: about the exact machine, of whose limits with the same number one stands for all.
+    """
+    known = {each.name for each in claims if each.key}
+    items = [item for item, _, _ in _changing(layout) if item.constraint.name not in known]
+    place = next((k for k, each in enumerate(claims) if not each.key or each.leg is not None), len(claims))
+    return [*claims[:place], *claims_of_items(items), *claims[place:]]
+
+
+class _Changing(NamedTuple):
+    """A limit's constraint on a leg; for rates, in a task."""
+
+    item: BoundedConstraint
+    limit: JointAngle | RateShare | ActuatorRate
+    place: tuple[int, int]
+
+
+def _changing(layout: Layout) -> Iterator[_Changing]:
+    """Yield the constraints of limits on numbers that change with the pose."""
+    case, robot = layout.case, layout.robots[0]
+    posed = PosedRobot(case.model, robot, tuple(task.name for task in case.tasks))
+    names = [leg.name for leg in robot.legs]
+    for limit in case.limits:
+        if not isinstance(limit, _CHANGING):
+            continue
+        # Constraints on angles are one for each leg, those on rates for each limb, and for each task of it.
+        tasks = 1 if isinstance(limit, JointAngle) else len(case.tasks)
+        order = names if isinstance(limit, JointAngle) else list(case.model.limbs)
+        places = [(names.index(name), j) for name, j in itertools.product(order, range(tasks))]
+        for item, place in zip(limit.at_pose(posed), places, strict=True):
+            yield _Changing(item, limit, place)
+
+
+class BuiltNumbers:
+    """The numbers of a case over all machines.
+
+    Args:
+        layout: the case as symbols of the pose.
+        machines: the machines.
+    """
+
+    def __init__(self, layout: Layout, machines: Machines) -> None:
+        self._machines, self._layout = machines, layout
+        robot, case = layout.robots[0], layout.case
+        self._names = [leg.name for leg in robot.legs]
+        self._rates: list[TaskRates] = [
+            task_rates(machines, [float(part) for part in task.twist], j) for j, task in enumerate(case.tasks)
+        ]
+        self._rules: dict[str, Callable[[float], BuiltNumber]] = {
+            each.item.constraint.name: partial(self._limited, each.limit, *each.place) for each in _changing(layout)
+        }
+
+    def of(self, claim: Claim) -> BuiltNumber:
+        """Return the number of a claim.
+
+        Raises:
+            ProofError: it has no rule.
+        """
+        sign, t = 1.0 if claim.sense is Sense.MAX else -1.0, self._machines.legs.tolerance
+        owner = claim.name.partition(" limb ")[2]
+        if claim.key and claim.name in self._rules:
+            return self._rules[claim.name](sign)
+        # Limits on the joint centres of plates, and relations, have keys that begin with the limit's own.
+        limit = claim.key.partition(".")[0].partition("[")[0]
+        if limit == JointSpacing.key:
+            return BuiltNumber(claim.expression, 2 * t, least=0.0)
+        if limit == Footprint.key:
+            return BuiltNumber(claim.expression, t)
+        if limit == RadiusRatio.key:
+            return BuiltNumber(radius_ratio(self._machines, sign), least=0.0)
+        if limit == Relations.key:
+            # About the numbers of the case, which no machine changes.
+            return BuiltNumber(claim.expression)
+        if claim.leg is not None:
+            return BuiltNumber(claim.expression, 2 * t, least=0.0)
+        if claim.task is not None:
+            return BuiltNumber(self._rates[claim.task].total(sign), least=0.0)
+        if claim.quantity in (BaseJointAngle.key, "platform_joint_angle") and owner in self._names:
+            normal = SX([0, 0, 1])
+            axis = normal if claim.quantity == BaseJointAngle.key else self._machines.robot.rotation @ normal
+            return _angle(angle(self._machines, self._names.index(owner), axis, sign))
+        raise ProofError("this number has no rule for errors of joint centres")
+
+    def _limited(
+        self, limit: JointAngle | RateShare | ActuatorRate, leg: int, task: int, sign: float  # noqa: ARG002 - one side
+    ) -> BuiltNumber:
+        """Return the number of a limit that changes with the pose."""
+        if isinstance(limit, JointAngle):
+            return _angle(minus_cosine(self._machines, leg, self._axis(limit, leg)))
+        if isinstance(limit, RateShare):
+            return BuiltNumber(self._rates[task].share(leg), least=0.0, most=1.0)
+        return BuiltNumber(self._rates[task].square(leg), least=0.0)
+
+    def _axis(self, limit: JointAngle, leg: int) -> SX:
+        """Return the unit mounting axis (3, 1) of a joint in the world: joints are mounted as in the design."""
+        legs, robot = self._machines.legs, self._machines.robot
+        is_of_base = isinstance(limit, BaseJointAngle)
+        if limit.about is None:
+            axis = SX([0, 0, 1])
+        elif isinstance(limit.about, MountingPose):
+            home = limit.about
+            about = SX(unit_axes((home.axis,), 1)[0].tolist())
+            rotation = matrix_from_axis_angle(about, SX(home.angle))
+            span = SX(list(home.position)) + rotation @ SX(legs.platform[leg].tolist()) - SX(legs.base[leg].tolist())
+            axis = span / ca.norm_2(span)
+            axis = axis if is_of_base else rotation.T @ axis
+        else:
+            axis = SX(unit_axes(limit.about, len(self._names))[leg].tolist())
+        return axis if is_of_base else robot.rotation @ axis
+
+
+def _angle(expression: SX) -> BuiltNumber:
+    """Return an angle, which is between 0 and half a turn."""
+    return BuiltNumber(expression, least=0.0, most=math.pi)
