@@ -69,6 +69,7 @@ def verify_paper(proof: PaperProof, case: Case) -> None:
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
+    from ...models import Dimension
     from ..certificate.paper.proof import ProofError
     from ..errors import one_line
     from ..workspace.paper.check import check_paper
@@ -79,7 +80,13 @@ def verify_paper(proof: PaperProof, case: Case) -> None:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
     count = len(checked.claims) + len(checked.unproved)
-    typer.echo(f"holds: {len(checked.claims)} of {count} claims about the workspace of {one_line(case.name)}")
+    whose = ""
+    if proof.tolerance:
+        off = (
+            f"{case.units.shown(proof.tolerance, Dimension.LENGTH):.10g} {case.units.label(Dimension.LENGTH)}".rstrip()
+        )
+        whose = f", for every machine whose joint centres are off by at most {off}"
+    typer.echo(f"holds: {len(checked.claims)} of {count} claims about the workspace of {one_line(case.name)}{whose}")
     for each in checked.claims:
         typer.echo(f"  {one_line(each.name)}: {_words(each, case)}")
     _echo_unproved(checked.unproved, err=False)
@@ -88,6 +95,8 @@ def verify_paper(proof: PaperProof, case: Case) -> None:
 
 def _words(claim: CheckedClaim, case: Case) -> str:
     """Return what is shown of a claim."""
+    if claim.by_machine:
+        return "refuted, at the pose given J is singular for a machine within the tolerance"
     if claim.is_refuted:
         return "refuted, J is singular at a pose between the two given"
     if claim.bound is None:

@@ -13,9 +13,9 @@ from ...case.limits.singular_values import ConditionNumber, SmallestSingularValu
 from ...case.task import Sense
 from ...errors import UncoveredError
 from ..built.builtclaims import NO_LEGS
+from ..claims import asked_name
 from ..general.problem import NotJudgedError, build_problem
 from ..general.spectrum import Spectrum
-from ..claims import asked_name
 from ..machine import legs_of
 from ..posebox import PoseBox
 from ..verdict import Outcome

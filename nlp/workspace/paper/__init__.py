@@ -4,8 +4,9 @@ The modules import each other in this order, and who checks a proof imports noth
 
 * both sides: ``document`` (a proof as JSON), ``tree`` (boxes as bytes) and ``expected`` (claims that it must name);
 * the search: ``record`` (trees of searches) and ``written`` (the document of a judgement);
+* about every machine within a tolerance: ``built``, whose ``statement`` both sides have;
 * the check: ``exactly`` (fractions), ``poseroot`` (the box of coordinates), ``ballslopes`` (arithmetic), ``ballrows``
   (rows of legs), ``pieces`` (bisection), ``positive`` (positive definite matrices), ``rankclaim`` and
   ``clearanceclaim`` (claims about boxes), ``inverserows`` (the inverse of the rows), ``singularclaim`` and
-  ``errorclaim`` (claims that need it), and ``check``.
+  ``errorclaim`` (claims that need it), ``comparing`` (with the case), and ``check``.
 """

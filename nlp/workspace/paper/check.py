@@ -21,11 +21,12 @@ from ...certificate.paper.proof import Proof, ProofError, Statement
 from ...certificate.paper.proofcheck import check_proof
 from ...errors import ScrewsynthError
 from ...program.layout import Layout
-from ..machine import Legs, legs_of, workspace_of_case
+from ..machine import legs_of, workspace_of_case
 from ..posed import extreme_program, posed_layout
 from .ballrows import Joints
 from .built.built import Built
 from .clearanceclaim import ClearanceClaim
+from .comparing import compare_legs, keep_limit
 from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
 from .errorclaim import ErrorClaim, whole_errors
 from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
@@ -35,10 +36,6 @@ from .rankclaim import RankClaim
 from .singularclaim import SingularClaim
 from .tree import read_leaves
 
-#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
-_ON_LIMIT = 1e-9
-#: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
-_SAME = 1e-9
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
 #: Reason that each kind of claim must have.
@@ -60,7 +57,8 @@ class CheckedClaim:
         name, sense: of the claim.
         bound: proven bound of the number as it reads in results, radians for angles; None without a number.
         limit: limit of the case that it keeps, read in the same way; None without one.
-        is_refuted: whether the opposite is shown: a singular pose, of the exact machine or of one within the tolerance.
+        is_refuted: whether the opposite is shown: a singular pose.
+        by_machine: whether that is a pose of another machine within the tolerance.
         dimension: of the number.
     """
 
@@ -70,6 +68,7 @@ class CheckedClaim:
     bound: float | None = None
     limit: float | None = None
     is_refuted: bool = False
+    by_machine: bool = False
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ class _Checker:
         if workspace_numbers(workspace) != proof.workspace:
             raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
-        _compare_legs(self._legs, proof)
+        compare_legs(self._legs, proof)
         self._layout: Layout = posed_layout(case, workspace)
         self._root: PoseRoot = pose_root(workspace)
         self._tolerance = case.joint_centre_tolerance or 0.0
@@ -174,10 +173,8 @@ class _Checker:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         if self._tolerance and self._built is None:
             raise ProofError("errors of joint centres are covered for six straight legs alone")
-        if given.reason == "singular machine":
-            return self._check_machine(each, given)
-        if given.reason == "singular":
-            return self._check_sides(each, given)
+        if given.reason in ("singular", "singular machine"):
+            return self._check_sides(each, given) if given.reason == "singular" else self._check_machine(each, given)
         if each.kind == "regular":
             self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
             return CheckedClaim(each.name, each.sense)
@@ -190,7 +187,7 @@ class _Checker:
         if each.kind == "error":
             return self._check_error(each, given)
         bound = float(given.bound)
-        _keep_limit(each, bound)
+        keep_limit(each, bound)
         claim: BoxClaim
         if each.kind == "clearance":
             # Two legs that are moved towards each other are nearer by twice the tolerance.
@@ -241,7 +238,7 @@ class _Checker:
         if self._built is None:
             raise ProofError("the claim is about the exact machine")
         self._built.refuse_unless_singular(self._root, given.sides)
-        return CheckedClaim(each.name, each.sense, is_refuted=True)
+        return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
 
     def _bound_of(self, expression: SX, sense: Sense, given: PaperClaim) -> float:
         """Return the bound of an expression that a tree of ``certify`` proves."""
@@ -266,7 +263,7 @@ class _Checker:
             number = self._built.number(claim)
             bound = self._bound_of(number.expression, claim.sense, given)
             shown, value = self._built.shown(claim, number, bound)
-        _keep_limit(each, value)
+        keep_limit(each, value)
         self._bounds[each.key] = bound
         limit = None if claim.limit is None else read(claim.limit)
         return CheckedClaim(each.name, each.sense, claim.reading.dimension, shown, limit)
@@ -296,7 +293,7 @@ class _Checker:
             long = self._length(name, "max") + 2 * self._tolerance
             off = 8 * _ROUNDING * long
             bound = long - short + off if is_stroke else 2 * short - long - off
-        _keep_limit(each, bound)
+        keep_limit(each, bound)
         return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
 
     def _check_error(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
@@ -315,33 +312,3 @@ class _Checker:
         if not math.isfinite(whole):
             raise ProofError("the errors are too large for a bound of their part of second order")
         return CheckedClaim(each.name, each.sense, Dimension.ANGLE if is_rotation else Dimension.LENGTH, whole)
-
-
-def _compare_legs(legs: Legs | None, proof: PaperProof) -> None:
-    """Refuse a proof for other joint centres.
-
-    Raises:
-        ProofError: it is one.
-    """
-    numbers = [] if legs is None else [*legs.base.tolist(), *legs.platform.tolist()]
-    given = [list(each) for each in proof.legs]
-    same = len(numbers) == len(given) and all(len(each) == 3 for each in given)
-    if same and numbers:
-        size = float(np.abs(numbers).max())
-        same = bool(np.allclose(given, numbers, rtol=0.0, atol=_SAME * size))
-    if not same:
-        raise ProofError("the proof is for other joint centres than this case's")
-
-
-def _keep_limit(each: ExpectedClaim, bound: float) -> None:
-    """Refuse a bound beyond the limit of the case.
-
-    Raises:
-        ProofError: it is beyond.
-    """
-    if each.limit is None:
-        return
-    sign = 1.0 if each.sense == Sense.MAX.value else -1.0
-    slack = _ON_LIMIT * max(abs(each.limit), abs(bound))
-    if not sign * (bound - each.limit) <= slack:
-        raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {each.limit:.10g}")

@@ -99,7 +99,7 @@ class PaperProof:
         leg_error: largest error of a leg's length.
         claims: the claims that are proved.
         unproved: the others.
-        tolerance: largest error of each joint centre in the machines that the claims are about; 0 for the exact machine.
+        tolerance: largest error of each joint centre in the machines that the claims are about; 0 for the exact one.
         lemmas: claims that others rest on.
     """
 

@@ -155,15 +155,17 @@ class PaperRecord:
         self._keep(claim, ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree))
 
     def program(self, claim: Claim, found: Certificate, writer: ProofWriter, *, again: bool = False) -> None:
-        """Record a search of a number, or a finer one again."""
+        """Record a search of a number, or a finer one again, of which the better one is kept."""
         has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(
             found.bound
         )
         tree = writer.tree(with_open=True) if has_bound else None
         bound = -found.nlp.sign * found.bound
         record = ProgramRecord(found.nlp, bound, tree)
-        if again:
-            self.programs[claim.name, claim.sense.value] = record
+        key = claim.name, claim.sense.value
+        before = self.programs.get(key)
+        if again and (before is None or before.tree is None or (tree is not None and bound <= before.bound)):
+            self.programs[key] = record
         else:
             self._keep(claim, record)
 

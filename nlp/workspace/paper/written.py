@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from ....models.joints.closedform import closed_form
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...certificate.paper.proof import fingerprint
+from ..claims import asked_name, exact_length_name, one_machine_name
 from ..machine import Legs, legs_of
 from ..posed import posed_layout
 from ..verdict import Outcome
-from ..claims import asked_name, exact_length_name, one_machine_name
 from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
@@ -101,9 +101,7 @@ def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
     return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
 
 
-def _lemmas(
-    judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]
-) -> Iterator[PaperClaim]:
+def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]) -> Iterator[PaperClaim]:
     """Yield the claims that those about every machine rest on."""
     keys = [(exact_length_name(leg.name), "min") for leg in judged.case.model.legs]
     machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]

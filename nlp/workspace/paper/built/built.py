@@ -159,7 +159,8 @@ class Built:
                 raise ProofError("a joint centre of the machine is off by more than the tolerance")
         y = numbers[0].tolist()
         signs = [
-            determinant_sign(root.kind, root.axis.tolist(), joints[:LEGS], joints[LEGS:], y) for joints in (exact, moved)
+            determinant_sign(root.kind, root.axis.tolist(), joints[:LEGS], joints[LEGS:], y)
+            for joints in (exact, moved)
         ]
         if signs[0] * signs[1] > 0:
             raise ProofError("the determinant has the same sign for both machines")

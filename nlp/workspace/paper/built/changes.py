@@ -38,7 +38,7 @@ def _most(numbers: BallSlopes) -> FloatArray:
 def change_of_jacobian(joints: Joints, tolerance: float, length: float, shortest: float) -> float:
     """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
 
-    The unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its moment by ``|a| h + t``, over the length.
+    The unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its moment by ``|a| h + t``.
 
     Args:
         joints: joint centres of the exact machine.

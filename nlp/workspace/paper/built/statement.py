@@ -9,12 +9,13 @@ from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from .....models import matrix_from_axis_angle
 from ....case.limits.actuator_rate import ActuatorRate
 from ....case.limits.constraint import BoundedConstraint
-from ....case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
+from ....case.limits.joints import BaseJointAngle, JointAngle, MountingPose, PlatformJointAngle, unit_axes
 from ....case.limits.limit import PosedRobot
 from ....case.limits.plates import Footprint, JointSpacing, RadiusRatio
 from ....case.limits.rate_share import RateShare
@@ -95,7 +96,8 @@ class BuiltNumbers:
         robot, case = layout.robots[0], layout.case
         self._names = [leg.name for leg in robot.legs]
         self._rates: list[TaskRates] = [
-            task_rates(machines, [float(part) for part in task.twist], j) for j, task in enumerate(case.tasks)
+            task_rates(machines, [float(part) for part in np.asarray(task.twist)], j)
+            for j, task in enumerate(case.tasks)
         ]
         self._rules: dict[str, Callable[[float], BuiltNumber]] = {
             each.item.constraint.name: partial(self._limited, each.limit, *each.place) for each in _changing(layout)
@@ -107,33 +109,44 @@ class BuiltNumbers:
         Raises:
             ProofError: it has no rule.
         """
-        sign, t = 1.0 if claim.sense is Sense.MAX else -1.0, self._machines.legs.tolerance
-        owner = claim.name.partition(" limb ")[2]
+        sign = 1.0 if claim.sense is Sense.MAX else -1.0
         if claim.key and claim.name in self._rules:
             return self._rules[claim.name](sign)
-        # Limits on the joint centres of plates, and relations, have keys that begin with the limit's own.
-        limit = claim.key.partition(".")[0].partition("[")[0]
-        if limit == JointSpacing.key:
-            return BuiltNumber(claim.expression, 2 * t, least=0.0)
-        if limit == Footprint.key:
-            return BuiltNumber(claim.expression, t)
-        if limit == RadiusRatio.key:
-            return BuiltNumber(radius_ratio(self._machines, sign), least=0.0)
-        if limit == Relations.key:
+        found = self._of_plates(claim, sign) or self._of_pose(claim, sign)
+        if found is None:
+            raise ProofError("this number has no rule for errors of joint centres")
+        return found
+
+    def _of_plates(self, claim: Claim, sign: float) -> BuiltNumber | None:
+        """Return the number of a limit on plates, or of a relation, that no pose changes; None for another."""
+        expression, t = claim.expression, self._machines.legs.tolerance
+        numbers = {
+            JointSpacing.key: BuiltNumber(expression, 2 * t, least=0.0),
+            Footprint.key: BuiltNumber(expression, t),
+            RadiusRatio.key: BuiltNumber(radius_ratio(self._machines, sign), least=0.0),
             # About the numbers of the case, which no machine changes.
-            return BuiltNumber(claim.expression)
+            Relations.key: BuiltNumber(expression),
+        }
+        return numbers.get(claim.key.partition(".")[0].partition("[")[0])
+
+    def _of_pose(self, claim: Claim, sign: float) -> BuiltNumber | None:
+        """Return a length of a leg, F, or a measure that is asked for; None for another."""
         if claim.leg is not None:
-            return BuiltNumber(claim.expression, 2 * t, least=0.0)
+            return BuiltNumber(claim.expression, 2 * self._machines.legs.tolerance, least=0.0)
         if claim.task is not None:
             return BuiltNumber(self._rates[claim.task].total(sign), least=0.0)
-        if claim.quantity in (BaseJointAngle.key, "platform_joint_angle") and owner in self._names:
-            normal = SX([0, 0, 1])
-            axis = normal if claim.quantity == BaseJointAngle.key else self._machines.robot.rotation @ normal
-            return _angle(angle(self._machines, self._names.index(owner), axis, sign))
-        raise ProofError("this number has no rule for errors of joint centres")
+        owner, normal = claim.name.partition(" limb ")[2], SX([0, 0, 1])
+        axes = {BaseJointAngle.key: normal, PlatformJointAngle.key: self._machines.robot.rotation @ normal}
+        if claim.quantity not in axes or owner not in self._names:
+            return None
+        return _angle(angle(self._machines, self._names.index(owner), axes[claim.quantity], sign))
 
     def _limited(
-        self, limit: JointAngle | RateShare | ActuatorRate, leg: int, task: int, sign: float  # noqa: ARG002 - one side
+        self,
+        limit: JointAngle | RateShare | ActuatorRate,
+        leg: int,
+        task: int,
+        sign: float,  # noqa: ARG002 - one side
     ) -> BuiltNumber:
         """Return the number of a limit that changes with the pose."""
         if isinstance(limit, JointAngle):

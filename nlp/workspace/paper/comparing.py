@@ -1,0 +1,46 @@
+"""Comparison of a proof with its case: joint centres, and limits that a bound must keep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...case.task import Sense
+from ...certificate.paper.proof import ProofError
+from ..machine import Legs
+from .document import PaperProof
+from .expected import ExpectedClaim
+
+#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
+_ON_LIMIT = 1e-9
+#: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
+_SAME = 1e-9
+
+
+def compare_legs(legs: Legs | None, proof: PaperProof) -> None:
+    """Refuse a proof for other joint centres.
+
+    Raises:
+        ProofError: it is one.
+    """
+    numbers = [] if legs is None else [*legs.base.tolist(), *legs.platform.tolist()]
+    given = [list(each) for each in proof.legs]
+    same = len(numbers) == len(given) and all(len(each) == 3 for each in given)
+    if same and numbers:
+        size = float(np.abs(numbers).max())
+        same = bool(np.allclose(given, numbers, rtol=0.0, atol=_SAME * size))
+    if not same:
+        raise ProofError("the proof is for other joint centres than this case's")
+
+
+def keep_limit(each: ExpectedClaim, bound: float) -> None:
+    """Refuse a bound beyond the limit of the case.
+
+    Raises:
+        ProofError: it is beyond.
+    """
+    if each.limit is None:
+        return
+    sign = 1.0 if each.sense == Sense.MAX.value else -1.0
+    slack = _ON_LIMIT * max(abs(each.limit), abs(bound))
+    if not sign * (bound - each.limit) <= slack:
+        raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {each.limit:.10g}")
