@@ -524,11 +524,3 @@ def test_the_shipped_workspace_is_accepted(cli: Run, tmp_path: Path) -> None:
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
     assert out.startswith("holds: 57 of 57 claims")
-
-
-def test_machines_within_a_tolerance_have_no_proof(judged: tuple[Judgement, PaperRecord]) -> None:
-    """The claims are then about other machines too, of which the checker knows nothing."""
-    text = TEXT + "[tolerance]\njoint_centre = 0.002\n"
-    proof = paper_of(replace(judged[0], case=case_of(text)), judged[1], text)
-    assert not proof.claims
-    assert all("tolerance" in each.reason for each in proof.unproved)
