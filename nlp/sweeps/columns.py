@@ -107,4 +107,4 @@ def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
         notes: of the rows.
     """
     notice = stated_pose_notice(case)
-    return notice if notice in notes else None
+    return notice if notice is not None and notice in notes else None
