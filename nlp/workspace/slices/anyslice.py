@@ -126,8 +126,10 @@ class AnySlices:
             near = grid[at[:, 0], at[:, 1]]
             use = ~cells.is_known & np.isfinite(near).all(axis=1)
             left = cells._replace(near=np.where(use[:, None], near, cells.near)), *left[1:]
+            # Where the loops are closed at no point of the grid in and around a box, none of its parts is tried.
+            is_empty = ~cells.is_known & ~self._has_point(grid, cells, places, lower, upper)
             blocks = [slice(begin, begin + _BLOCK) for begin in range(0, len(centre), _BLOCK)]
-            parts = [self._examine(*_some(left, each), first, places, upper - lower) for each in blocks]
+            parts = [self._examine(*_some(left, each), is_empty[each], first, places, upper - lower) for each in blocks]
             done += [_of(each, each.is_done) for each in parts]
             left = _next([_of(each, ~each.is_done) for each in parts], places, list(problem.independent), problem.size)
         return Covered(self._cover(done, places, (lower, upper)), limits.limits, limits.uncovered)
@@ -137,11 +139,12 @@ class AnySlices:
         cells: Cells,
         known: NDArray[np.int8],
         is_regular: NDArray[np.bool_],
+        is_empty: NDArray[np.bool_],
         first: FirstViolated,
         places: list[int],
         width: FloatArray,
     ) -> _Boxes:
-        """Examine boxes, which are known to be regular already or not."""
+        """Examine boxes, which are known to be regular already or not, and may have no closed loops."""
         count, k = len(cells.lower), len(self._dependent)
         cells, is_regular = self._with_ranks(cells, is_regular)
         relation = Relation(np.zeros((count, k)), np.zeros((count, k, len(self.free))), np.full((count, k), np.inf))
@@ -161,7 +164,7 @@ class AnySlices:
         region[is_regular] = _REGIONS.index(Region.REGULAR)
         region[unreached] = _REGIONS.index(Region.UNREACHED)
         binding[~reached] = UNDECIDED
-        is_done = (is_regular & is_same) | unreached | small
+        is_done = (is_regular & is_same) | unreached | small | (is_empty & ~cells.is_known)
         return _Boxes(cells, states, is_regular, region.astype(np.int8), binding, is_done, relation)
 
     def _with_ranks(self, cells: Cells, is_regular: NDArray[np.bool_]) -> tuple[Cells, NDArray[np.bool_]]:
@@ -204,6 +207,18 @@ class AnySlices:
             z[known] = loops.all_closed(z[known].T, dependent).T
             grid[at[:, 0], at[:, 1]] = np.where(known[:, None], z, np.nan)
         return grid
+
+    def _has_point(
+        self, grid: FloatArray, cells: Cells, places: list[int], lower: FloatArray, upper: FloatArray
+    ) -> NDArray[np.bool_]:
+        """Return whether loops are closed at a point of the grid in or beside each box (B,)."""
+        total = np.zeros((POINTS + 1, POINTS + 1))
+        total[1:, 1:] = np.isfinite(grid).all(axis=-1).cumsum(axis=0).cumsum(axis=1)
+        low, high = ((each[:, places] - lower) / (upper - lower) * (POINTS - 1) for each in (cells.lower, cells.upper))
+        begin = np.clip(np.floor(low), 0, POINTS - 1).astype(np.intp)
+        end = np.clip(np.ceil(high), 0, POINTS - 1).astype(np.intp) + 1
+        found = total[end[:, 0], end[:, 1]] - total[begin[:, 0], end[:, 1]]
+        return np.asarray(found - total[end[:, 0], begin[:, 1]] + total[begin[:, 0], begin[:, 1]] > 0)
 
     def _cover(self, done: list[_Boxes], places: list[int], ends: tuple[FloatArray, FloatArray]) -> Cover:
         """Return the boxes of a slice that are decided, those of other assemblies as not known."""
