@@ -34,6 +34,8 @@ _TESTS = 4
 #: Smallest derivative of an equation, of order 1, by its unknown at home: below, home is on the edge of reach.
 _EDGE = 1e-9
 _SEED = 0
+#: Part of the squared sine or cosine of a reach below which an extended square root is continued by its tangent.
+_EXTENDED = 1e-4
 
 
 class Reach(NamedTuple):
@@ -71,8 +73,14 @@ class _Solved(NamedTuple):
     reach: SX
 
 
-def closed_form(model: Model) -> ClosedForm:
-    """Return a robot without those of its unknowns that follow from dimensions and pose in closed form."""
+def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
+    """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
+
+    Args:
+        model: the robot.
+        extended: whether the expressions have values out of reach too, for searches that pass through it: the square
+            root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
+    """
     symbols = [item.symbol for item in model.unknowns]
     found: dict[int, _Solved] = {}
     dropped: set[int] = set()
@@ -81,7 +89,7 @@ def closed_form(model: Model) -> ClosedForm:
         for e, equation in enumerate(model.closure):
             if e in dropped or _depends_on(equation.expression, symbols) != [k]:
                 continue
-            solved = _solved(model, unknown, equation)
+            solved = _solved(model, unknown, equation, extended)
             if solved is not None:
                 found[k] = solved
                 dropped.add(e)
@@ -103,7 +111,7 @@ def _depends_on(expression: SX, symbols: Sequence[SX]) -> list[int]:
     return [k for k, each in enumerate(symbols) if ca.depends_on(expression, each)]
 
 
-def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None:
+def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> _Solved | None:
     """Return an unknown that an equation determines in closed form; None where the equation has another form."""
     q = unknown.symbol
     expression = equation.expression / equation.size
@@ -123,7 +131,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None
         if not _is_same(model, expression, middle + A * ca.cos(q) + B * ca.sin(q)):
             return None
         D, square = -middle, A * A + B * B
-        root = sign * ca.sqrt(square - D * D)
+        root = sign * _root(square - D * D, square, extended)
         cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
         return _Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
     c0, plus, minus = at(0.0), at(1.0), at(-1.0)
@@ -132,7 +140,16 @@ def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None
         return None
     square = c1 * c1 - 4 * c0 * c2
     # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
-    return _Solved((sign * ca.sqrt(square) - c1) / (2 * c2), None, None, square / (2 * c2))
+    return _Solved((sign * _root(square, 2 * c2, extended) - c1) / (2 * c2), None, None, square / (2 * c2))
+
+
+def _root(value: SX, size: SX, extended: bool) -> SX:
+    """Return the square root of a number, where wanted along its tangent below a part of a size."""
+    if not extended:
+        return ca.sqrt(value)
+    least = ca.fmax(value, _EXTENDED * size)
+    root = ca.sqrt(least)
+    return root + (value - least) / (2 * root)
 
 
 def _at_turn(expression: SX, q: SX, sine: float, cosine: float) -> SX:

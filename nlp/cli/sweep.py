@@ -209,7 +209,21 @@ def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
         ends += f", {proved:,} are proved"
     if not is_silent:
         typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
+        notice = _notice(found, out)
+        if notice is not None:
+            typer.echo(f"note: {notice}")
     return 0 if values else 1
+
+
+def _notice(found: Sweep, out: str) -> str | None:
+    """Return the notice that limits over a workspace are taken at the stated pose alone; None where they are not."""
+    from ..output.sweeptable import table_rows
+    from ..sweeps.columns import stated_pose_note
+
+    case = found.source.case_at(found.points.settings(0))
+    if case.workspace is None or not case.workspace.has_limits:
+        return None
+    return stated_pose_note(case, [row.note for row in table_rows(out, found)])
 
 
 def _show_progress(before: int, done: int, total: int, seconds: float) -> None:

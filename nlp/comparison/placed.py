@@ -76,7 +76,7 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
         workspace = replace(workspace, position=_moved(workspace.position, offset))
         if workspace.has_limits and not _is_hexapod(model):
             workspace = replace(workspace, has_limits=False)
-            left_out.append(LeftOut("limits.over", "needs a robot with six straight legs"))
+            left_out.append(LeftOut("limits.over", "is compared for robots with six straight legs alone"))
     bare = replace(
         case,
         model=model,

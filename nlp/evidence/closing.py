@@ -42,7 +42,8 @@ def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found
-    for pose, own in enumerate(nlp.program.places.unknowns):
+    # Unknowns at further poses of a workspace have a start of their own.
+    for pose, own in enumerate(nlp.program.places.unknowns[: len(nlp.program.robots)]):
         state = evaluate(nlp, x, pose)
         parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
         place = np.concatenate([state.angle * state.axis, state.position])

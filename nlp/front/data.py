@@ -9,7 +9,7 @@ from ..program.places import Scalar
 from ..results.evidence import certificate_data
 from ..results.front import FrontGoalData, FrontPointData, FrontResult
 from ..results.jsondata import finite_or_none
-from ..results.point import head_data, versions
+from ..results.point import head_data, stated_pose_notice, versions
 from ..results.tradeoffwording import unit_of_objective
 from .front import Front, FrontPoint
 
@@ -22,6 +22,7 @@ def front_result(front: Front) -> FrontResult:
     )
     return FrontResult(
         head=head_data(front.case),
+        notice=stated_pose_notice(front.case),
         front=goals,
         points=tuple(_point(front, each) for each in front.points),
         gaps=front.gaps,

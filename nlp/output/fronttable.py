@@ -11,6 +11,7 @@ from ..front.data import design_places, goal_bounds, goal_units, goal_values
 from ..front.front import Front, FrontPoint
 from ..front.goals import Goal
 from ..program.designnumbers import design_names
+from ..results.point import stated_pose_notice
 from ..results.text import TextTable
 
 _SEPARATOR = "; "
@@ -67,6 +68,8 @@ def front_words(front: Front) -> list[str]:
     if len(front.goals) > 2:
         ends = [(min(column), max(column)) for column in zip(*values, strict=True)]
     lines += [f"{goal.label}: {low:.7g} to {high:.7g}" for goal, (low, high) in zip(front.goals, ends, strict=True)]
+    notice = stated_pose_notice(front.case)
+    lines += [] if notice is None else [notice]
     if front.gaps:
         lines.append(f"pairs of neighbours with a gap between them, in which no point was found: {len(front.gaps)}")
     if front.failed:

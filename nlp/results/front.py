@@ -6,7 +6,7 @@ from ..case.task import Sense
 from ..evidence.optimality import PointKind
 from ..solver.status import Status
 from .data import CertificateData
-from .jsondata import Inline, JsonObject
+from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, VersionsData
 
 
@@ -59,6 +59,8 @@ class FrontResult(JsonObject):
 
     Attributes:
         head: the case.
+        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
+            absent.
         front: the goals.
         points: none of which is better than another in all goals, in the order of the first goal, its best value last.
         gaps: of two goals, indices of the points that no point was found between it and the next.
@@ -68,6 +70,7 @@ class FrontResult(JsonObject):
     """
 
     head: Inline[HeadData]
+    notice: Absent[str]
     front: tuple[FrontGoalData, ...]
     points: tuple[FrontPointData, ...]
     gaps: tuple[int, ...]

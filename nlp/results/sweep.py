@@ -15,6 +15,8 @@ class SweepResult(JsonObject):
 
     Attributes:
         head: the case at the first point.
+        notice: that limits are taken at the stated pose alone, where the case has them over its workspace and the
+            compiled engine solved points; else absent.
         unit: of F; empty where tasks do not agree in it.
         numbers: values of each number that changes, by name.
         statuses: of each solve; "refused" where the case contradicts itself.
@@ -38,6 +40,7 @@ class SweepResult(JsonObject):
     """
 
     head: Inline[HeadData]
+    notice: Absent[str]
     unit: str
     numbers: Mapping[str, Vector]
     statuses: tuple[str, ...]

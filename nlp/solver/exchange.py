@@ -24,7 +24,9 @@ from casadi import SX
 from ...models import FloatArray, RobotInstance, Substitution, instantiate
 from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from ..case.limits.clearance import LegClearance
 from ..case.limits.joints import JointAngle
+from ..case.limits.legs import Actuator
 from ..case.limits.limit import Design, PosedRobot
 from ..case.task import Sense
 from ..errors import CaseError
@@ -32,19 +34,17 @@ from ..interruption import is_requested
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..workspace.judge import Judgement, judge_workspace
-from ..workspace.machine import LEGS, JointErrors
+from ..workspace.machine import has_straight_legs
 from ..workspace.posebox import PoseNumbers, pose_box
 from ..workspace.verdict import Outcome
+from .binding import BindingPose, Distinct, points_around
 from .machines import machine_of, on_plates, with_spans_of
 from .multistart import ProgramSolution
+from .otherclaims import OtherClaims, judge
+from .tighter import TIGHTER, tightened
 
-#: Part of a limit by which it is tighter in the constraints, and gap of the proofs: several of them fit between.
-TIGHTER = 1e-3
+#: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
 _GAP = 2e-4
-#: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
-#: ranges, at which they are compared.
-_ALIKE, _NEARBY = 3e-4, 0.05
-_SEED = 0
 #: Part of the determinant of the rows at the middle of the workspace that is demanded at a singular pose.
 _DETERMINANT = 1e-2
 #: Largest number of exchanges.
@@ -54,22 +54,6 @@ MOST_EXCHANGES = 40
 SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
 #: Called after each exchange with the number of exchanges, F, and the number of claims that are not proved.
 ExchangeProgress = Callable[[int, float, int], None]
-
-
-class BindingPose(NamedTuple):
-    """A pose at which a claim, by its name, is a constraint.
-
-    Attributes:
-        name: of the claim.
-        pose: the pose; of a stroke that of the shortest length.
-        longest: pose of the longest length of a stroke; else None.
-        errors: of the joint centres of the machine that is meant; None for the exact one.
-    """
-
-    name: str
-    pose: PoseNumbers
-    longest: PoseNumbers | None = None
-    errors: JointErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,27 +99,39 @@ def solve_over_workspace(
         progress: called after each exchange.
 
     Raises:
-        CaseError: the case has several tasks or poses, or a robot that is not six straight legs.
+        CaseError: the case has several tasks or poses, or a tolerance on joint centres of a robot that is not six
+            straight legs.
     """
     _check(case)
     bare = formulate(case)
     nlp, binding, history = bare, list[BindingPose](), list[tuple[float, int]]()
+    others = None if has_straight_legs(case.model) else OtherClaims(bare, case)
     first: Judgement | None = None
     found = solve_one(nlp, ())
     while found.status.is_answer:
         design = design_of(case, nlp, found.x)
-        judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, jobs=1, with_objective=False)
+        if others is None:
+            judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, jobs=1, with_objective=False)
+        else:
+            judged = judge(design, gap=_GAP, time_limit=time_limit)
         first = judged if first is None else first
         faults = _faults(judged)
         history.append((found.F, len(faults)))
         if progress is not None:
             progress(len(history), found.F, len(faults))
         fresh = [each for each in faults if each is not None and not _is_known(each, binding)]
+        if others is not None:
+            fresh = others.added(design, fresh, found.x)
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
             return Exchanged(found, WorkspaceProof(judged, tuple(binding), tuple(history), first))
-        binding += _without_images(bare, case, fresh, found.x)
-        nlp = with_binding_poses(bare, case, binding)
-        found = solve_one(nlp, [found.x])
+        if others is None:
+            binding += _without_images(bare, case, fresh, found.x)
+            nlp, point = with_binding_poses(bare, case, binding), found.x
+        else:
+            binding += fresh
+            nlp = others.program
+            point = np.concatenate([found.x, nlp.start[len(found.x) :]])
+        found = solve_one(nlp, [point])
     return Exchanged(found, None)
 
 
@@ -164,16 +160,22 @@ def with_binding_poses(nlp: Nlp, case: Case, binding: Sequence[BindingPose]) -> 
 
 
 def _check(case: Case) -> None:
-    """Refuse a case whose limits cannot hold over a workspace.
+    """Refuse a case whose limits are not judged over a workspace.
 
     Raises:
         CaseError: it is refused.
     """
     if len(case.tasks) > 1 or case.pose_count > 1:
         raise CaseError("limits.over", "needs a case with one task and one stated pose", "workspace", case.source)
-    model = case.model
-    if len(model.legs) != LEGS or len(model.wrenches) != LEGS or model.unknowns:
-        raise CaseError("limits.over", "needs a robot with six straight legs", "workspace", case.source)
+    if has_straight_legs(case.model):
+        return
+    if case.joint_centre_tolerance:
+        fault = "needs a robot with six straight legs, or no [tolerance] joint_centre"
+        raise CaseError("limits.over", fault, "workspace", case.source)
+    for limit in case.limits:
+        if isinstance(limit, Actuator | LegClearance):
+            fault = f"needs a robot with six straight legs, or no limits.{limit.key}"
+            raise CaseError("limits.over", fault, "workspace", case.source)
 
 
 def _faults(judged: Judgement) -> list[BindingPose | None]:
@@ -184,6 +186,8 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         faults.append(
             None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y), None, regular.errors)
         )
+    if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
+        faults.append(None)
     by_name = {(each.name, each.sense): each for each in judged.extremes}
     for each in judged.extremes:
         if each.limit is None or each.outcome is Outcome.PROVED:
@@ -223,20 +227,15 @@ def _without_images(nlp: Nlp, case: Case, fresh: Sequence[BindingPose], x: Float
     Two constraints of one kind are the same where they differ by less than they are tighter than their limits, at a
     design (n,) and at designs around it. With both a program would have no unique multipliers.
     """
-    rng = np.random.default_rng(_SEED)
-    points = [x, *(np.clip(x + _NEARBY * nlp.scale * rng.normal(size=nlp.n), nlp.lower, nlp.upper) for _ in range(3))]
-    kept: list[BindingPose] = []
-    known: list[tuple[str, FloatArray, float]] = []
+    points = points_around(nlp, x)
+    kept, distinct = list[BindingPose](), Distinct()
     for each in fresh:
         items = list(_constraints(nlp, case, each, 0))
         expressions = ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
         function = ca.Function("constraints", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
         values = np.array([function(point, nlp.arguments).full().ravel() for point in points])
-        key, size = each.name.partition(" ")[0], float(np.abs(values).max(initial=0.0))
-        alike = (k == key and v.shape == values.shape and np.abs(v - values).max() <= _ALIKE * s for k, v, s in known)
-        if not any(alike):
+        if distinct.adds(each.name, values):
             kept.append(each)
-            known.append((key, values, size))
     return kept
 
 
@@ -262,7 +261,7 @@ def _constraints(nlp: Nlp, case: Case, binding: BindingPose, k: int) -> Iterator
             items += on_plates(limit, case, robot)
         for item in items:
             if item.constraint.name in (binding.name, f"{binding.name}{where}"):
-                yield _tightened(item, f"{binding.name}{where}")
+                yield tightened(item, f"{binding.name}{where}")
 
 
 def _of_stroke(
@@ -274,16 +273,7 @@ def _of_stroke(
         for leg, family in zip(case.model.legs, limit.on_pairs(both), strict=False):
             for item in family.pair(0, 1):
                 if binding.name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
-                    yield _tightened(item, f"{binding.name}{where}")
-
-
-def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
-    """Return a constraint with tighter bounds and a name; its number is that of its expression."""
-    lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
-    upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
-    # A measure is evaluated at the stated pose, and this is another.
-    stated = (item.lower, item.upper)
-    return BoundedConstraint(replace(item.constraint, name=name, measure=None, stated=stated), lower, upper)
+                    yield tightened(item, f"{binding.name}{where}")
 
 
 def _robot_at(nlp: Nlp, case: Case, pose: PoseNumbers) -> RobotInstance:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models import FloatArray, frozen_array
+from ..case.case import Case
+from ..results.point import stated_pose_notice
 from .rows import Row
 from .sweep import Sweep
 
@@ -30,7 +32,7 @@ class SweepColumns:
         starts, converged: (N,) number of searches, and of those that converged.
         engine: whose point it is.
         seconds: (N,) wall time.
-        note: reason of a refusal.
+        note: reason of a refusal; that limits over a workspace are taken at the stated pose alone, or not proved.
         certificate: status of each proof; empty texts without ``certified``.
         bound, gap: (N,) proven bound, and its distance from F.
     """
@@ -95,3 +97,14 @@ def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
         bound=numbers([row.bound for row in rows]),
         gap=numbers([row.gap for row in rows]),
     )
+
+
+def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
+    """Return the notice that limits over the workspace are taken at the stated pose alone, where a row has it.
+
+    Args:
+        case: the case at one of the points.
+        notes: of the rows.
+    """
+    notice = stated_pose_notice(case)
+    return notice if notice is not None and notice in notes else None

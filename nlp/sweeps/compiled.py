@@ -75,6 +75,9 @@ class CompiledEngine:
         self.library = _compile(self.places)
         sides = self.places.nlp.sides.sides
         self._side_names = [f"{side.name} {side.bound}" for side in sides]
+        workspace = self.places.nlp.case.workspace
+        # All points are solved in one way, those that Ipopt solves too.
+        self._note = "" if workspace is None else workspace.stated_pose_notice
         self._slopes: dict[tuple[int, float], float] = {}
 
     def solve(self, indices: Sequence[int], values: FloatArray) -> Solved:
@@ -117,6 +120,7 @@ class CompiledEngine:
                 converged=int(found.converged[k]),
                 engine="compiled",
                 seconds=share,
+                note=self._note,
             )
             if is_good[k] and verdicts.is_strict[k]:
                 rows.append(self._with_verdict(row, verdicts, block, k, strict))
@@ -124,7 +128,10 @@ class CompiledEngine:
             examined = self._with_evidence(row, block, found.x[k], k) if is_good[k] else None
             if examined is None:
                 settings = dict(zip(self.names, solved.values[k].tolist(), strict=True))
-                examined = solve_point(self.source, settings, index, self.starts, self.seed)
+                examined = solve_point(
+                    self.source, settings, index, self.starts, self.seed, at_stated_pose=bool(self._note)
+                )
+                examined = examined._replace(note=examined.note or self._note)
             rows.append(examined)
         return rows
 

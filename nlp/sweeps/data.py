@@ -10,7 +10,7 @@ from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, versions
 from ..results.sweep import Column, SweepResult
 from ..results.tradeoffwording import unit_of_objective
-from .columns import SweepColumns
+from .columns import SweepColumns, stated_pose_note
 
 
 def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
@@ -23,6 +23,7 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
     is_proved = any(found.certificate)
     return SweepResult(
         head=head_data(case),
+        notice=stated_pose_note(case, found.note),
         unit=unit_of_objective(case),
         numbers=MappingProxyType({name: vector(values) for name, values in found.numbers.items()}),
         statuses=found.status,

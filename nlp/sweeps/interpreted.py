@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ..errors import CaseError, InputError, UncoveredError
 from ..evidence.optimality import Evidence
@@ -22,6 +23,8 @@ def solve_point(
     starts: int,
     seed: int | None,
     proof_seconds: float | None = None,
+    *,
+    at_stated_pose: bool = False,
 ) -> Row:
     """Return the row of one point.
 
@@ -32,10 +35,14 @@ def solve_point(
         starts: number of starting points.
         seed: seed instead of the case's.
         proof_seconds: seconds for the certificate of the point; None for no certificate.
+        at_stated_pose: whether limits over a workspace are taken at the stated pose alone.
     """
     began = time.perf_counter()
     try:
-        solution = solve(source.case_at(settings), starts=starts, seed=seed, jobs=1)
+        case = source.case_at(settings)
+        if at_stated_pose and case.workspace is not None:
+            case = replace(case, workspace=replace(case.workspace, has_limits=False))
+        solution = solve(case, starts=starts, seed=seed, jobs=1)
     except CaseError as error:
         return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
     if proof_seconds is None:
@@ -65,7 +72,9 @@ def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     program = own.nlp.program
     decided = solution.decided_by
     evidence: Evidence | None = solution.evidence
-    row = Row(index, solution.status.value, None, engine="ipopt", seconds=seconds)
+    is_unproved = solution.workspace is not None and not solution.workspace.is_proved
+    note = "not proved over the workspace" if is_unproved else ""
+    row = Row(index, solution.status.value, None, engine="ipopt", seconds=seconds, note=note)
     row = row._replace(
         x=tuple(units.shown(float(solution.x[k]), program.variables[k].dimension) for k in design_indices(program))
     )

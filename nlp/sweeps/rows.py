@@ -30,7 +30,8 @@ class Row(NamedTuple):
         converged: number of searches that ended at an optimum.
         engine: ``compiled`` or ``ipopt``: whose point it is.
         seconds: wall time; of points solved together, an equal share.
-        note: a sentence where the point is refused, or where its certificate is; empty otherwise.
+        note: a sentence where the point is refused, or where its certificate is, and about limits over a workspace that
+            are taken at the stated pose alone, or are not proved; empty otherwise.
         certificate: status of the proof; empty where none was asked for, or it is refused.
         bound: no feasible design has a better F; None where nothing is proved.
         gap: distance of the bound from F; None likewise.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...models import FloatArray, frozen_array
+from ...models import FloatArray, Model, frozen_array
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.workspace import Workspace
@@ -61,13 +61,18 @@ def workspace_of_case(case: Case) -> Workspace:
     return case.workspace
 
 
+def has_straight_legs(model: Model) -> bool:
+    """Return whether a robot is six straight legs and nothing else."""
+    return len(model.legs) == LEGS and len(model.wrenches) == LEGS and not (model.members or model.unknowns)
+
+
 def legs_of(case: Case) -> Legs | None:
     """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
 
     Their tolerance is the case's.
     """
     model = case.model
-    if len(model.legs) != LEGS or len(model.wrenches) != LEGS or model.members or model.unknowns:
+    if not has_straight_legs(model):
         return None
     symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]

@@ -107,6 +107,25 @@ class PoseBox:
         axis, angle = axis_angle_from_matrix(rotation)
         return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
 
+    def coordinates(self, pose: PoseNumbers) -> FloatArray:
+        """Return the point (6,) of a pose, which is one of this box: fixed coordinates are those of the box."""
+        turn = self._turn(pose)
+        y = np.concatenate([pose.position, turn])
+        return np.asarray(np.where(self.lower == self.upper, self.lower, y))
+
+    def _turn(self, pose: PoseNumbers) -> FloatArray:
+        """Return the coordinates (3,) of a pose's rotation."""
+        R = pose.rotation
+        if self.kind is not TurnKind.ROLL_PITCH_YAW:
+            r = np.tan(pose.angle / 2) * pose.axis
+            return np.asarray(r if self.kind is TurnKind.ANY_AXIS else np.array([r @ self.axis, 0.0, 0.0]))
+        pitch = math.asin(min(max(-R[2, 0], -1.0), 1.0))
+        roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
+        # The same rotation has two such triples.
+        other = [math.remainder(each, 2 * math.pi) for each in (roll + math.pi, math.pi - pitch, yaw + math.pi)]
+        both = [np.tan(0.5 * np.array(each)) for each in ((roll, pitch, yaw), other)]
+        return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
+
     def contracted(self, lower: FloatArray, upper: FloatArray) -> Contracted:
         """Return boxes (B, 6) with their ends moved to the ball of rotations."""
         lower, upper = np.array(lower), np.array(upper)

@@ -33,7 +33,8 @@ from screwsynth.nlp.workspace.regular.engines import kernel, rank_engine
 from screwsynth.nlp.workspace.regular.regularity import Rank
 from screwsynth.nlp.workspace.regular.search import prove_regular
 from screwsynth.nlp.workspace.scale import largest_scale
-from screwsynth.nlp.workspace.slices.slices import Region, slices_of
+from screwsynth.nlp.workspace.slices.regions import Region
+from screwsynth.nlp.workspace.slices.slices import slices_of
 from screwsynth.nlp.workspace.verdict import Outcome
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ....models import Dimension, FloatArray
 from ...case.case import Case
 from ...results.rounding import number
-from ...workspace.slices.slices import KEPT, UNDECIDED, Region, Slice
+from ...workspace.slices.regions import KEPT, UNDECIDED, Region
+from ...workspace.slices.slices import Slice
 from .canvas import INK, MUTED
 from .figures import picture_of
 from .fonts import legible
@@ -33,8 +34,13 @@ _ALONE = 4.2
 #: Place of its axes, left, bottom, width and height, as parts of it.
 _PLACE = (0.16, 0.13, 0.82, 0.82)
 _GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
+#: Poses out of reach, and those whose closed loops are not proved.
+_FAR, _EDGE = "#7d8790", "#aab2b9"
 #: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
-_LIMITS = ("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0", "#e6d96c", "#bf9b7a")
+_LIMITS = (
+    *("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0"),
+    *("#e6d96c", "#bf9b7a", "#c3dd7a", "#e08f8f", "#7f93cf", "#d98fcb"),
+)
 #: Points on each side of a box that is drawn curved.
 _CURVED = 2
 
@@ -67,8 +73,9 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     lines = -(-(len(entries) + 1) // across) + len(notes)
     size = _SIZE[0] * columns, _SIZE[1] * rows + 0.6 + _LINE * lines
     figure = Figure(figsize=size, facecolor="white", layout="constrained")
+    kinds = _kinds(case, slices)
     for k, each in enumerate(slices):
-        _paint(figure.add_subplot(rows, columns, k + 1), case, each)
+        _paint(figure.add_subplot(rows, columns, k + 1), case, each, kinds)
     title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
     words = [*title, "slices through the middle of the workspace"]
     figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
@@ -97,7 +104,7 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
     def alone(each: Slice) -> Figure:
         figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white")
         # The same place in each picture, so that slices side by side stand in line.
-        _paint(figure.add_axes(_PLACE), case, each)
+        _paint(figure.add_axes(_PLACE), case, each, _kinds(case, slices))
         return figure
 
     return [picture_of(partial(alone, each), ".png") for each in slices]
@@ -105,7 +112,7 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
 
 def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
     """Return the kinds of boxes that slices have, in the order in which they are painted."""
-    kinds = _kinds(case, slices[0])
+    kinds = _kinds(case, slices)
     members = [[layer.members.any() for layer in _layers(each, kinds)] for each in slices]
     shown = {layer.kind for row in members for layer, used in zip(_layers(slices[0], kinds), row, strict=True) if used}
     return [kind for kind in kinds if kind in shown]
@@ -120,10 +127,10 @@ def slices_notes(slices: Sequence[Slice]) -> list[str]:
     return notes
 
 
-def _paint(axes: Axes, case: Case, each: Slice) -> None:
+def _paint(axes: Axes, case: Case, each: Slice, kinds: Sequence[Kind]) -> None:
     """Paint the boxes of a slice, the outline of the workspace, and the names of the axes."""
     axes.set_box_aspect(1)
-    for kind, members, is_filled in _layers(each, _kinds(case, each)):
+    for kind, members, is_filled in _layers(each, kinds):
         if members.any():
             style: dict[str, Any] = {"facecolor": kind.colour, "edgecolor": kind.colour, "linewidth": 0.3}
             if not is_filled:
@@ -132,18 +139,29 @@ def _paint(axes: Axes, case: Case, each: Slice) -> None:
     _frame(axes, case, each)
 
 
-def _kinds(case: Case, each: Slice) -> list[Kind]:
+def _kinds(case: Case, slices: Sequence[Slice]) -> list[Kind]:
     """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
-    limits = each.limits
+    limits = slices[0].limits
+    # Limits that are violated somewhere have the first colours, so that few of them share one.
+    used = np.unique(np.concatenate([each.binding for each in slices])).tolist()
+    order = sorted(range(len(limits)), key=lambda k: (k not in used, k))
+    colours = {k: _LIMITS[place % len(_LIMITS)] for place, k in enumerate(order)}
     kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
     kinds = [Kind(kept, _GREEN)]
     for k, limit in enumerate(limits):
         value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
         how = "" if limit.is_enclosed else " at samples"
-        kinds.append(Kind(f"violated{how}: {limit.key} = {value}", _LIMITS[k % len(_LIMITS)]))
+        kinds.append(Kind(f"violated{how}: {limit.key} = {value}", colours[k]))
     if limits:
         kinds.append(Kind("limits open", _PALE))
-    return [*kinds, Kind(Region.BEYOND.value, _ORANGE, "////"), Kind(Region.OPEN.value, _BAND)]
+    return [
+        *kinds,
+        Kind(Region.BEYOND.value, _ORANGE, "////"),
+        Kind(Region.OTHER_SIGN.value, _ORANGE, "////"),
+        Kind(Region.OPEN.value, _BAND),
+        Kind(Region.UNREACHED.value, _FAR),
+        Kind(Region.UNKNOWN.value, _EDGE),
+    ]
 
 
 class _Layer(NamedTuple):
@@ -157,16 +175,21 @@ class _Layer(NamedTuple):
 def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
     """Return the layers of a slice, the lowest first; a box may be in two."""
     regions = np.array([region.value for region in each.regions])
-    is_beyond, is_singular = regions == Region.BEYOND.value, regions == Region.OPEN.value
+    is_judged = (regions != Region.UNREACHED.value) & (regions != Region.UNKNOWN.value)
+    is_beyond = {region: regions == region.value for region in (Region.BEYOND, Region.OTHER_SIGN)}
+    is_here = ~np.any(list(is_beyond.values()), axis=0)
     kept, *limits = kinds[: 1 + len(each.limits)]
-    *opened, beyond, band = kinds[1 + len(each.limits) :]
+    *opened, beyond, other, band, far, edge = kinds[1 + len(each.limits) :]
+    hatched = [(beyond, is_beyond[Region.BEYOND]), (other, is_beyond[Region.OTHER_SIGN])]
     return [
-        _Layer(kept, (each.binding == KEPT) & ~is_beyond),
+        _Layer(kept, (each.binding == KEPT) & is_here),
         *(_Layer(kind, each.binding == k) for k, kind in enumerate(limits)),
-        *(_Layer(kind, each.binding == UNDECIDED) for kind in opened),
-        _Layer(beyond, (each.binding == KEPT) & is_beyond),
-        _Layer(beyond, is_beyond, is_filled=False),
-        _Layer(band, is_singular),
+        *(_Layer(kind, (each.binding == UNDECIDED) & is_judged) for kind in opened),
+        *(_Layer(kind, (each.binding == KEPT) & members) for kind, members in hatched),
+        *(_Layer(kind, members, is_filled=False) for kind, members in hatched),
+        _Layer(band, regions == Region.OPEN.value),
+        _Layer(far, regions == Region.UNREACHED.value),
+        _Layer(edge, regions == Region.UNKNOWN.value),
     ]
 
 

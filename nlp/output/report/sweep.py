@@ -8,7 +8,7 @@ from ...case.case import Case
 from ...results.rounding import number
 from ...results.text import TextTable
 from ...results.tradeoffwording import unit_of_objective
-from ...sweeps.columns import SweepColumns
+from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
 from ..pictures.sweeps import sweep_picture
 from ..sweeptable import TablePoint
@@ -33,7 +33,8 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
     proved = found.certificate.count("proved")
     if any(found.certificate):
         words += f", {proved:,} of them with a proof"
-    parts = [tag("h2", "F over the points")]
+    notice = stated_pose_note(case, found.note)
+    parts = [tag("h2", "F over the points"), paragraphs([] if notice is None else [f"Note: {notice}."])]
     changing = [axis for axis in points.axes if len(axis) > 1]
     if 1 <= len(changing) <= 2 and answers:
         sides = [TablePoint(float(F), "; ".join(active)) for F, active in zip(found.F, found.active, strict=True)]

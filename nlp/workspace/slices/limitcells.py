@@ -31,13 +31,14 @@ from ...errors import UncoveredError
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from ..claims import Claim, claims_of
+from ..general.spectrum import Spectrum
 from ..machine import Legs
 from ..numbers.clearance import Clearance
 from ..numbers.singular import SingularValues
 from ..posebox import PoseBox
 
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in the proofs.
-_ON_LIMIT = 1e-9
+ON_LIMIT = 1e-9
 #: Boxes that are examined at once: the terms of six legs over one box take some ten thousand numbers.
 _BLOCK = 1024
 _CLEARANCE = "leg_clearance.min"
@@ -96,7 +97,7 @@ class LimitCells:
         parts: list[_Part] = []
         limits: dict[str, SliceLimit] = {}
         uncovered: dict[str, None] = {}
-        layout = _layout(case, box, chosen)
+        layout = slice_layout(case, box, chosen)
         claims = [claim for claim in claims_of(layout, with_objective=False) if claim.limit is not None]
         for key in dict.fromkeys(claim.key for claim in claims):
             own = [claim for claim in claims if claim.key == key]
@@ -117,12 +118,12 @@ class LimitCells:
             elif isinstance(limit, SmallestSingularValue):
                 key = "smallest_singular_value.min"
                 oracle = SingularValues(legs, box, limit.length, is_condition=False)
-                parts.append(_Sampled(key, oracle, limit.min))
+                parts.append(SampledLimit(key, oracle, limit.min))
                 limits[key] = SliceLimit(key, limit.min, Dimension.NUMBER, is_enclosed=False)
             elif isinstance(limit, ConditionNumber):
                 key = "condition_number.max"
                 oracle = SingularValues(legs, box, limit.length, is_condition=True)
-                parts.append(_Sampled(key, oracle, -limit.max))
+                parts.append(SampledLimit(key, oracle, -limit.max))
                 limits[key] = SliceLimit(key, limit.max, Dimension.NUMBER, is_enclosed=False)
         self._parts = tuple(parts)
         #: The limits, one for each key.
@@ -179,13 +180,13 @@ class _Expressions:
         self._tape = compile_tape(function)
         limits = np.array([claim.limit or 0.0 for claim in claims])[:, None]
         self._sign = np.array([1.0 if claim.sense is Sense.MAX else -1.0 for claim in claims])[:, None]
-        self._limit = self._sign * limits + _ON_LIMIT * np.abs(limits)
+        self._limit = self._sign * limits + ON_LIMIT * np.abs(limits)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
         found = enclose(self._tape, lower[:, self._chosen].T, upper[:, self._chosen].T)
         is_most = self._sign > 0
         most, least = np.where(is_most, found.hi, -found.lo), np.where(is_most, found.lo, -found.hi)
-        return _states((most <= self._limit).all(axis=0), (least > self._limit).any(axis=0))
+        return states_of((most <= self._limit).all(axis=0), (least > self._limit).any(axis=0))
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         at = points[:, self._chosen].T
@@ -199,25 +200,25 @@ class _Apart:
 
     def __init__(self, pair: Clearance, limit: float) -> None:
         self._pair = pair
-        self._limit = limit - _ON_LIMIT * abs(limit)
+        self._limit = limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
         bounds = self._pair.bounds(lower, upper)
         # Each of the two legs moves by at most the sum of the shares from its place at the middle of the box.
         most = self._pair.values(0.5 * lower + 0.5 * upper) + 2 * bounds.shares.sum(axis=1)
-        return _states(bounds.lower >= self._limit, most < self._limit)
+        return states_of(bounds.lower >= self._limit, most < self._limit)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         return np.asarray(self._pair.values(points) < self._limit)
 
 
-class _Sampled:
+class SampledLimit:
     """A function that is bounded from below only; violated where it is so at the corners and the middle of a box."""
 
-    def __init__(self, key: str, oracle: SingularValues, limit: float) -> None:
+    def __init__(self, key: str, oracle: SingularValues | Spectrum, limit: float) -> None:
         self.key = key
         self._oracle = oracle
-        self._limit = limit - _ON_LIMIT * abs(limit)
+        self._limit = limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
         kept = self._oracle.bounds(lower, upper).lower >= self._limit
@@ -228,7 +229,7 @@ class _Sampled:
             for k, is_upper in zip(free, sides, strict=True):
                 corner[:, k] = upper[:, k] if is_upper else lower[:, k]
             violated &= self.violated(corner)
-        return _states(kept, violated)
+        return states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         return np.asarray(self._oracle.values(points) < self._limit)
@@ -243,12 +244,12 @@ class _Quaternion(NamedTuple):
     z: SX
 
 
-def _states(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
+def states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
     """Return states from whether each claim is proved to be kept, or violated."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
 
 
-def _layout(case: Case, box: PoseBox, chosen: Sequence[int]) -> Layout:
+def slice_layout(case: Case, box: PoseBox, chosen: Sequence[int]) -> Layout:
     """Return a case as symbols of the chosen coordinates; the others are at the middle of the box."""
     middle = 0.5 * (box.lower + box.upper)
     values: list[Value] = [
