@@ -64,7 +64,7 @@ def displaced_robot(model: Model) -> DisplacedRobot:
     found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters)
     # Of equations that depend on each other those of the design are kept, also where others would be as good.
     every = {each.name: each for each in found.loops}
-    closure = tuple(replace(each, expression=every[f"{each.name} in full"].expression) for each in model.closure)
+    closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
     return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
 
 
