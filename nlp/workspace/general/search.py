@@ -13,6 +13,7 @@ from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
+from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
@@ -35,6 +36,7 @@ def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
     *,
+    family: Family | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
@@ -44,7 +46,8 @@ def prove_rank(
 
     Args:
         problem: the robot.
-        matrix: its matrix.
+        matrix: one of its two matrices.
+        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
@@ -53,7 +56,7 @@ def prove_rank(
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, engine)
+    search = _Search(problem, matrix, family, engine)
     try:
         reason = search.run(time_limit, most_boxes, progress)
     except KeyboardInterrupt:
@@ -64,11 +67,16 @@ def prove_rank(
 class _Search:
     """The state of a search."""
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, engine: str | None) -> None:
+    def __init__(self, problem: Problem, matrix: RankMatrix, family: Family | None, engine: str | None) -> None:
         self._began = time.perf_counter()
-        self._problem = problem
-        self._examiner = Examiner(problem, RankTest(matrix, problem.z, problem.start), engine)
-        self._newton = SingularPose(problem, matrix)
+        self._problem, self._family = problem, family
+        self._newtons = [SingularPose(problem, matrix)]
+        test = RankTest(matrix, problem.z, problem.start)
+        if family is not None:
+            built = family.matrix(matrix)
+            self._newtons.append(SingularPose(problem, built, family))
+            test = RankTest(built, family.coordinates, family.start)
+        self._examiner = Examiner(problem, test, family, engine)
         self._independent = list(problem.independent)
         box = problem.box
         n = len(problem.start)
@@ -158,9 +166,11 @@ class _Search:
             z[own] = found.cells.centre[k, own]
             dependent = list(self._problem.dependent)
             z[dependent] = found.cells.centre[k, dependent]
-            self._singular = self._newton.search(z)
-            if self._singular is not None:
-                return True
+            for newton in self._newtons:
+                begin = z if newton is self._newtons[0] or self._family is None else self._family.exact(z)
+                self._singular = newton.search(begin)
+                if self._singular is not None:
+                    return True
         return False
 
     def _branch(self, found: Examined) -> None:
@@ -198,8 +208,11 @@ class _Search:
         """Return the verdict at this state of the search."""
         problem = self._problem
         outcome, y, share, left = Outcome.PROVED, None, 0.0, [*self._stack, *self._small]
+        centres = None
         if self._singular is not None:
             outcome, reason = Outcome.REFUTED, BY_NEWTON
+            if self._family is not None and len(self._singular) > len(problem.start):
+                centres = self._family.errors_of(self._singular)
             y = problem.pose_of(self._singular)
         elif left:
             outcome, cells = Outcome.OPEN, joined(left)
@@ -222,4 +235,5 @@ class _Search:
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,
+            centres=centres,
         )
