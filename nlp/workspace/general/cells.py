@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -14,7 +14,7 @@ from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .family import Family
 from .problem import Problem
-from .rank import RankTest
+from .rank import Tested
 from .relation import Relation, are_contractions, by_centres, relation_of
 
 if TYPE_CHECKING:
@@ -65,6 +65,34 @@ def joined(parts: Sequence[Cells]) -> Cells:
     return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
 
 
+def whole_workspace(problem: Problem) -> Cells:
+    """Return the whole workspace as one box; its dependent coordinates are not known."""
+    box, n, free = problem.box, len(problem.start), list(problem.free)
+    lower, upper = np.full((1, n), np.nan), np.full((1, n), np.nan)
+    lower[0, : len(free)], upper[0, : len(free)] = box.lower[free], box.upper[free]
+    dependent = list(problem.dependent)
+    lower[0, dependent] = upper[0, dependent] = np.nan
+    return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
+
+
+def in_workspace(problem: Problem, cells: Cells) -> Cells:
+    """Return the boxes that hold poses of the workspace, contracted to them."""
+    box, free = problem.box, list(problem.free)
+    ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
+    # Numbers of the pose that are not known yet may be any of the workspace.
+    lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
+    upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
+    apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
+    found = box.contracted(lower, upper)
+    kept = ~(apart | found.outside)
+    cells = cells.some(np.flatnonzero(kept))
+    own = [j for j in problem.independent if j < len(free)]
+    columns = [free[j] for j in own]
+    new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
+    new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
+    return cells._replace(lower=new_lower, upper=new_upper)
+
+
 class Examined(NamedTuple):
     """Results for B boxes.
 
@@ -82,13 +110,40 @@ class Examined(NamedTuple):
     shares: FloatArray
     smallest: FloatArray
 
+    def some(self, which: NDArray[np.int64]) -> Examined:
+        """Return the results for some of the boxes."""
+        relation = Relation(*(each[which] for each in self.relation))
+        regular, shares, smallest = (each[which] for each in self[2:])
+        return Examined(self.cells.some(which), relation, regular, shares, smallest)
+
+    def followed_by(self, other: Examined) -> Examined:
+        """Return these results, then those of other boxes."""
+        relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
+        regular, shares, smallest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
+        return Examined(joined([self.cells, other.cells]), relation, regular, shares, smallest)
+
+
+class Test(Protocol):
+    """A test of expressions over boxes.
+
+    Attributes:
+        entries: (R, 1) the expressions.
+    """
+
+    entries: ca.SX
+
+    def examine(
+        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
+    ) -> Tested:
+        """Return the results for boxes from forms of the entries; see :meth:`~.rank.RankTest.examine`."""
+
 
 class Examiner:
-    """Examination of boxes of a robot for the rank of one matrix.
+    """Examination of boxes of a robot by one test, as for the rank of a matrix.
 
     Args:
         problem: the robot.
-        test: of the matrix; that of all machines has its entries in their coordinates.
+        test: its entries are in the coordinates of the problem, or of all machines.
         family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None.
 
@@ -96,7 +151,7 @@ class Examiner:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: RankTest, family: Family | None, engine: str | None) -> None:
+    def __init__(self, problem: Problem, test: Test, family: Family | None, engine: str | None) -> None:
         self.problem, self._test = problem, test
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)

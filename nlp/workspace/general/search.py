@@ -11,7 +11,7 @@ from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached
 from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
-from .cells import Cells, Examined, Examiner, joined
+from .cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
 from .connected import is_connected
 from .family import Family
 from .matrices import RankMatrix
@@ -78,16 +78,9 @@ class _Search:
             test = RankTest(built, family.coordinates, family.start)
         self._examiner = Examiner(problem, test, family, engine)
         self._independent = list(problem.independent)
-        box = problem.box
-        n = len(problem.start)
-        lower, upper = np.full((1, n), np.nan), np.full((1, n), np.nan)
-        free = list(problem.free)
-        lower[0, : len(free)], upper[0, : len(free)] = box.lower[free], box.upper[free]
-        dependent = list(problem.dependent)
-        lower[0, dependent] = upper[0, dependent] = np.nan
-        self._whole = (upper - lower)[0, self._independent]
-        is_known = np.full(1, not dependent)
-        self._stack = [Cells(lower, upper, problem.start[None].copy(), is_known)]
+        whole = whole_workspace(problem)
+        self._whole = (whole.upper - whole.lower)[0, self._independent]
+        self._stack = [whole]
         self._small: list[Cells] = []
         # The boxes in which dependent coordinates became known.
         self._roots: list[Cells] = []
@@ -111,7 +104,7 @@ class _Search:
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            cells = self._in_workspace(self._next())
+            cells = in_workspace(self._problem, self._next())
             if not len(cells.lower):
                 continue
             self._boxes += len(cells.lower)
@@ -134,24 +127,6 @@ class _Search:
             self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
             cells = cells.some(np.arange(_BLOCK))
         return cells
-
-    def _in_workspace(self, cells: Cells) -> Cells:
-        """Return the boxes that hold poses of the workspace, contracted to them."""
-        problem, free = self._problem, list(self._problem.free)
-        box, count = problem.box, len(free)
-        ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
-        # Numbers of the pose that are not known yet may be any of the workspace.
-        lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
-        upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
-        apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
-        found = box.contracted(lower, upper)
-        kept = ~(apart | found.outside)
-        cells = cells.some(np.flatnonzero(kept))
-        own = [j for j in self._independent if j < count]
-        columns = [free[j] for j in own]
-        new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
-        new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
-        return cells._replace(lower=new_lower, upper=new_upper)
 
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
@@ -178,13 +153,7 @@ class _Search:
         rows = np.flatnonzero(~found.is_regular)
         if not rows.size:
             return
-        part = Examined(
-            found.cells.some(rows),
-            type(found.relation)(*(each[rows] for each in found.relation)),
-            found.is_regular[rows],
-            found.shares[rows],
-            found.smallest[rows],
-        )
+        part = found.some(rows)
         own = self._independent
         width = (part.cells.upper - part.cells.lower)[:, own]
         whole = np.where(self._whole > 0, self._whole, np.inf)
