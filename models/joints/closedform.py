@@ -9,7 +9,8 @@ Of the two solutions that of home's working mode is taken: the derivative of the
 that it has at home, and is 0 where both solutions meet, at the edge of the limb's reach. The unknown then is an
 expression of dimensions and pose, and the edge a claim of its own.
 
-Coefficients are read off the equation at three values of the unknown. That it has no further terms is tested at random
+Coefficients are derivatives of the equation by the unknown, or by its sine and cosine, at 0. Differences of its values
+would leave terms that cancel, which bounds over boxes do not know. That it has no further terms is tested at random
 values of all symbols, at which another analytic expression would differ.
 """
 
@@ -116,26 +117,24 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
     q = unknown.symbol
     expression = equation.expression / equation.size
 
-    def at(value: float) -> SX:
-        return ca.substitute(expression, q, SX(value))
-
     slope = _slope_at_home(model, ca.jacobian(expression, q) * unknown.size)
     if not abs(slope) > _EDGE:
         return None
     sign = 1.0 if slope > 0 else -1.0
     if unknown.dimension is Dimension.ANGLE:
-        # pi and its half are not doubles: sine and cosine are put in instead.
-        none, half, quarter = (_at_turn(expression, q, *turn) for turn in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0)))
-        middle = (none + half) / 2
-        A, B = (none - half) / 2, quarter - middle
+        sine, cosine = SX.sym("sine"), SX.sym("cosine")
+        turned = _at_turn(expression, q, sine, cosine)
+        value, B, A, twice = _at_zero(turned, ca.vertcat(sine, cosine), [sine, cosine, (cosine, cosine)])
+        # With the squares of sine and cosine as one term, which is 1.
+        middle = value + twice / 2
         if not _is_same(model, expression, middle + A * ca.cos(q) + B * ca.sin(q)):
             return None
         D, square = -middle, A * A + B * B
         root = sign * _root(square - D * D, square, extended)
         cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
         return _Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
-    c0, plus, minus = at(0.0), at(1.0), at(-1.0)
-    c1, c2 = (plus - minus) / 2, (plus + minus) / 2 - c0
+    c0, c1, twice = _at_zero(expression, q, [q, (q, q)])
+    c2 = twice / 2
     if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
         return None
     square = c1 * c1 - 4 * c0 * c2
@@ -152,12 +151,31 @@ def _root(value: SX, size: SX, extended: bool) -> SX:
     return root + (value - least) / (2 * root)
 
 
-def _at_turn(expression: SX, q: SX, sine: float, cosine: float) -> SX:
-    """Return an expression with numbers in the place of sine and cosine of an angle; 0 in that of the angle itself."""
+def _at_turn(expression: SX, q: SX, sine: SX, cosine: SX) -> SX:
+    """Return an expression with symbols in the place of sine and cosine of an angle; 0 in that of the angle itself."""
     others = ca.symvar(expression)
     rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
-    turned = _Solved(SX(0), SX(sine), SX(cosine), SX(0))
+    turned = _Solved(SX(0), sine, cosine, SX(0))
     return _walk([rest, q], [expression], 1, {0: turned})[0]
+
+
+def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> list[SX]:
+    """Return the value of an expression, and derivatives of it, where unknowns (k, 1) are 0.
+
+    Args:
+        expression: (1, 1).
+        unknowns: symbols.
+        by: those of first derivatives, and pairs for second derivatives.
+    """
+    own = {each.element_hash() for each in ca.vertsplit(unknowns)}
+    rest = ca.vertcat(SX(0, 1), *[each for each in ca.symvar(expression) if each.element_hash() not in own])
+    found = [expression]
+    for each in by:
+        first, *second = each if isinstance(each, tuple) else (each,)
+        slope = ca.jacobian(expression, first)
+        found.append(ca.jacobian(slope, second[0]) if second else slope)
+    function = ca.Function("derivatives", [unknowns, rest], found)
+    return list(function.call([SX.zeros(unknowns.numel()), rest]))
 
 
 def _symbols(model: Model) -> list[SX]:

@@ -13,7 +13,7 @@ from ..arrays import FloatArray
 from ..limbjoints import LimbJoint, LimbLink
 from ..member import Member
 from ..model import Model
-from ..parts import Actuator, AssemblySign, Closure, Dimension, JointScrews, PathStructure, PoseSymbols, Unknown
+from ..parts import Actuator, AssemblySign, Closure, Dimension, JointScrews, Parameter, PathStructure, PoseSymbols, Unknown
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb
 from .cut import choose_cut, simplified
@@ -35,7 +35,6 @@ from .resistance import Ranks, path_ranks, resistance
 from .segments import limb_links, with_shared_places
 from .states import PathJoints
 from .structure import joint_screws, member_remarks, structure_of, with_kept
-from .words import RobotWords
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -97,7 +96,8 @@ def robot(
         "coupling": coupling,
     }
     definition = {key: plain(value) for key, value in tables.items() if value is not None and value != ""}
-    return _model(read_robot(definition), definition)
+    at_home = home_of(read_robot(definition))
+    return model_of_home(at_home, sampled_dimensions(at_home), definition)
 
 
 @dataclass(eq=False)
@@ -145,7 +145,7 @@ class _Builder:
         labels: dict[int, str] = {}
         count, opened = len(self.unknowns), []
         for index, joints in enumerate(limb.paths):
-            new = _labels(limb, index, joints, labels)
+            new = joint_labels(limb, index, joints, labels)
             labels |= new
             path = self._path(limb, index, joints, self._variables(limb.name, known), labels)
             if path is None:
@@ -243,7 +243,7 @@ class _Builder:
         return variable
 
 
-def _labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
+def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
     """Return the label of each joint of a path that has none yet, such as ``2:3``, by the joint's identity.
 
     Args:
@@ -260,10 +260,21 @@ def _labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int,
     return found
 
 
-def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
-    """Return the model of a robot from its words, and the tables that state them."""
-    at_home = home_of(words)
-    samples = sampled_dimensions(at_home)
+def model_of_home(
+    at_home: HomeRobot, samples: FloatArray, definition: Mapping[str, object], more: Sequence[Parameter] = ()
+) -> Model:
+    """Return the model of a robot at home.
+
+    Args:
+        at_home: the robot.
+        samples: (s, d) values of its dimensions at which ranks are measured.
+        definition: the tables that state it.
+        more: parameters that are among its symbols, beside its dimensions.
+
+    Raises:
+        RobotError: the robot cannot be put together near home.
+    """
+    words = at_home.words
     remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
     platform = Motion(pose.rotation, at_home.home, pose.position)
@@ -298,7 +309,7 @@ def _model(words: RobotWords, definition: Mapping[str, object]) -> Model:
         description=words.description,
         length_unit=words.length_unit,
         options={"definition": definition},
-        parameters=parameters(at_home),
+        parameters=(*parameters(at_home), *more),
         pose=pose,
         home=frame.typical_triple(at_home.home),
         wrenches=tuple(builder.wrenches),

@@ -44,6 +44,18 @@ class JointErrors(NamedTuple):
         return Legs(legs.base + self.base, legs.platform + self.platform)
 
 
+class CentreErrors(NamedTuple):
+    """Errors of the joint centres of one machine of a robot that is not six straight legs.
+
+    Attributes:
+        names: of the m joint centres.
+        vectors: (m, 3) in the world frame at home, length; of platform joints of legs in the platform's frame.
+    """
+
+    names: tuple[str, ...]
+    vectors: FloatArray
+
+
 def workspace_of_case(case: Case) -> Workspace:
     """Return a case's workspace.
 

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from ...models import FloatArray
-from .machine import JointErrors
+from .machine import CentreErrors, JointErrors
 from .posebox import PoseBox
 
 
@@ -37,6 +37,7 @@ class Regularity:
         reason: for stopping before every box was closed; else empty.
         errors: of the joint centres of the machine that is singular at ``y``, where that is not the exact machine; else
             None.
+        centres: the same for a robot that is not six straight legs.
     """
 
     outcome: Outcome
@@ -50,3 +51,4 @@ class Regularity:
     seconds: float
     reason: str
     errors: JointErrors | None = None
+    centres: CentreErrors | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -12,9 +12,10 @@ from ....models import FloatArray
 from ..regular.inverse import inverses
 from .assembled import Loops
 from .enclosing import Encloser, Forms
+from .family import Family
 from .problem import Problem
-from .rank import RankTest
-from .relation import Relation, are_contractions, relation_of
+from .rank import Tested
+from .relation import Relation, are_contractions, by_centres, relation_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,6 +65,34 @@ def joined(parts: Sequence[Cells]) -> Cells:
     return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
 
 
+def whole_workspace(problem: Problem) -> Cells:
+    """Return the whole workspace as one box; its dependent coordinates are not known."""
+    box, n, free = problem.box, len(problem.start), list(problem.free)
+    lower, upper = np.full((1, n), np.nan), np.full((1, n), np.nan)
+    lower[0, : len(free)], upper[0, : len(free)] = box.lower[free], box.upper[free]
+    dependent = list(problem.dependent)
+    lower[0, dependent] = upper[0, dependent] = np.nan
+    return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
+
+
+def in_workspace(problem: Problem, cells: Cells) -> Cells:
+    """Return the boxes that hold poses of the workspace, contracted to them."""
+    box, free = problem.box, list(problem.free)
+    ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
+    # Numbers of the pose that are not known yet may be any of the workspace.
+    lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
+    upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
+    apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
+    found = box.contracted(lower, upper)
+    kept = ~(apart | found.outside)
+    cells = cells.some(np.flatnonzero(kept))
+    own = [j for j in problem.independent if j < len(free)]
+    columns = [free[j] for j in own]
+    new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
+    new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
+    return cells._replace(lower=new_lower, upper=new_upper)
+
+
 class Examined(NamedTuple):
     """Results for B boxes.
 
@@ -81,28 +110,61 @@ class Examined(NamedTuple):
     shares: FloatArray
     smallest: FloatArray
 
+    def some(self, which: NDArray[np.int64]) -> Examined:
+        """Return the results for some of the boxes."""
+        relation = Relation(*(each[which] for each in self.relation))
+        regular, shares, smallest = (each[which] for each in self[2:])
+        return Examined(self.cells.some(which), relation, regular, shares, smallest)
+
+    def followed_by(self, other: Examined) -> Examined:
+        """Return these results, then those of other boxes."""
+        relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
+        regular, shares, smallest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
+        return Examined(joined([self.cells, other.cells]), relation, regular, shares, smallest)
+
+
+class Test(Protocol):
+    """A test of expressions over boxes.
+
+    Attributes:
+        entries: (R, 1) the expressions.
+    """
+
+    entries: ca.SX
+
+    def examine(
+        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
+    ) -> Tested:
+        """Return the results for boxes from forms of the entries; see :meth:`~.rank.RankTest.examine`."""
+
 
 class Examiner:
-    """Examination of boxes of a robot for the rank of one matrix.
+    """Examination of boxes of a robot by one test, as for the rank of a matrix.
 
     Args:
         problem: the robot.
-        test: of the matrix.
+        test: its entries are in the coordinates of the problem, or of all machines.
+        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: RankTest, engine: str | None) -> None:
+    def __init__(self, problem: Problem, test: Test, family: Family | None, engine: str | None) -> None:
         self.problem, self._test = problem, test
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)
-        slopes = [ca.jacobian(problem.equations, problem.z)[:, k] for k in self._dependent]
+        equations = problem.equations if family is None else family.equations
+        coordinates = problem.z if family is None else family.coordinates
+        n, whole = int(problem.z.numel()), int(coordinates.numel())
+        self._errors, self._tolerance = list(range(n, whole)), 0.0 if family is None else family.tolerance
+        slopes = [ca.jacobian(equations, problem.z)[:, k] for k in self._dependent]
         own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
         # A last entry that is not used, for a matrix that is constant.
-        entries = ca.vertcat(problem.equations, own, test.entries, problem.z[0])
-        self._encloser = Encloser(problem.z, entries, engine)
+        entries = ca.vertcat(equations, own, test.entries, problem.z[0])
+        self._encloser = Encloser(coordinates, entries, engine)
+        self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
     @property
@@ -116,7 +178,8 @@ class Examiner:
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
         known, near = cells.is_known.copy(), cells.near.copy()
-        relation = Relation(np.zeros((B, k)), np.zeros((B, k, f)), np.full((B, k), np.inf))
+        of_errors = np.zeros((B, k, len(self._errors)))
+        relation = Relation(np.zeros((B, k)), np.zeros((B, k, f)), np.full((B, k), np.inf), of_errors)
         shares, smallest, regular = np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=bool)
         if k and not known.all():
             new = np.flatnonzero(~known)
@@ -127,8 +190,8 @@ class Examiner:
             rows = np.flatnonzero(known if attempt == 0 else ~known & np.isfinite(lower).all(axis=1))
             if not rows.size:
                 continue
-            forms = self._encloser(lower[rows].T, upper[rows].T)
-            own = relation_of(forms.part(slice(0, k)), self._independent, self._dependent)
+            forms = self._forms(lower[rows], upper[rows])
+            own = relation_of(forms.part(slice(0, k)), self._independent, self._dependent, self._errors)
             if attempt:
                 good = self._is_single(forms, own, lower[rows], upper[rows])
                 known[rows[good]] = True
@@ -142,13 +205,19 @@ class Examiner:
                 continue
             for whole, part in zip(relation, own, strict=True):
                 whole[rows] = part
-            found = self._test.examine(forms.part(slice(k + k * k, -1)), own, self._independent, self._dependent)
+            entries = forms.part(slice(k + k * k, -1))
+            found = self._test.examine(entries, own, self._independent, self._dependent, self._errors)
             regular[rows], shares[rows], smallest[rows] = found.is_regular, found.shares, found.smallest
         for j in self._dependent:
             lower[~known, j] = upper[~known, j] = np.nan
         finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
         return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
+
+    def _forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
+        """Return the forms of all entries over boxes (B, n), for all machines."""
+        errors = np.full((len(lower), len(self._errors)), self._tolerance)
+        return self._encloser(np.hstack([lower, -errors]).T, np.hstack([upper, errors]).T)
 
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
         """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
@@ -164,12 +233,25 @@ class Examiner:
             slopes = self.loops.slopes(z.T) * size
             T = inverses(slopes[:, :, D]) @ slopes[:, :, own]
             reach = np.abs(T) * (half / size[own])[:, None, :]
-        width = np.maximum(_WIDER * reach.sum(axis=2), _LEAST)
+            whole = reach.sum(axis=2) + self._reach_of_errors(z, inverses(slopes[:, :, D]))
+        width = np.maximum(_WIDER * whole, _LEAST)
         width = np.where(width <= _MOST, width, np.nan) * size[D]
         near[rows] = z
         lower[rows[:, None], D], upper[rows[:, None], D] = z[:, D] - width, z[:, D] + width
         shares = np.nan_to_num(reach.sum(axis=1))
         return np.asarray(np.where(shares.any(axis=1, keepdims=True), shares, half / size[own]))
+
+    def _reach_of_errors(self, z: FloatArray, Y: FloatArray) -> FloatArray:
+        """Return how far errors move dependent coordinates (B, k), in parts of their sizes, to first order.
+
+        Args:
+            z: (B, n) closed points of the design.
+            Y: (B, k, k) inverses of the derivatives by these coordinates.
+        """
+        if self._machines is None:
+            return np.zeros(Y.shape[:2])
+        points = np.hstack([z, np.zeros((len(z), len(self._errors)))])
+        return by_centres(Y @ self._machines.slopes(points.T)[:, :, self._errors] * self._tolerance)
 
     def _is_single(self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
         """Return whether each pose of a box surely has one closed point between the ends, and only one."""
@@ -207,12 +289,13 @@ class Examiner:
         place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
         lower[:, own] = upper[:, own] = place[:, own]
         for _ in range(_CONTRACTIONS):
-            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, self.count)), own, D)
+            relation = relation_of(self._forms(lower, upper).part(slice(0, self.count)), own, D, self._errors)
+            rho = relation.rho + relation.of_errors
             middle, half = 0.5 * (lower + upper)[:, D], 0.5 * (upper - lower)[:, D] * (1 + _ROUNDING)
             slack = _ROUNDING * np.abs(middle)
             with np.errstate(all="ignore"):
-                low = middle + half * np.maximum(relation.off - relation.rho, -1.0) - slack
-                high = middle + half * np.minimum(relation.off + relation.rho, 1.0) + slack
+                low = middle + half * np.maximum(relation.off - rho, -1.0) - slack
+                high = middle + half * np.minimum(relation.off + rho, 1.0) + slack
             lower[:, D], upper[:, D] = np.minimum(low, high), np.maximum(low, high)
         return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
 
@@ -223,7 +306,8 @@ class Examiner:
             found: the examined boxes.
             split: (B,) place of the coordinate among the independent ones.
         """
-        cells, (off, T, rho) = found.cells, found.relation
+        cells, (off, T, rho, _) = found.cells, found.relation
+        rho = rho + found.relation.of_errors
         every, column = np.arange(len(split)), np.array(self._independent)[split]
         middle = 0.5 * cells.lower[every, column] + 0.5 * cells.upper[every, column]
         parts = []
@@ -234,7 +318,7 @@ class Examiner:
                 # The coordinate lies in [-1, 0] or [0, 1] of the whole box, and a little beyond for rounding.
                 own = T[every, :, split]
                 reach = np.abs(T).sum(axis=2) - 0.5 * np.abs(own) + rho
-                reach = reach + 1e-12 * (np.abs(off) + np.abs(T).sum(axis=2))
+                reach = reach + 1e-12 * (np.abs(off) + np.abs(T).sum(axis=2) + rho)
                 centre = off - 0.5 * side * own
                 for place, j in enumerate(self._dependent):
                     mid = 0.5 * cells.lower[:, j] + 0.5 * cells.upper[:, j]

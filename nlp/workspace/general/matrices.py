@@ -15,7 +15,7 @@ Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 from casadi import SX
@@ -53,6 +53,19 @@ class Limbs:
     actuators: Sequence[tuple[str, SX]]
     position: SX
     length: float
+
+    def reduced(self, columns: Sequence[Sequence[int]], length: float) -> Limbs:
+        """Return the limbs with some of the screws of each member, and another length.
+
+        Args:
+            columns: indices of the screws that are kept.
+            length: by which rotations are multiplied.
+        """
+        members = [
+            replace(each, screws=each.screws[:, list(kept)])
+            for each, kept in zip(self.members, columns, strict=True)
+        ]
+        return replace(self, members=members, length=length)
 
 
 def locked_matrix(limbs: Limbs) -> SX:

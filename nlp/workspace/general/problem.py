@@ -54,6 +54,8 @@ class Problem:
         unactuated: the same with free actuators; None for a robot without constraints.
         jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
         length: of the order of the robot's, length.
+        needed: indices of the equations among those of the model.
+        columns: indices of the screws of each member that are kept.
     """
 
     box: PoseBox
@@ -68,6 +70,8 @@ class Problem:
     unactuated: RankMatrix | None
     jacobian: SX
     length: float
+    needed: tuple[int, ...]
+    columns: tuple[tuple[int, ...], ...]
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
@@ -97,7 +101,7 @@ def _turn(about: int, tangent: SX) -> SX:
 
 
 @dataclass(frozen=True, eq=False)
-class _Posed:
+class PosedModel:
     """A model as expressions of the coordinates: Substitution's numbers put in.
 
     Attributes:
@@ -132,7 +136,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     Raises:
         NotJudgedError: no closed loops are found in the middle of the workspace, or they leave a joint free.
     """
-    posed = _posed(case, model, box)
+    posed = posed_model(case, model, box)
     count = len(posed.free)
     loops = Loops(posed.z, posed.closure, posed.every, posed.signs, posed.size)
     middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(posed.z.numel() - count)])
@@ -144,9 +148,8 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     dependent = _dependent(Loops(posed.z, equations, posed.every, posed.signs, posed.size), start, count)
     independent = tuple(k for k in range(posed.z.numel()) if k not in dependent)
     length = _length(posed, start, case, model)
-    members = [_with_independent_screws(each, posed, start, length) for each in posed.limbs.members]
-    limbs = replace(posed.limbs, members=members, length=length)
-    locked = RankMatrix(locked_matrix(limbs), 0)
+    columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.members)
+    limbs = posed.limbs.reduced(columns, length)
     return Problem(
         box=box,
         z=posed.z,
@@ -156,24 +159,39 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=locked,
+        locked=RankMatrix(locked_matrix(limbs), 0),
         unactuated=_unactuated(model, limbs, posed.z, start),
-        jacobian=_about_platform(posed.jacobian, limbs.position, length),
+        jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
+        needed=tuple(needed),
+        columns=columns,
     )
 
 
-def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
-    """Return a model as expressions of the coordinates."""
+def posed_model(
+    case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None
+) -> PosedModel:
+    """Return a model as expressions of the coordinates.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot; its parameters may be followed by errors of joint centres.
+        box: the poses.
+        z: (n, 1) symbols of the coordinates; new ones if left out.
+        errors: (3 m, 1) symbols in the place of the errors.
+    """
     free = box.free
     y = [SX(float(each)) for each in 0.5 * box.lower + 0.5 * box.upper]
-    for k in free:
-        y[k] = SX.sym(f"y{k}")
-    unknowns = [SX.sym(item.name) for item in model.unknowns]
+    own = [SX.sym(f"y{k}") for k in free] if z is None else ca.vertsplit(z)[: len(free)]
+    for k, symbol in zip(free, own, strict=True):
+        y[k] = symbol
+    unknowns = [SX.sym(item.name) for item in model.unknowns] if z is None else ca.vertsplit(z)[len(free) :]
+    errors = SX(0, 1) if errors is None else errors
     rotation, position = rotation_of(box, ca.vertcat(*y[3:])), ca.vertcat(*y[:3])
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    own = Substitution.identity(model)
-    given = Substitution(ca.vertcat(SX(0, 1), *values), ca.vertcat(SX(0, 1), *unknowns), rotation, position)
+    symbols = Substitution.identity(model)
+    numbers = ca.vertcat(SX(0, 1), *values, errors)
+    given = Substitution(numbers, ca.vertcat(SX(0, 1), *unknowns), rotation, position)
     every = (*model.closure, *model.loops)
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
@@ -182,18 +200,18 @@ def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
-    following = iter(ca.Function("model", own.all, outputs).call(given.all))
+    following = iter(ca.Function("model", symbols.all, outputs).call(given.all))
     wrenches = [
         replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
     ]
     members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
     actuators = [(each.limb, next(following)) for each in model.actuators]
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
-    sizes = sizes_at(model, (*every, *model.unknowns), tuple(values), SX.ones(len(every) + len(model.unknowns)))
+    sizes = sizes_at(model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns)))
     scaled = [next(following) / sizes[k] for k in range(len(every))]
     ranges = (0.5 * (box.upper - box.lower))[list(free)]
     own_sizes = np.array(ca.DM(sizes[len(every) :, :])).ravel()
-    return _Posed(
+    return PosedModel(
         z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
         free=free,
         size=np.concatenate([ranges, own_sizes]),
@@ -205,7 +223,7 @@ def _posed(case: Case, model: Model, box: PoseBox) -> _Posed:
     )
 
 
-def _needed(loops: Loops, start: FloatArray, count: int, posed: _Posed) -> list[int]:
+def _needed(loops: Loops, start: FloatArray, count: int, posed: PosedModel) -> list[int]:
     """Return the indices of the equations that do not follow from others in the workspace."""
     if not loops.count:
         return []
@@ -250,7 +268,7 @@ def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     return (*order, *unknowns)
 
 
-def _length(posed: _Posed, start: FloatArray, case: Case, model: Model) -> float:
+def _length(posed: PosedModel, start: FloatArray, case: Case, model: Model) -> float:
     """Return a length of the order of the robot's: the median arm of its rows and screws about the platform."""
     p, pairs = posed.limbs.position, []
     pairs += [(ca.norm_2(r.moment - ca.cross(p, r.force)), ca.norm_2(r.force)) for r in posed.limbs.wrenches]
@@ -265,23 +283,23 @@ def _length(posed: _Posed, start: FloatArray, case: Case, model: Model) -> float
     return float(np.median(arms)) if arms else home or case.characteristic_length
 
 
-def _with_independent_screws(member: Member, posed: _Posed, start: FloatArray, length: float) -> Member:
-    """Return a member with as many of its screws as have its rank: they span the others where they are independent.
+def _independent_screws(member: Member, posed: PosedModel, start: FloatArray, length: float) -> tuple[int, ...]:
+    """Return the indices of as many screws of a member as have its rank: they span the others if independent.
 
     Raises:
         NotJudgedError: its screws have another rank in the middle of the workspace.
     """
     if member.rank == member.screws.shape[1]:
-        return member
+        return tuple(range(member.rank))
     columns = scaled_twists(member.screws, member.centre, SX(length), member.size)
     values = ca.Function("screws", [posed.z], [ca.densify(columns)])(start).full()
     chosen = independent_rows([values.T])
     if len(chosen) != member.rank:
         raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
-    return replace(member, screws=member.screws[:, sorted(chosen)])
+    return tuple(sorted(chosen))
 
 
-def _about_platform(rows: SX, position: SX, length: float) -> SX:
+def about_platform(rows: SX, position: SX, length: float) -> SX:
     """Return rows with moments about the platform's origin, divided by a length."""
     found = [
         ca.horzcat(rows[i, :3], (rows[i, 3:] - ca.cross(position, rows[i, :3].T).T) / length)

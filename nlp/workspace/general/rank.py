@@ -5,7 +5,8 @@ With forms of the entries, in which the dependent coordinates are replaced by th
 
     |I - C M| <= |I - C M0| + sum_v |C M_v| + |C| R  entry by entry;
 
-where the right side has a spectral radius below 1, C M has an inverse, and M full column rank.
+the parts of the three errors of a joint centre, a vector of at most unit length, count together as that of a vector.
+Where the right side has a spectral radius below 1, C M has an inverse, and M full column rank.
 
 A matrix whose null space has d dimensions at almost all poses gets d further rows, a basis of the null space at the
 middle of the box: full column rank then means that it has no more dimensions anywhere in the box.
@@ -22,7 +23,7 @@ from casadi import SX
 from ....models import FloatArray
 from .enclosing import Forms
 from .matrices import RankMatrix
-from .relation import ROUNDING, Relation, are_contractions
+from .relation import ROUNDING, Relation, are_contractions, by_centres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,21 +74,24 @@ class RankTest:
         self.entries: SX = ca.vertcat(SX(0, 1), *entries)
         self._constant *= self._scale[:, None]
 
-    def examine(self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int]) -> Tested:
+    def examine(
+        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
+    ) -> Tested:
         """Return the verdict on boxes.
 
         Args:
             forms: of the entries.
             relation: of the dependent coordinates.
             independent: indices of the coordinates that are free.
-            dependent: indices of the others.
+            dependent: indices of those that follow.
+            errors: indices of errors of joint centres.
         """
         c, a, r = forms
-        own, others = a[:, :, dependent], a[:, :, independent]
+        own, others = a[:, :, dependent], a[:, :, [*independent, *errors]]
         size = np.abs(own)
         with np.errstate(all="ignore"):
             middle = c + (own @ relation.off[:, :, None])[:, :, 0]
-            slope = others - own @ relation.T
+            slope = others - own @ np.concatenate([relation.T, relation.E], axis=2)
             rest = r + (size @ relation.rho[:, :, None])[:, :, 0]
             terms = np.abs(c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
             rest = rest * (1 + ROUNDING) + ROUNDING * terms
@@ -97,15 +101,22 @@ class RankTest:
         at, scale = self._at, self._scale[self._at[0]]
         M0[:, at[0], at[1]] += middle * scale
         R[:, at[0], at[1]] = rest * scale
-        M = np.zeros((count, f, *self._constant.shape))
+        M = np.zeros((count, f + len(errors), *self._constant.shape))
         M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
         known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
         known &= np.isfinite(M).all(axis=(1, 2, 3))
         M0[~known], M[~known] = 0.0, 0.0
-        return self._judged(M0, M, np.where(known[:, None, None], R, np.inf))
+        return self._judged(M0, M, np.where(known[:, None, None], R, np.inf), f)
 
-    def _judged(self, M0: FloatArray, M: FloatArray, R: FloatArray) -> Tested:
-        """Return the verdict from middles (B, m, c), linear parts (B, f, m, c) and rests (B, m, c)."""
+    def _judged(self, M0: FloatArray, M: FloatArray, R: FloatArray, f: int) -> Tested:
+        """Return the verdict on boxes.
+
+        Args:
+            M0: (B, m, c) middles.
+            M: (B, f + e, m, c) linear parts, those of errors last.
+            R: (B, m, c) rests.
+            f: number of independent coordinates.
+        """
         columns = M0.shape[2]
         _, values, right = np.linalg.svd(M0, full_matrices=True)
         rank = columns - self.nullity
@@ -120,8 +131,10 @@ class RankTest:
             )
             C = np.linalg.pinv(M0, rcond=1e-14)
             size = np.abs(C)
-            linear = np.abs(C[:, None] @ M)
+            products = C[:, None] @ M
+            linear = np.abs(products[:, :f])
             B = np.abs(C @ M0 - np.eye(columns)) + linear.sum(axis=1) + size @ R
+            B += by_centres(products[:, f:].transpose(0, 2, 3, 1))
             # Products of fewer than 400 terms, and a sum.
             B += ROUNDING * (size @ (np.abs(M0) + np.abs(M).sum(axis=1)))
             B = np.where(np.isfinite(B), B, np.inf)

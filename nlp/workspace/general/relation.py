@@ -5,6 +5,7 @@ coordinates D, every closed point of the box has
 
     e_D = off - T e_I + [-rho, rho],    off = -Y g,   T = Y A_I,   rho = |Y| r + |Y A_D - I|  (+ rounding).
 
+Errors of joint centres are further columns E, ``- Y A_E e_E``; those of one centre are a vector of at most unit length.
 Where the right side is inside of the box for all ``|e_I| <= 1``, Brouwer's theorem gives a closed point for each value
 of the independent coordinates; where moreover the derivatives by D are regular over the box, there is only one [1].
 
@@ -39,33 +40,53 @@ class Relation(NamedTuple):
         off: (B, k) at the middle of the independent ones.
         T: (B, k, f) slopes, to be subtracted.
         rho: (B, k) rest; infinite where nothing is known.
+        E: (B, k, 3 m) slopes by errors of m joint centres, to be subtracted.
     """
 
     off: FloatArray
     T: FloatArray
     rho: FloatArray
+    E: FloatArray
+
+    @property
+    def of_errors(self) -> FloatArray:
+        """Largest sizes (B, k) of the part of the errors."""
+        return by_centres(self.E)
 
     @property
     def reach(self) -> FloatArray:
         """Largest sizes (B, k) over the box."""
-        return np.asarray((np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.rho) * (1 + ROUNDING))
+        return np.asarray(
+            (np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING)
+        )
 
 
-def relation_of(equations: Forms, independent: list[int], dependent: list[int]) -> Relation:
-    """Return the relation that k equations over boxes give."""
+def by_centres(slopes: FloatArray) -> FloatArray:
+    """Return the largest sizes (...) of linear parts (..., 3 m) in the errors of m centres, each of at most size 1."""
+    parts = slopes.reshape(*slopes.shape[:-1], slopes.shape[-1] // 3, 3)
+    return np.asarray(np.sqrt((parts * parts).sum(axis=-1)).sum(axis=-1) * (1 + ROUNDING))
+
+
+def relation_of(equations: Forms, independent: list[int], dependent: list[int], errors: list[int]) -> Relation:
+    """Return the relation that k equations over boxes give.
+
+    Args:
+        equations: their forms.
+        independent, dependent, errors: indices of the coordinates of each kind.
+    """
     A = equations.a[:, :, dependent]
-    other = equations.a[:, :, independent]
+    other, own = equations.a[:, :, independent], equations.a[:, :, errors]
     Y = inverses(A)
     size = np.abs(Y)
     with np.errstate(all="ignore"):
-        T = Y @ other
+        T, E = Y @ other, Y @ own
         off = -(Y @ equations.c[:, :, None])[:, :, 0]
         defect = np.abs(Y @ A - np.eye(len(dependent))).sum(axis=2) + ROUNDING * (size @ np.abs(A)).sum(axis=2)
-        terms = np.abs(equations.c) + np.abs(other).sum(axis=2)
+        terms = np.abs(equations.c) + np.abs(other).sum(axis=2) + np.abs(own).sum(axis=2)
         rho = ((size @ equations.r[:, :, None])[:, :, 0] + defect) * (1 + ROUNDING)
         rho += ROUNDING * (size @ terms[:, :, None])[:, :, 0]
     rho = np.where(np.isfinite(rho), rho, np.inf)
-    return Relation(np.nan_to_num(off), np.nan_to_num(T), rho)
+    return Relation(np.nan_to_num(off), np.nan_to_num(T), rho, np.nan_to_num(E))
 
 
 def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:

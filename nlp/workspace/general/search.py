@@ -11,8 +11,9 @@ from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached
 from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
-from .cells import Cells, Examined, Examiner, joined
+from .cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
 from .connected import is_connected
+from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
@@ -35,6 +36,7 @@ def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
     *,
+    family: Family | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
@@ -44,7 +46,8 @@ def prove_rank(
 
     Args:
         problem: the robot.
-        matrix: its matrix.
+        matrix: one of its two matrices.
+        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
@@ -53,7 +56,7 @@ def prove_rank(
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, engine)
+    search = _Search(problem, matrix, family, engine)
     try:
         reason = search.run(time_limit, most_boxes, progress)
     except KeyboardInterrupt:
@@ -64,22 +67,20 @@ def prove_rank(
 class _Search:
     """The state of a search."""
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, engine: str | None) -> None:
+    def __init__(self, problem: Problem, matrix: RankMatrix, family: Family | None, engine: str | None) -> None:
         self._began = time.perf_counter()
-        self._problem = problem
-        self._examiner = Examiner(problem, RankTest(matrix, problem.z, problem.start), engine)
-        self._newton = SingularPose(problem, matrix)
+        self._problem, self._family = problem, family
+        self._newtons = [SingularPose(problem, matrix)]
+        test = RankTest(matrix, problem.z, problem.start)
+        if family is not None:
+            built = family.matrix(matrix)
+            self._newtons.append(SingularPose(problem, built, family))
+            test = RankTest(built, family.coordinates, family.start)
+        self._examiner = Examiner(problem, test, family, engine)
         self._independent = list(problem.independent)
-        box = problem.box
-        n = len(problem.start)
-        lower, upper = np.full((1, n), np.nan), np.full((1, n), np.nan)
-        free = list(problem.free)
-        lower[0, : len(free)], upper[0, : len(free)] = box.lower[free], box.upper[free]
-        dependent = list(problem.dependent)
-        lower[0, dependent] = upper[0, dependent] = np.nan
-        self._whole = (upper - lower)[0, self._independent]
-        is_known = np.full(1, not dependent)
-        self._stack = [Cells(lower, upper, problem.start[None].copy(), is_known)]
+        whole = whole_workspace(problem)
+        self._whole = (whole.upper - whole.lower)[0, self._independent]
+        self._stack = [whole]
         self._small: list[Cells] = []
         # The boxes in which dependent coordinates became known.
         self._roots: list[Cells] = []
@@ -103,7 +104,7 @@ class _Search:
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            cells = self._in_workspace(self._next())
+            cells = in_workspace(self._problem, self._next())
             if not len(cells.lower):
                 continue
             self._boxes += len(cells.lower)
@@ -127,24 +128,6 @@ class _Search:
             cells = cells.some(np.arange(_BLOCK))
         return cells
 
-    def _in_workspace(self, cells: Cells) -> Cells:
-        """Return the boxes that hold poses of the workspace, contracted to them."""
-        problem, free = self._problem, list(self._problem.free)
-        box, count = problem.box, len(free)
-        ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
-        # Numbers of the pose that are not known yet may be any of the workspace.
-        lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
-        upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
-        apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
-        found = box.contracted(lower, upper)
-        kept = ~(apart | found.outside)
-        cells = cells.some(np.flatnonzero(kept))
-        own = [j for j in self._independent if j < count]
-        columns = [free[j] for j in own]
-        new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
-        new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
-        return cells._replace(lower=new_lower, upper=new_upper)
-
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
         values = np.where(found.is_regular, np.inf, found.smallest)
@@ -158,9 +141,11 @@ class _Search:
             z[own] = found.cells.centre[k, own]
             dependent = list(self._problem.dependent)
             z[dependent] = found.cells.centre[k, dependent]
-            self._singular = self._newton.search(z)
-            if self._singular is not None:
-                return True
+            for newton in self._newtons:
+                begin = z if newton is self._newtons[0] or self._family is None else self._family.exact(z)
+                self._singular = newton.search(begin)
+                if self._singular is not None:
+                    return True
         return False
 
     def _branch(self, found: Examined) -> None:
@@ -168,13 +153,7 @@ class _Search:
         rows = np.flatnonzero(~found.is_regular)
         if not rows.size:
             return
-        part = Examined(
-            found.cells.some(rows),
-            type(found.relation)(*(each[rows] for each in found.relation)),
-            found.is_regular[rows],
-            found.shares[rows],
-            found.smallest[rows],
-        )
+        part = found.some(rows)
         own = self._independent
         width = (part.cells.upper - part.cells.lower)[:, own]
         whole = np.where(self._whole > 0, self._whole, np.inf)
@@ -198,8 +177,11 @@ class _Search:
         """Return the verdict at this state of the search."""
         problem = self._problem
         outcome, y, share, left = Outcome.PROVED, None, 0.0, [*self._stack, *self._small]
+        centres = None
         if self._singular is not None:
             outcome, reason = Outcome.REFUTED, BY_NEWTON
+            if self._family is not None and len(self._singular) > len(problem.start):
+                centres = self._family.errors_of(self._singular)
             y = problem.pose_of(self._singular)
         elif left:
             outcome, cells = Outcome.OPEN, joined(left)
@@ -222,4 +204,5 @@ class _Search:
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,
+            centres=centres,
         )

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 
@@ -30,23 +31,27 @@ _MOVES = 1e-3
 
 
 class SingularPose:
-    """Newton's method for a singular pose of one matrix of a robot.
+    """Newton's method for a singular pose of one matrix of a robot, or of a machine within a tolerance.
 
     Args:
         problem: the robot.
         matrix: whose rank is judged.
+        family: all machines, whose errors are further coordinates; None for the design alone.
     """
 
-    def __init__(self, problem: Problem, matrix: RankMatrix) -> None:
-        self._problem, self._matrix = problem, matrix
-        z, M = problem.z, ca.densify(matrix.matrix)
+    def __init__(self, problem: Problem, matrix: RankMatrix, family: Family | None = None) -> None:
+        self._problem, self._matrix, self._family = problem, matrix, family
+        meant = problem if family is None else family
+        self._size = meant.size
+        z = problem.z if family is None else family.coordinates
+        M = ca.densify(matrix.matrix)
         v = ca.SX.sym("v", M.shape[1])
         product = M @ v
         self._values = ca.Function("values", [z], [M])
         self._equations = ca.Function(
-            "singular", [z, v], [problem.equations, product, ca.jacobian(problem.equations, z), ca.jacobian(product, z)]
+            "singular", [z, v], [meant.equations, product, ca.jacobian(meant.equations, z), ca.jacobian(product, z)]
         )
-        self._jacobian = ca.Function("J", [z], [ca.densify(problem.jacobian)])
+        self._jacobian = ca.Function("J", [z], [ca.densify(meant.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
@@ -63,8 +68,11 @@ class SingularPose:
         return found if float(np.abs(right[rank - 1, :6]).max()) > _MOVES else float("inf")
 
     def search(self, z: FloatArray) -> FloatArray | None:
-        """Return a singular pose (n,) of the workspace near a point (n,); None where none is found."""
-        z, size = z.copy(), self._problem.size
+        """Return a singular pose (n,) of the workspace near a point (n,); None where none is found.
+
+        Points of a family are (n + 3 m,), with the errors of a machine within the tolerance.
+        """
+        z, size = z.copy(), self._size
         M = self._values(z).full()
         if not np.isfinite(M).all():
             return None
@@ -107,7 +115,7 @@ class SingularPose:
         free = self._problem.free
         z = z.copy()
         z[: len(free)] = self._problem.box.clipped(self._problem.pose_of(z)[None])[0][list(free)]
-        return z
+        return z if self._family is None else self._family.within(z)
 
 
 def problem_columns(matrix: RankMatrix) -> int:

@@ -1,0 +1,72 @@
+"""Robots with errors of their joint centres as further parameters: machines as they are built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from casadi import SX
+
+from .drawing import Scene
+from .legs import legged_platform
+from .model import Model
+from .parts import Dimension, Parameter
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A joint centre that may be off.
+
+    Attributes:
+        name: of the joint, such as ``2:3``, or of a leg and its plate.
+        error: (3, 1) symbols of its error, length: in the world frame at home, or in that of the leg's plate.
+    """
+
+    name: str
+    error: SX
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacedRobot:
+    """A robot whose joint centres may be off.
+
+    Attributes:
+        model: the robot; the errors are its last parameters, in order.
+        centres: one for each of these parameters.
+    """
+
+    model: Model
+    centres: tuple[Centre, ...]
+
+
+def error_parameter(centre: Centre) -> Parameter:
+    """Return the error of a joint centre as a parameter of a model."""
+    return Parameter(
+        f"error {centre.name}", centre.error, Dimension.LENGTH, "error of a joint centre", (0.0, 0.0, 0.0)
+    )
+
+
+def displaced_legs(model: Model) -> DisplacedRobot:
+    """Return a robot that is given by its rows, with errors of the joint centres of its legs.
+
+    Measures of other things than its legs are left out.
+
+    Args:
+        model: the robot, with its rows as built.
+    """
+    centres = [
+        Centre(f"{leg.name} {plate}", error)
+        for leg in model.legs
+        for plate, error in (("base", leg.base_error), ("platform", leg.platform_error))
+    ]
+    legs = [leg.built for leg in model.legs]
+    of_legs = {each.name: each for each in legged_platform(legs, model.pose).quantities}
+    found = replace(
+        model,
+        parameters=(*model.parameters, *map(error_parameter, centres)),
+        wrenches=model.built,
+        built=(),
+        legs=tuple(legs),
+        quantities=tuple(of_legs[each.name] for each in model.quantities if each.name in of_legs),
+        scene=Scene(),
+    )
+    return DisplacedRobot(found, tuple(centres))

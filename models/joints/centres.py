@@ -1,0 +1,158 @@
+"""A robot given joint by joint with errors of its joint centres: a machine as it is built.
+
+The robot is put together at home with each joint's centre off by a vector, and with the directions of all axes as they
+are designed. The coordinates of all joints count from there. Joints of a limb that have one centre at home, as the
+hinges of a spherical joint, have one error. The centre of a slide does not matter, and that of joints whose axes are
+parallel matters across their axes alone: the part of the error along them is left out. A parallelogram has two centres,
+at the ends of its rods, which are equal in the machine too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ..arrays import FloatArray
+from ..catalog import gallery_names, gallery_tables
+from ..displaced import Centre, DisplacedRobot, error_parameter
+from ..model import Model
+from .chain import HomeRobot, Joint, Limb
+from .forms import RobotError
+from .generic import INCIDENT, are_parallel, sampled_dimensions
+from .graphwords import read_robot
+from .linkgraph import home_of
+from .motion import AxisKind
+from .robot import joint_labels, model_of_home
+
+#: Part of the robot's size by which joint centres are off where ranks are measured: small enough for loops to close.
+_OFF = 0.01
+_SEED = 0
+
+
+def displaced_robot(model: Model) -> DisplacedRobot:
+    """Return a robot given joint by joint with errors of its joint centres.
+
+    Args:
+        model: the robot, from a definition.
+
+    Raises:
+        RobotError: the robot is given by links and joints, or cannot be put together near home with such errors.
+    """
+    definition = _definition(model)
+    robot = home_of(read_robot(definition))
+    if robot.graph is not None:
+        raise RobotError("joint", "is one of links and joints, whose centres are not known as those of limbs")
+    exact = sampled_dimensions(robot)
+    displaced = _Displaced(robot, exact)
+    limbs = tuple(displaced.limb(limb) for limb in robot.limbs)
+    errors = ca.vertcat(SX(0, 1), *[each.error for each in displaced.centres])
+    count = int(errors.numel())
+    with_errors = replace(
+        robot,
+        symbols=ca.vertcat(robot.symbols, errors),
+        typical=np.concatenate([robot.typical, np.zeros(count)]),
+        limbs=limbs,
+    )
+    sizes = ca.Function("size", [robot.symbols], [robot.size])
+    off = np.random.default_rng(_SEED).uniform(-_OFF, _OFF, (len(exact), count))
+    off *= np.array([[float(sizes(each))] for each in exact])
+    parameters = [error_parameter(each) for each in displaced.centres]
+    found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters)
+    # Of equations that depend on each other those of the design are kept, also where others would be as good.
+    every = {each.name: each for each in found.loops}
+    closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
+    return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
+
+
+def _definition(model: Model) -> Mapping[str, object]:
+    """Return the tables that state a robot.
+
+    Raises:
+        RobotError: they are not known.
+    """
+    found = model.options.get("definition")
+    if isinstance(found, Mapping):
+        return dict(found)
+    if not (model.structure and model.name in gallery_names()):
+        raise RobotError("joint", "is known as a row alone")
+    return gallery_tables(model.name) | {"name": model.name}
+
+
+class _Displaced:
+    """Joints with errors of their centres.
+
+    Args:
+        robot: at home.
+        samples: (s, d) values of its dimensions.
+
+    Attributes:
+        centres: those that have an error so far.
+    """
+
+    def __init__(self, robot: HomeRobot, samples: FloatArray) -> None:
+        self._robot, self._samples = robot, samples
+        self.centres: list[Centre] = []
+        # By identity: paths of a limb share the joints of its stem.
+        self._joints: dict[int, Joint] = {}
+
+    def limb(self, limb: Limb) -> Limb:
+        """Return a limb with errors of its joint centres."""
+        labels: dict[int, str] = {}
+        joints: list[Joint] = []
+        for index, path in enumerate(limb.paths):
+            labels |= joint_labels(limb, index, path, labels)
+            joints += [joint for joint in path if not any(joint is each for each in joints)]
+        for group in self._groups(joints):
+            error = self._error(labels[id(group[0])], group)
+            for joint in group:
+                self._joints[id(joint)] = self._moved(joint, labels[id(joint)], error)
+        return replace(
+            limb,
+            stem=tuple(self._joints[id(each)] for each in limb.stem),
+            branches=tuple(tuple(self._joints[id(each)] for each in branch) for branch in limb.branches),
+        )
+
+    def _groups(self, joints: list[Joint]) -> list[list[Joint]]:
+        """Return the joints of a limb that have one centre."""
+        groups: list[list[Joint]] = []
+        for joint in joints:
+            for group in groups:
+                off = ca.norm_2(joint.point - group[0].point) / self._robot.size
+                function = ca.Function("off", [self._robot.symbols], [ca.densify(off)])
+                if all(float(function(each)) < INCIDENT for each in self._samples):
+                    group.append(joint)
+                    break
+            else:
+                groups.append([joint])
+        return groups
+
+    def _error(self, name: str, group: list[Joint]) -> SX:
+        """Return the error (3, 1) of a centre as far as it matters."""
+        axes = [axis for joint in group for axis in joint.axes if axis.kind is not AxisKind.TRANSLATION]
+        if not axes:
+            return SX.zeros(3)
+        error = self._new(name)
+        first = axes[0]
+        turns = all(axis.kind is AxisKind.ROTATION for axis in axes)
+        if turns and all(are_parallel(self._robot, first.axis, axis.axis, self._samples) for axis in axes[1:]):
+            return error - first.axis * ca.dot(first.axis, error)
+        return error
+
+    def _new(self, name: str) -> SX:
+        """Return the symbols of the error of a new centre."""
+        self.centres.append(Centre(name, SX.sym(f"error_{len(self.centres)}", 3)))
+        return self.centres[-1].error
+
+    def _moved(self, joint: Joint, name: str, error: SX) -> Joint:
+        """Return a joint whose centre is off."""
+        axes = []
+        for axis in joint.axes:
+            rod = axis.rod
+            if axis.kind is AxisKind.PARALLELOGRAM:
+                rod = rod + self._new(f"{name}, other end") - error
+            axes.append(replace(axis, point=axis.point + error, rod=rod))
+        return replace(joint, point=joint.point + error, axes=tuple(axes))

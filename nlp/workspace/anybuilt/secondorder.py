@@ -1,0 +1,114 @@
+"""Bounds of what a first-order change by errors of joint centres leaves out, over a whole workspace.
+
+With g a number of a machine and H its second derivatives by the errors e, on the way from the exact machine
+
+    |g(e) - g(0) - g'(0) e| <= 1/2 sum_jk |H_jk| |e_j| |e_k|,
+
+where H_jk is the block (3, 3) of centres j and k, and |H_jk| its Frobenius norm. The blocks are bounded over boxes of
+poses and all errors within the tolerance. The boxes with the largest bounds are bisected.
+"""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import FloatArray
+from ...certificate.kinks import refuse_jumps
+from ..general.cells import in_workspace, joined, whole_workspace
+from ..general.enclosing import Encloser
+from ..general.family import Family
+
+#: Number of boxes examined at once, and of all boxes.
+_BLOCK, _MOST = 32, 2048
+#: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
+_SHARE, _NEAR = 0.02, 1.2
+#: Part of itself by which a bound moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-9
+#: Operations whose derivatives jump: second derivatives say nothing of the change there.
+_KINKS = (ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LE, ca.OP_LT, ca.OP_IF_ELSE_ZERO)
+
+
+def is_smooth(family: Family, expression: SX) -> bool:
+    """Return whether an expression (1, 1) has no operation whose derivative jumps."""
+    function = ca.Function("number", [family.coordinates], [expression])
+    return not any(function.instruction_id(k) in _KINKS for k in range(function.n_instructions()))
+
+
+def second_order_change(family: Family, expression: SX, first: float, engine: str | None = None) -> float:
+    """Return a bound of the change of an expression beyond first order; infinite where none is found.
+
+    Args:
+        family: the machines; no coordinate of theirs follows from others.
+        expression: (1, 1) in their coordinates, smooth.
+        first: size of the first-order change at some pose, beside which a small bound is good enough.
+        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+    refuse_jumps(expression, family.coordinates)
+    H = ca.tril(ca.hessian(expression, family.errors)[0])
+    if not H.nnz():
+        return 0.0
+    rows, columns = (np.array(each) for each in H.sparsity().get_triplet())
+    blocks = _Blocks(rows, columns, len(family.names))
+    encloser = Encloser(family.coordinates, H.nz[:], engine)
+    factor = 0.5 * family.tolerance**2 * _OUTWARDS
+    problem = family.problem
+    cells, bounds, middles = whole_workspace(problem), np.array([math.inf]), np.array([0.0])
+    whole = np.where(cells.upper > cells.lower, cells.upper - cells.lower, np.inf)
+    done = 0
+    while done < _MOST:
+        worst = int(np.argmax(bounds))
+        if bounds[worst] <= max(_SHARE * first, _NEAR * middles[worst]):
+            break
+        order = np.argsort(-bounds)[:_BLOCK]
+        rest = np.setdiff1d(np.arange(len(bounds)), order)
+        now = cells.some(order)
+        if done:
+            split = np.argmax((now.upper - now.lower) / whole, axis=1)
+            every, middle = np.arange(len(order)), now.centre
+            low, high = now.lower.copy(), now.upper.copy()
+            high[every, split] = low[every, split] = middle[every, split]
+            now = joined([now._replace(upper=high), now._replace(lower=low)])
+            now = in_workspace(problem, now)
+        errors = np.full((len(now.lower), family.errors.numel()), family.tolerance)
+        forms = encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
+        with np.errstate(all="ignore"):
+            sizes = np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r
+        found = np.where(np.isfinite(sizes).all(axis=1), factor * blocks.sums(sizes), np.inf)
+        cells = joined([cells.some(rest), now])
+        bounds = np.concatenate([bounds[rest], found])
+        middles = np.concatenate([middles[rest], np.nan_to_num(factor * blocks.sums(np.abs(forms.c)))])
+        done += len(now.lower)
+    return float(bounds.max(initial=0.0))
+
+
+class _Blocks:
+    """Blocks of centres of a symmetric matrix whose lower entries are known.
+
+    Args:
+        rows, columns: (R,) places of its entries in and below the diagonal.
+        count: number m of centres.
+    """
+
+    def __init__(self, rows: FloatArray, columns: FloatArray, count: int) -> None:
+        self._block = rows // 3 * count + columns // 3
+        # An entry below the diagonal of a block on the diagonal stands for two of this block.
+        self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
+        self._count = count
+
+    def sums(self, sizes: FloatArray) -> FloatArray:
+        """Return the sums (B,) of the norms of all blocks from sizes (B, R) of the entries."""
+        total = np.zeros((len(sizes), self._count**2))
+        for k, block in enumerate(self._block):
+            total[:, block] += self._times[k] * sizes[:, k] ** 2
+        norms = np.sqrt(total).reshape(-1, self._count, self._count)
+        diagonal = np.trace(norms, axis1=1, axis2=2)
+        return np.asarray(2 * norms.sum(axis=(1, 2)) - diagonal)
+
+
