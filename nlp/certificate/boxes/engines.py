@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,6 +16,7 @@ from ..standardform import StandardForm
 from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
 from .firstpass import value_tape
+from .threads import Threads, pieces
 
 if TYPE_CHECKING:
     from ....models import FloatArray
@@ -44,10 +42,6 @@ class Engine(Protocol):
 
 #: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
 _BOXES_PER_JOB = 2048
-#: Boxes for each thread below which starting threads costs more than it saves.
-_WORTH_A_THREAD = 64
-#: Boxes that a thread takes at once: a whole number of the kernel's blocks of 32.
-_PIECE = 512
 
 
 class KernelEngine:
@@ -66,10 +60,9 @@ class KernelEngine:
         self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int | None = None
     ) -> None:
         self._module, self._shared = module, shared or 0
-        self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
+        self._threads = Threads(jobs)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
-        self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
         rows = search_rows(form, apart=shared is not None)
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
@@ -127,23 +120,15 @@ class KernelEngine:
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
-        def examine_part(begin: int, finish: int) -> None:
-            self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold, *models)
+        def examine_piece(piece: tuple[int, int]) -> None:
+            self._module.examine(self._form, (*ends, *found), count, *piece, threshold, *models)
 
-        if self._pool is None or count < _WORTH_A_THREAD * self._jobs:
-            examine_part(0, count)
-        else:
-            # Boxes cost differently, by what closes them: a thread that is done takes the next piece.
-            size = max(_WORTH_A_THREAD // 2, min(_PIECE, count // (2 * self._jobs)))
-            edges = [*range(0, count, size), count]
-            for each in [self._pool.submit(examine_part, *edge) for edge in itertools.pairwise(edges)]:
-                each.result()
+        self._threads.map(examine_piece, pieces(count, self._threads.jobs))
         return Examination(*found)
 
     def close(self) -> None:
         """Stop the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._threads.close()
 
 
 def _kernel_tape(tape: Tape) -> tuple[Any, ...]:
