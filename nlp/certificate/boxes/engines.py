@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..enclosing.quadratic import Ends, QuadraticModel
 from ..enclosing.quotients import search_rows
 from ..enclosing.tape import Tape
 from ..limbs.limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
@@ -93,11 +94,11 @@ class KernelEngine:
         matters = () if least is None else (np.ascontiguousarray(least),)
         found = self._examine(lower, upper, -np.inf, (m, rows, *matters))
         flags, L, sides = models_from_rows(rows, n, m)
-        closed = np.isin(found.verdict, (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED))
+        closed = (found.verdict != Verdict.OPEN) & (found.verdict != Verdict.BOUNDED)
         found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
         return LimbModels(
             is_possible=~closed,
-            defined=np.isin(flags, (1, 3)),
+            defined=(flags == 1) | (flags == 3),
             holds=flags >= 2,
             lower=found.lower,
             upper=found.upper,
@@ -109,6 +110,18 @@ class KernelEngine:
             high=found.bound,
             value=found.value,
         )
+
+    def bound(self, L: QuadraticModel) -> FloatArray:
+        """Return upper bounds (B,): see :meth:`screwsynth.nlp.certificate.enclosing.quadratic.QuadraticModel.bound`."""
+        bound = np.empty(L.middle.size)
+        self._module.models(len(L.b), _kernel_models(L), bound.size, bound)
+        return bound
+
+    def ends_reaching(self, L: QuadraticModel, level: FloatArray) -> Ends:
+        """Return ends for levels (B,): see ``ends_reaching`` of :class:`.quadratic.QuadraticModel`."""
+        low, high = np.empty(L.b.shape), np.empty(L.b.shape)
+        self._module.models(len(L.b), _kernel_models(L), level.size, np.ascontiguousarray(level), low, high)
+        return Ends(low, high)
 
     def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
         """Examine boxes on all threads; with ``models`` the number of shared variables and an array for the models."""
@@ -135,6 +148,12 @@ def _kernel_tape(tape: Tape) -> tuple[Any, ...]:
     """Return a tape as the kernel reads it: code, constants, and the numbers of instructions, registers and results."""
     code = np.stack([tape.op, tape.to, tape.a, tape.b, tape.first, tape.last], axis=1).astype(np.int32)
     return np.ascontiguousarray(code), tape.k, len(tape), tape.registers, tape.outputs
+
+
+def _kernel_models(L: QuadraticModel) -> tuple[FloatArray, ...]:
+    """Return models as the kernel reads them."""
+    arrays = (L.middle, L.b, L.H, L.w, L.slope_lo, L.slope_hi, L.rounding)
+    return tuple(np.ascontiguousarray(each) for each in arrays)
 
 
 def kernel() -> ModuleType | None:
