@@ -5,7 +5,7 @@
  * loops become vector instructions; the boxes are then examined one by one. Every formula is that of the Python
  * modules, in the same order; their docstrings and docs/certificate.md explain them. The headers of kernel/ have an idea
  * each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, enclosure,
- * quadratic, quotients, contraction, examination, secondorder, firstpass, blocks, enclosed.
+ * quadratic, quotients, contraction, examination, secondorder, firstpass, blocks, enclosed, models.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
  * nor with contraction to fused operations, which would make the two engines differ.
@@ -15,6 +15,7 @@
 #include <Python.h>
 
 #include "kernel/enclosed.h"
+#include "kernel/models.h"
 
 typedef struct {
     Py_buffer buffers[24];
@@ -158,7 +159,52 @@ static PyObject *enclose(PyObject *module, PyObject *args)
     Py_RETURN_NONE;
 }
 
+static PyObject *models(PyObject *module, PyObject *args)
+{
+    PyObject *arrays[7], *first, *low = NULL, *high = NULL;
+    Models found = {0};
+    Borrowed all = {.count = 0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "i(OOOOOOO)nO|OO", &found.n, &arrays[0], &arrays[1], &arrays[2], &arrays[3], &arrays[4],
+                          &arrays[5], &arrays[6], &found.B, &first, &low, &high))
+        return NULL;
+    Py_ssize_t n = found.n, B = found.B, D = sizeof(double), rows[] = {1, n, n * n, n, n, n, 1};
+    const double **inputs[] = {&found.middle,   &found.b,        &found.H,       &found.w,
+                               &found.slope_lo, &found.slope_hi, &found.rounding};
+    int good = n > 0 && B > 0;
+    if (!good)
+        PyErr_SetString(PyExc_ValueError, "the kernel got no variables or no boxes");
+    for (int i = 0; good && i < 7; i++)
+        good = (*inputs[i] = borrow(&all, arrays[i], rows[i] * B, D, 0)) != NULL;
+    if (good && high)
+        good = (found.level = borrow(&all, first, B, D, 0)) && (found.low = borrow(&all, low, n * B, D, 1)) &&
+               (found.high = borrow(&all, high, n * B, D, 1));
+    else if (good)
+        good = (found.bound = borrow(&all, first, B, D, 1)) != NULL;
+    double *memory = good ? malloc(memory_for_models(found.n) * sizeof(double)) : NULL;
+    if (good && !memory)
+        PyErr_NoMemory();
+    if (memory) {
+        Py_BEGIN_ALLOW_THREADS
+        if (found.bound)
+            bound_models(&found, memory);
+        else
+            reach_models(&found, memory);
+        Py_END_ALLOW_THREADS
+    }
+    free(memory);
+    for (int i = 0; i < all.count; i++)
+        PyBuffer_Release(&all.buffers[i]);
+    if (!memory)
+        return NULL;
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
+    {"models", models, METH_VARARGS,
+     "models(n, (middle, b, H, w, slope_lo, slope_hi, rounding), B, bound)\n"
+     "models(n, (...), B, level, low, high)\n\n"
+     "Write upper bounds (B,) of B quadratic models, or the ends (n, B) of points that can reach levels (B,)."},
     {"enclose", enclose, METH_VARARGS,
      "enclose(n, tape, (lower, upper, c, p, q, s, a), B)\n\n"
      "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a."},

@@ -31,6 +31,7 @@ from .limbs.limbsearch import IndependentSearch
 from .limbs.sharedsearch import SharedSearch
 from .separation import separate
 from .standardform import StandardForm, is_in_home_mode, standard_form
+from .symmetry import halved
 
 #: The gap asked for when none is given: a ten-thousandth.
 GAP = 1e-4
@@ -133,8 +134,10 @@ def _method(
 ) -> SearchMethod:
     """Return the search for a form: by limbs where it separates, else of the whole box.
 
-    The proof of limbs that share variables would need lists of boxes of their own: it is one of the whole box.
+    The proof of limbs that share variables would need lists of boxes of their own: it is one of the whole box. A proof
+    covers the whole box too where mirrors would leave a part of it.
     """
+    form = halved(form) if recorder is None else form
     separation = separate(form)
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)

@@ -16,7 +16,7 @@ from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.incumbent import Incumbent
 from screwsynth.nlp.certificate.limbs import sharedsearch
-from screwsynth.nlp.certificate.limbs.limbmodels import LimbModels
+from screwsynth.nlp.certificate.limbs.limbmodels import LimbEngine, LimbModels
 from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb
 from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
 from screwsynth.nlp.certificate.limbs.sharedcuts import LeftOwn
@@ -116,6 +116,19 @@ def test_the_engines_have_the_same_models_of_limbs() -> None:
         for name, values in vars(one.L).items():
             np.testing.assert_allclose(values, getattr(other.L, name), rtol=1e-9, atol=1e-9)
         assert form.n > limb.n
+        # Of the same models, with some that no number is known of.
+        L = other.L
+        with np.errstate(all="ignore"):
+            level = np.where(np.arange(200) % 2, L.bound() - 0.1 * (L.bound() - L.middle), -np.inf)
+        L.slope_lo[0, :3], L.H[0, 0, 3:6], L.middle[6:9] = np.nan, np.inf, np.nan
+        kernel_engine = limb_engine_for(limb, m, "c", 1)
+        with np.errstate(all="ignore"):
+            bound, ends = L.bound(), L.ends_reaching(level)
+        np.testing.assert_allclose(kernel_engine.bound(L)[3:], bound[3:], rtol=1e-12)
+        assert (kernel_engine.bound(L)[:3] >= bound[:3] * (1 - 1e-12)).all()
+        for mine, reference in zip(kernel_engine.ends_reaching(L, level), ends, strict=True):
+            np.testing.assert_allclose(mine, reference, rtol=1e-9, atol=1e-9)
+        assert 0 < np.count_nonzero(ends.low > -1) < ends.low.size
 
 
 def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
@@ -139,7 +152,7 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     at_good = engine.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good]))
     opposite = limb_engine_for(replace(limb, functions=(-limb.functions[0],)), m)
     fall = opposite.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])).L
-    part = bound_limb(models, at_good, fall, own, m)
+    part = bound_limb(engine, models, at_good, fall, own, m)
     assert (part.reached > -np.inf).all()
     value = ca.Function("f", [limb.x], [limb.functions[0]])
     e = rng.uniform(-1, 1, (m, B, points))
@@ -184,10 +197,16 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
     whole = sharedsearch.cut_own
 
     def careless(
-        good: np.ndarray, found: LimbModels, part: LimbBound, own: OwnBoxes, sums: np.ndarray, threshold: float
+        engine: LimbEngine,
+        good: np.ndarray,
+        found: LimbModels,
+        part: LimbBound,
+        own: OwnBoxes,
+        sums: np.ndarray,
+        threshold: float,
     ) -> LeftOwn:
         del sums
-        return whole(good, found, part, own, part.best, threshold)
+        return whole(engine, good, found, part, own, part.best, threshold)
 
     monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
     monkeypatch.setattr(sharedsearch, "cut_own", careless)
@@ -227,7 +246,7 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
             sums = search._examine(replace(boxes, bound=np.array([bound])))
             lists = [
                 sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
-                for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
+                for each in zip(search._engines, boxes.good, sums.models, sums.parts, boxes.own, strict=True)
             ]
         assert sums.bound[0] == min(bound, sums.sums[0])
         assert all(each.own.of.size for each in lists)

@@ -84,42 +84,44 @@ class BoxSearch(BoundedSearch[Boxes]):
             if self._recorder is not None:
                 # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
                 self._closed_bound = max(self._closed_bound, threshold)
-        if self._is_contracted_by_value(found):
-            self._closed_bound = max(self._closed_bound, threshold)
+        if self._closed_bound < threshold and self._is_contracted_by_value(found):
+            self._closed_bound = threshold
         self.boxes += boxes.count
-        bound = np.fmin(found.bound, boxes.bound)
-        lower, upper, split = found.lower, found.upper, found.split
-        every = np.arange(boxes.count)
+        # Most boxes of a block may be closed: only the open ones are looked at here, since this is no work for threads.
+        rest = np.flatnonzero(found.verdict == Verdict.OPEN)
+        lower, upper, split = found.lower[:, rest], found.upper[:, rest], found.split[rest]
+        bound = np.fmin(found.bound[rest], boxes.bound[rest])
+        every = np.arange(rest.size)
         low, high = lower[split, every], upper[split, every]
         middle = 0.5 * low + 0.5 * high
         whole = (self.form.upper - self.form.lower)[:, None]
         width = ((upper - lower) / whole).max(axis=0)
         least = np.where(np.isfinite(bound), _LEAST_WIDTH, _SINGULAR_WIDTH)
-        is_open = found.verdict == Verdict.OPEN
-        small = is_open & ((width < least) | ~((low < middle) & (middle < high)))
+        small = (width < least) | ~((low < middle) & (middle < high))
         # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
-        again = small & ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
-        once, done, cut = (np.flatnonzero(which) for which in (again, small & ~again, is_open & ~small))
-        first_child = np.full(boxes.count, -1, dtype=np.int64)
-        first_child[cut] = self._nodes + 2 * np.arange(cut.size)
-        first_child[once] = self._nodes + 2 * cut.size + np.arange(once.size)
+        at = np.flatnonzero(small)
+        moved = ((lower[:, at] != boxes.lower[:, rest[at]]) | (upper[:, at] != boxes.upper[:, rest[at]])).any(axis=0)
+        once, done, cut = at[moved], at[~moved], np.flatnonzero(~small)
+        first_child = self._nodes + 2 * np.arange(cut.size)
+        first_once = self._nodes + 2 * cut.size + np.arange(once.size)
         self._nodes += 2 * cut.size + once.size
         if self._recorder is not None:
-            is_cut = is_open & ~small
-            self._recorder.record(boxes, found, np.where(is_cut, middle, np.nan), first_child)
+            children = np.full(boxes.count, -1, dtype=np.int64)
+            children[rest[cut]], children[rest[once]] = first_child, first_once
+            middles = np.full(boxes.count, np.nan)
+            middles[rest[cut]] = middle[cut]
+            self._recorder.record(boxes, found, middles, children)
         if done.size:
-            self._undivided.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[done]))
-        self._opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_child[once]))
-        left, right = upper[:, cut].copy(), lower[:, cut].copy()
+            self._undivided.append(Boxes(lower[:, done], upper[:, done], bound[done], boxes.place[rest[done]]))
+        if once.size:
+            self._opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_once))
+        if at.size:
+            lower, upper, bound, split, middle = (each[..., cut] for each in (lower, upper, bound, split, middle))
+        halves = np.concatenate([lower, lower], axis=1), np.concatenate([upper, upper], axis=1)
         columns = np.arange(cut.size)
-        left[split[cut], columns] = right[split[cut], columns] = middle[cut]
+        halves[1][split, columns] = halves[0][split, cut.size + columns] = middle
         self._opened.push(
-            Boxes(
-                np.concatenate([lower[:, cut], right], axis=1),
-                np.concatenate([left, upper[:, cut]], axis=1),
-                np.concatenate([bound[cut], bound[cut]]),
-                np.concatenate([first_child[cut], first_child[cut] + 1]),
-            )
+            Boxes(*halves, np.concatenate([bound, bound]), np.concatenate([first_child, first_child + 1]))
         )
 
     def _is_contracted_by_value(self, found: Examination) -> bool:
@@ -127,7 +129,11 @@ class BoxSearch(BoundedSearch[Boxes]):
         # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
         # checker must show.
         count, rest = len(self.form.functions), (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
-        return any(bool(((why >= 0) & (why < count) & rest).any()) for why in (found.cut_lower, found.cut_upper))
+        return any(
+            # Numbers from 0 to count - 1, in one comparison: negative ones are large without a sign.
+            bool(((why.view(np.uint32) < count) & rest).any())
+            for why in (found.cut_lower, found.cut_upper)
+        )
 
 
 def reason_without_bound(form: StandardForm, lower: FloatArray, upper: FloatArray, bound: FloatArray) -> str:

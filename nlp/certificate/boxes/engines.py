@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..enclosing.quadratic import Ends, QuadraticModel
 from ..enclosing.quotients import search_rows
 from ..enclosing.tape import Tape
 from ..limbs.limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
@@ -19,6 +17,7 @@ from ..standardform import StandardForm
 from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
 from .firstpass import value_tape
+from .threads import Threads, pieces
 
 if TYPE_CHECKING:
     from ....models import FloatArray
@@ -44,10 +43,6 @@ class Engine(Protocol):
 
 #: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
 _BOXES_PER_JOB = 2048
-#: Boxes for each thread below which starting threads costs more than it saves.
-_WORTH_A_THREAD = 64
-#: Boxes that a thread takes at once: a whole number of the kernel's blocks of 32.
-_PIECE = 512
 
 
 class KernelEngine:
@@ -66,10 +61,9 @@ class KernelEngine:
         self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int | None = None
     ) -> None:
         self._module, self._shared = module, shared or 0
-        self._jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
+        self._threads = Threads(jobs)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
-        self._pool = ThreadPoolExecutor(self._jobs) if self._jobs > 1 else None
         functions = len(form.functions)
         rows = search_rows(form, apart=shared is not None)
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
@@ -100,11 +94,11 @@ class KernelEngine:
         matters = () if least is None else (np.ascontiguousarray(least),)
         found = self._examine(lower, upper, -np.inf, (m, rows, *matters))
         flags, L, sides = models_from_rows(rows, n, m)
-        closed = np.isin(found.verdict, (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED))
+        closed = (found.verdict != Verdict.OPEN) & (found.verdict != Verdict.BOUNDED)
         found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
         return LimbModels(
             is_possible=~closed,
-            defined=np.isin(flags, (1, 3)),
+            defined=(flags == 1) | (flags == 3),
             holds=flags >= 2,
             lower=found.lower,
             upper=found.upper,
@@ -117,6 +111,18 @@ class KernelEngine:
             value=found.value,
         )
 
+    def bound(self, L: QuadraticModel) -> FloatArray:
+        """Return upper bounds (B,): see :meth:`screwsynth.nlp.certificate.enclosing.quadratic.QuadraticModel.bound`."""
+        bound = np.empty(L.middle.size)
+        self._module.models(len(L.b), _kernel_models(L), bound.size, bound)
+        return bound
+
+    def ends_reaching(self, L: QuadraticModel, level: FloatArray) -> Ends:
+        """Return ends for levels (B,): see ``ends_reaching`` of :class:`.quadratic.QuadraticModel`."""
+        low, high = np.empty(L.b.shape), np.empty(L.b.shape)
+        self._module.models(len(L.b), _kernel_models(L), level.size, np.ascontiguousarray(level), low, high)
+        return Ends(low, high)
+
     def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
         """Examine boxes on all threads; with ``models`` the number of shared variables and an array for the models."""
         n, count = lower.shape
@@ -127,29 +133,27 @@ class KernelEngine:
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
-        def examine_part(begin: int, finish: int) -> None:
-            self._module.examine(self._form, (*ends, *found), count, begin, finish, threshold, *models)
+        def examine_piece(piece: tuple[int, int]) -> None:
+            self._module.examine(self._form, (*ends, *found), count, *piece, threshold, *models)
 
-        if self._pool is None or count < _WORTH_A_THREAD * self._jobs:
-            examine_part(0, count)
-        else:
-            # Boxes cost differently, by what closes them: a thread that is done takes the next piece.
-            size = max(_WORTH_A_THREAD // 2, min(_PIECE, count // (2 * self._jobs)))
-            edges = [*range(0, count, size), count]
-            for each in [self._pool.submit(examine_part, *edge) for edge in itertools.pairwise(edges)]:
-                each.result()
+        self._threads.map(examine_piece, pieces(count, self._threads.jobs))
         return Examination(*found)
 
     def close(self) -> None:
         """Stop the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._threads.close()
 
 
 def _kernel_tape(tape: Tape) -> tuple[Any, ...]:
     """Return a tape as the kernel reads it: code, constants, and the numbers of instructions, registers and results."""
     code = np.stack([tape.op, tape.to, tape.a, tape.b, tape.first, tape.last], axis=1).astype(np.int32)
     return np.ascontiguousarray(code), tape.k, len(tape), tape.registers, tape.outputs
+
+
+def _kernel_models(L: QuadraticModel) -> tuple[FloatArray, ...]:
+    """Return models as the kernel reads them."""
+    arrays = (L.middle, L.b, L.H, L.w, L.slope_lo, L.slope_hi, L.rounding)
+    return tuple(np.ascontiguousarray(each) for each in arrays)
 
 
 def kernel() -> ModuleType | None:

@@ -15,7 +15,7 @@ import numpy as np
 from ..boxes.bounding import NumpyEngine, ranges
 from ..boxes.examination import Verdict
 from ..enclosing.enclosure import midpoints
-from ..enclosing.quadratic import QuadraticModel
+from ..enclosing.quadratic import Ends, QuadraticModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,6 +66,12 @@ class LimbEngine(Protocol):
     def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
         """Return the models of boxes with ends (n, B)."""
 
+    def bound(self, L: QuadraticModel) -> FloatArray:
+        """Return upper bounds (B,): see :meth:`.quadratic.QuadraticModel.bound`."""
+
+    def ends_reaching(self, L: QuadraticModel, level: FloatArray) -> Ends:
+        """Return ends for levels (B,): see :meth:`.quadratic.QuadraticModel.ends_reaching`."""
+
     def close(self) -> None:
         """Stop its threads."""
 
@@ -85,6 +91,14 @@ class NumpyLimbEngine:
         """Return the models of boxes with ends (n, B)."""
         with np.errstate(all="ignore"):
             return self._limb_models(lower, upper, least)
+
+    def bound(self, L: QuadraticModel) -> FloatArray:
+        """Return upper bounds (B,) of models."""
+        return L.bound()
+
+    def ends_reaching(self, L: QuadraticModel, level: FloatArray) -> Ends:
+        """Return the ends of points that can reach levels (B,)."""
+        return L.ends_reaching(level)
 
     def close(self) -> None:
         """Do nothing: this engine has no threads."""

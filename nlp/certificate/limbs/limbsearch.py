@@ -7,6 +7,7 @@ of it has a bound above the limb's value at the incumbent by more than this part
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -18,31 +19,35 @@ from ..boxes.proofwriter import ProofWriter
 from ..incumbent import Incumbent
 from ..separation import Limb, Separation
 from ..standardform import StandardForm
+from ..symmetry import grouped
 
 #: Rounding of a sum of a few terms, in parts of their sizes: many times the largest possible.
 _SUM = 1e-14
 
 
 class LimbPoint:
-    """The part of the incumbent that belongs to one limb.
+    """The part of the incumbent that belongs to one limb, or to its copies too.
 
     Args:
-        limb: the limb.
+        limbs: the limb and its copies.
         whole: the incumbent, which a better part improves.
         parts: the best known part of each limb while there is no incumbent; shared by all limbs.
     """
 
-    def __init__(self, limb: Limb, whole: Incumbent, parts: dict[tuple[int, ...], FloatArray]) -> None:
-        self._limb, self._whole, self._parts = limb, whole, parts
+    def __init__(
+        self, limbs: Sequence[Limb], whole: Incumbent, parts: dict[tuple[int, ...], FloatArray]
+    ) -> None:
+        self._limbs, self._whole, self._parts = limbs, whole, parts
         self._at: FloatArray | None = None
         self._value = -math.inf
 
     @property
     def value(self) -> float:
-        """Value of the limb at the incumbent; -inf without one."""
+        """Value of the limb at the incumbent, the mean where it has copies; -inf without one."""
         if self._whole.x is not self._at and self._whole.x is not None:
-            self._at = self._whole.x
-            self._value = self._limb.form.value_at(self._at[list(self._limb.own)])
+            at = self._at = self._whole.x
+            values = [each.form.value_at(at[list(each.own)]) for each in self._limbs]
+            self._value = math.fsum(values) / len(values)
         return self._value
 
     def consider(self, point: FloatArray) -> None:
@@ -59,12 +64,13 @@ class LimbPoint:
 
     def _with_part(self, point: FloatArray) -> FloatArray | None:
         """Return the incumbent with another part; without one, the limbs' parts together, once there is one of each."""
-        own = list(self._limb.own)
         if self._whole.x is not None:
             whole = self._whole.x.copy()
-            whole[own] = point
+            for each in self._limbs:
+                whole[list(each.own)] = point
             return whole
-        self._parts[self._limb.own] = point
+        for each in self._limbs:
+            self._parts[each.own] = point
         whole = np.full(self._whole.size, np.nan)
         for places, part in self._parts.items():
             whole[list(places)] = part
@@ -92,16 +98,19 @@ class IndependentSearch:
         jobs: int | None,
         recorder: ProofWriter | None = None,
     ) -> None:
-        self._constant = separation.constant
+        self._constant, limbs = separation.constant, separation.limbs
+        # A proof has a tree for each limb.
+        groups = grouped([limb.form for limb in limbs]) if recorder is None else [[k] for k in range(len(limbs))]
+        self._copies = [len(group) for group in groups]
         parts: dict[tuple[int, ...], FloatArray] = {}
         self._searches = [
             BoxSearch(
-                limb.form,
-                engine_for(limb.form, engine, jobs),
-                LimbPoint(limb, incumbent, parts),
+                limbs[group[0]].form,
+                engine_for(limbs[group[0]].form, engine, jobs),
+                LimbPoint([limbs[each] for each in group], incumbent, parts),
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )
-            for k, limb in enumerate(separation.limbs)
+            for k, group in enumerate(groups)
         ]
         self._form, self._incumbent = form, incumbent
 
@@ -130,7 +139,7 @@ class IndependentSearch:
         """Upper bound of the maximum: the sum of the limbs' bounds, rounded up."""
         if self._is_infeasible:
             return -math.inf
-        bounds = [self._limb_bound(k) for k in range(len(self._searches))]
+        bounds = [count * self._limb_bound(k) for k, count in enumerate(self._copies)]
         total = math.fsum([*bounds, self._constant])
         return total + _SUM * math.fsum(map(abs, [*bounds, self._constant]))
 
@@ -146,10 +155,11 @@ class IndependentSearch:
     def step(self, threshold: float) -> None:
         """Examine a block of boxes of the limb that is furthest from its part of the threshold."""
         values = [each.incumbent.value for each in self._searches]
-        room = threshold - math.fsum([*values, self._constant]) if all(map(math.isfinite, values)) else -math.inf
+        every = [*(count * value for count, value in zip(self._copies, values, strict=True)), self._constant]
+        room = threshold - math.fsum(every) if all(map(math.isfinite, values)) else -math.inf
         # Twice, since the sum of the bounds is rounded up too.
-        rounding = 2 * _SUM * math.fsum(map(abs, [*values, room, self._constant]))
-        part = (room - rounding) / len(values) if math.isfinite(room) else -math.inf
+        rounding = 2 * _SUM * math.fsum(map(abs, [*every, room]))
+        part = (room - rounding) / sum(self._copies) if math.isfinite(room) else -math.inf
         openest = max(
             (k for k, each in enumerate(self._searches) if each.is_open),
             key=lambda k: self._searches[k].bound - values[k] if math.isfinite(values[k]) else math.inf,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +27,7 @@ class OwnBoxes:
     upper: FloatArray
     of: NDArray[np.int64]
 
-    @property
+    @cached_property
     def starts(self) -> NDArray[np.int64]:
         """(B,) place of the first box of each list; none may be empty."""
         return np.flatnonzero(np.diff(self.of, prepend=-1))

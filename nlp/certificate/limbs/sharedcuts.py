@@ -10,7 +10,7 @@ import numpy as np
 from ..enclosing.enclosure import midpoints
 from ..enclosing.intervals import ULP
 from ..enclosing.quadratic import Ends, GradientModel, QuadraticModel, affine_ends_reaching
-from .limbmodels import LimbModels
+from .limbmodels import LimbEngine, LimbModels
 from .limbsums import LimbBound, first_largest
 from .ownboxes import OwnBoxes, SharedBoxes
 
@@ -145,11 +145,18 @@ def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, 
 
 
 def cut_own(
-    good: FloatArray, found: LimbModels, part: LimbBound, own: OwnBoxes, sums: FloatArray, threshold: float
+    engine: LimbEngine,
+    good: FloatArray,
+    found: LimbModels,
+    part: LimbBound,
+    own: OwnBoxes,
+    sums: FloatArray,
+    threshold: float,
 ) -> LeftOwn:
     """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
 
     Args:
+        engine: finds the ends of models.
         good: (d, B) the best point known of the own variables.
         found: models of the limb.
         part: its bounds.
@@ -164,7 +171,7 @@ def cut_own(
     level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(part.best))
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), part.reached)
     keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
-    ends = part.L.ends_reaching(level[own.of])
+    ends = engine.ends_reaching(part.L, level[own.of])
     centre, radius = midpoints(own.lower, own.upper)
     own_ends = [Ends(ends.low[m:], ends.high[m:])]
     moved = _moved(found.lower[m:], found.upper[m:], centre, radius, own_ends, found.defined)

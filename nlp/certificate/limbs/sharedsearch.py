@@ -9,7 +9,7 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from ..boxes.bounding import NumpyEngine, ranges
 from ..boxes.boxsearch import reason_without_bound
 from ..boxes.engines import limb_engine_for
 from ..boxes.openboxes import BoundedSearch
+from ..boxes.threads import Threads
 from ..enclosing.enclosure import midpoints
 from ..enclosing.quadratic import GradientModel
-from .limbsums import bound_limb, first_largest, with_tilts
+from .limbmodels import LimbModels
+from .limbsums import LimbBound, bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
 
@@ -43,6 +45,13 @@ _PATIENCE = 1.0
 _SINGULAR_WIDTH, _LEAST_WIDTH = 2.0**-16, 2.0**-40
 
 
+class _ExaminedLimb(NamedTuple):
+    """Models of a limb, and its bounds."""
+
+    models: LimbModels
+    bound: LimbBound
+
+
 class SharedSearch(BoundedSearch[SharedBoxes]):
     """A search of limbs with shared variables.
 
@@ -51,7 +60,7 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         separation: its limbs.
         incumbent: the best point known, which the search improves.
         engine: name of the engine.
-        jobs: threads of the engine.
+        jobs: threads, which share the limbs.
     """
 
     def __init__(
@@ -63,10 +72,12 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         self._common_form = separation.common
         self._common = NumpyEngine(separation.common)
         m = self._m = len(separation.shared)
-        self._engines = [limb_engine_for(limb.form, m, engine, jobs) for limb in separation.limbs]
+        # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
+        self._threads = Threads(jobs)
+        self._engines = [limb_engine_for(limb.form, m, engine, 1) for limb in separation.limbs]
         # Minus a limb's function, for lower models.
         self._opposites = [
-            limb_engine_for(replace(limb.form, functions=(-limb.form.functions[0],)), m, engine, jobs)
+            limb_engine_for(replace(limb.form, functions=(-limb.form.functions[0],)), m, engine, 1)
             for limb in separation.limbs
         ]
         own = tuple(
@@ -89,9 +100,8 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         return ""
 
     def close(self) -> None:
-        """Stop the engines."""
-        for each in (*self._engines, *self._opposites):
-            each.close()
+        """Stop the threads."""
+        self._threads.close()
 
     def step(self, threshold: float) -> None:
         """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
@@ -111,19 +121,9 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""
-        models, parts = [], []
-        every = zip(self._engines, self._opposites, boxes.own, boxes.good, strict=True)
-        for engine, opposite, own, good in every:
-            place = [np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)]
-            at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
-            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
-            known = at_good.holds & at_good.defined
-            least = np.where(known, -fall.bound(), -np.inf)
-            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
-            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
-            models.append(engine.limb_models(lower, upper, least[own.of]))
-            self.boxes += own.of.size + boxes.count
-            parts.append(bound_limb(models[-1], at_good, fall, own, self._m))
+        found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
+        models, parts = [each.models for each in found], [each.bound for each in found]
+        self.boxes += sum(own.of.size + boxes.count for own in boxes.own)
         radius = midpoints(boxes.lower, boxes.upper).radius
         common = self._common.model(boxes.lower, boxes.upper, radius)
         low, high = ranges(common)
@@ -139,6 +139,27 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         bound = np.fmin(sums, boxes.bound)
         emptied = np.any([part.best == -np.inf for part in parts], axis=0)
         return SharedSums(models, parts, common, M, sums, bound, ~(impossible.any(axis=0) | emptied), binding)
+
+    def _examine_limb(self, k: int, boxes: SharedBoxes) -> _ExaminedLimb:
+        """Return models and bounds of a limb over shared boxes and its own boxes."""
+        engine, opposite, own, good = self._engines[k], self._opposites[k], boxes.own[k], boxes.good[k]
+        # NumPy's warnings are switched off for each thread by itself.
+        with np.errstate(all="ignore"):
+            place = [np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)]
+            at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
+            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+            known = at_good.holds & at_good.defined
+            least = np.where(known, -engine.bound(fall), -np.inf)
+            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
+            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
+            models = engine.limb_models(lower, upper, least[own.of])
+            return _ExaminedLimb(models, bound_limb(engine, models, at_good, fall, own, self._m))
+
+    def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
+        """Return a limb's own boxes that are left."""
+        with np.errstate(all="ignore"):
+            parts = boxes.good[k], sums.models[k], sums.parts[k], boxes.own[k]
+            return cut_own(self._engines[k], *parts, sums.sums, threshold)
 
     def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
         """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
@@ -171,8 +192,8 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
             self._closed_bound = max(self._closed_bound, float(sums.bound[bounded & sums.is_possible].max()))
         left = contract_shared(self._common_form, boxes, sums, threshold)
         lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
-        parts = zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
-        lists = [cut_own(*each, sums.sums, threshold) for each in parts]
+        limbs = range(len(self._engines))
+        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, threshold), limbs)
         good = tuple(each.good for each in lists)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         self._closed_bound = max(self._closed_bound, threshold)
