@@ -1,6 +1,7 @@
 """The checker's polynomials of second order against 200-bit balls, and what becomes of undefined values."""
 
 import importlib.util
+import itertools
 from pathlib import Path
 
 import casadi as ca
@@ -9,7 +10,8 @@ import pytest
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.paper.polynomials import Polynomial, PolynomialArithmetic, middles, places
+from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
 
@@ -123,7 +125,7 @@ def test_the_ball_is_of_third_order() -> None:
     arithmetic = PolynomialArithmetic(ca.Function("F", [form.x], [form.expressions[0]]))
     centre, width = form.lower[:, None] + 0.4 * (form.upper - form.lower)[:, None], (form.upper - form.lower)[:, None]
     sizes = [arithmetic(centre - h * width, centre + h * width)[0].s[0] for h in (2.0**-6, 2.0**-7, 2.0**-8)]
-    for wide, narrow in zip(sizes, sizes[1:], strict=False):
+    for wide, narrow in itertools.pairwise(sizes):
         assert 7 < wide / narrow < 9
 
 

@@ -1,4 +1,4 @@
-"""Ends of intervals for the check of a proof: each operation rounds them outwards by one number, or by a library's error.
+"""Ends of intervals for the check of a proof: operations move them outwards by one number, or by a library's error.
 
 An interval is a pair of arrays. An operation that may be undefined gives NaN, which proves nothing.
 """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..standardform import StandardForm
-from .polynomials import Polynomial, places
+from .polynomials import Polynomial, middles, places
 from .slopebounds import SumModel
 from .slopecut import cut_off
 
@@ -121,8 +121,7 @@ def reaching_part(
     one = np.ones_like(model.b)
     missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
     low, high = cut_off(missing, -model.b - half, half - model.b, -one, one)
-    centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
-    radius = np.nextafter(np.maximum(upper - centre, centre - lower), np.inf)
+    centre, radius = middles(lower, upper)
     margin = _SUMS * (np.abs(centre) + radius)
     with np.errstate(all="ignore"):
         # Only an end that was moved is written in the box's own numbers.

@@ -1,19 +1,17 @@
 """Check of a proof, without trust in who made it.
 
 The boxes of the tree start from the program's own bounds, so that the leaves cover them by construction. Every leaf
-and every face is a *claim* about one box, and the check shows each claim again with the interval slopes of
-:mod:`screwsynth.nlp.certificate.paper.slopes`; it bisects the box where they are too wide. It uses neither the
-arithmetic of the search nor its multipliers. Search and check share the case's expressions, and CasADi's derivatives
-of them.
+and every face is a *claim* about one box, and the check shows each claim again with the polynomials of
+:mod:`screwsynth.nlp.certificate.paper.polynomials`; it bisects the box where their balls are too large. It uses neither
+the arithmetic of the search nor its multipliers. Search and check share the case's expressions, and CasADi's
+derivatives of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,17 +19,19 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm, standard_form
+from .polynomials import places
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
 from .showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
 from .wrongclaims import Centres
 
-#: Number of boxes that are evaluated at once.
-_BLOCK = 512
+#: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of a value over them
+#: in between: a call of NumPy costs as much as a hundred boxes, and more coefficients do not fit in a cache.
+_FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
+#: Number of claims whose boxes wait at a time.
+_CLAIMS = 4096
 #: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
 _MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
-#: Error of a difference of two rounded numbers, in parts of their sizes.
-_SUMS = 1e-13
 #: Callback with the number of claims checked, and of those to be checked.
 CheckProgress = Callable[[int, int], None]
 
@@ -74,8 +74,8 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
         for claim in part.claims:
             groups.setdefault((claim.kind, claim.index), []).append(claim)
         for (kind, index), group in groups.items():
-            for start in range(0, len(group), 4 * _BLOCK):
-                some = group[start : start + 4 * _BLOCK]
+            for start in range(0, len(group), _CLAIMS):
+                some = group[start : start + _CLAIMS]
                 pieces += checker.show(kind, index, some)
                 done += len(some)
                 if progress is not None:
@@ -93,6 +93,7 @@ class _Checker:
 
     def __init__(self, form: StandardForm, bound: float) -> None:
         self._form, self._bound = form, bound
+        self._block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
         refuse_jumps(form.expressions, form.x)
 
     def _claim(self, kind: Node, index: int) -> BoundClaim | InfeasibleClaim | MonotoneClaim:
@@ -119,7 +120,7 @@ class _Checker:
         total = 0
         claimed, centres = self._claim(kind, index), Centres(self._form, self._bound, kind, index)
         while owner.size:
-            size = min(_BLOCK, owner.size)
+            size = min(self._block, owner.size)
             part = slice(owner.size - size, owner.size)
             a, b, of, deep = lower[:, part], upper[:, part], owner[part], depth[part]
             np.add.at(used, of, 1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..standardform import StandardForm
 from .polymodels import Forms, forms_of, polynomial_sum, reaching_part
-from .polynomials import PolynomialArithmetic
+from .polynomialrules import PolynomialArithmetic
 from .proof import Node
 from .slopeweights import weights_of
 
@@ -35,7 +35,7 @@ class Shown:
     lower: FloatArray
     upper: FloatArray
 
-    def keep(self, which: NDArray[np.intp], holds: FloatArray, change: FloatArray) -> None:
+    def keep(self, which: NDArray[np.intp], holds: NDArray[np.bool_], change: FloatArray) -> None:
         """Add what is shown of some boxes."""
         self.holds[which] |= holds
         self.change[:, which] = np.fmax(self.change[:, which], change)
