@@ -3,8 +3,9 @@
     python -P bench/random_proofs.py [first] [last] [seconds] [journal]
 
 A third of the cases are plain, a third has limits, and a third has several poses, some with limits. Prints each
-rejection, then the counts and the CPU time of the check, with the building of the program, over that of the search on
-one thread, with its proof. Each case is a line of JSON in the journal; those that it already has are not run again.
+rejection, and each bound that is below the best of some starts; then the counts and the CPU time of the check, with the
+building of the program, over that of the search on one thread, with its proof. Each case is a line of JSON in the
+journal; those that it already has are not run again.
 """
 
 import json
@@ -21,6 +22,9 @@ from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 from screwsynth.nlp.solver.solve import solve
+
+#: Starts with the best of which a bound is compared, and the part of F by which it may be below, which is rounding.
+STARTS, ROUNDING = 32, 1e-9
 
 
 def random_case(seed: int) -> str:
@@ -81,12 +85,19 @@ def examine(seed: int, seconds: float) -> dict[str, object]:
     """Certify a random case and check its proof."""
     text = random_case(seed)
     case = case_from_tables(tomllib.loads(text), name=f"random {seed}", source="random")
-    solution = solve(case, starts=4, jobs=1)
+    solution = solve(case, starts=STARTS, jobs=1)
     began = time.process_time()
     certified = certify(solution, gap=1e-4, time_limit=seconds, jobs=1, with_proof=True)
     search = time.process_time() - began
     certificate = certified.certificate
     row: dict[str, object] = {"seed": seed, "search": search, "outcome": "not proved"}
+    own = solution.outcomes[0].own
+    sign = -own.nlp.sign
+    best = max((sign * start.F for start in own.starts if start.violation <= ROUNDING), default=-np.inf)
+    if certificate is not None:
+        # Where no start is feasible, nothing is compared.
+        row["compared"] = bool(np.isfinite(best))
+        row["below"] = bool(sign * certificate.bound < best - ROUNDING * max(abs(best), 1e-6 * own.nlp.objective_scale))
     if certified.tree is None or certificate is None:
         return row
     row |= {"bytes": len(certified.tree), "boxes": certificate.boxes}
@@ -105,6 +116,10 @@ def print_summary(rows: list[dict[str, object]]) -> None:
     count = {each: sum(row["outcome"] == each for row in rows) for each in ("accepted", "rejected", "not proved")}
     ratios = [float(str(row["check"])) / float(str(row["search"])) for row in rows if "check" in row]
     print(", ".join(f"{name} {number}" for name, number in count.items()))
+    compared = [row for row in rows if row.get("compared")]
+    plain = sum(int(str(row["seed"])) % 3 == 0 for row in compared)
+    print(f"bounds compared with {STARTS} starts: {len(compared)} ({plain} plain), below the best: "
+          f"{sum(bool(row['below']) for row in compared)}")  # fmt: skip
     if ratios:
         largest = max((int(str(row["bytes"])) for row in rows if "check" in row), default=0)
         print(f"check over search: median {statistics.median(ratios):.1f}, largest {max(ratios):.1f}, above 20: "
@@ -126,6 +141,8 @@ def main() -> None:
         rows.append(row)
         if row["outcome"] == "rejected":
             print(f"{seed}: {row['message']}", flush=True)
+        if row.get("below"):
+            print(f"{seed}: the bound is below the best start", flush=True)
         if journal is not None:
             with journal.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")

@@ -10,6 +10,7 @@ import pytest
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
+from screwsynth.nlp.certificate.paper.polymodels import forms_of, polynomial_sum, reaching_part
 from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
 from screwsynth.nlp.certificate.standardform import standard_form
@@ -134,3 +135,35 @@ def test_a_power_without_a_rule_is_refused() -> None:
     arithmetic = PolynomialArithmetic(ca.Function("f", [x], [x**0.3]))
     with pytest.raises(UncoveredError, match="power"):
         arithmetic(np.array([[1.0]]), np.array([[2.0]]))
+
+
+def test_no_point_of_a_box_is_above_the_model_of_a_sum_or_outside_of_the_part_that_reaches_a_level() -> None:
+    form = standard_form(formulate(load_case("paper-4.3")))
+    assert len(form.expressions.elements()) == 2
+    rng = np.random.default_rng(4)
+    whole = (form.upper - form.lower)[:, None]
+    width = 10.0 ** rng.uniform(-3, -0.7, size=(1, 40)) * whole
+    centre = form.lower[:, None] + width + rng.random((form.n, 40)) * (whole - 2 * width)
+    lower, upper = centre - width, centre + width
+    forms = forms_of(
+        PolynomialArithmetic(ca.Function("f", [form.x], [form.expressions]))(lower, upper), lower, upper, form
+    )
+    weights = np.array([rng.random(40), -10 * rng.random(40) * (rng.random(40) > 0.3)])
+    model = polynomial_sum(forms, weights)
+    shares = np.concatenate([rng.random((200, form.n, 40)), rng.integers(0, 2, (200, form.n, 40))])
+    points = np.clip(lower + shares * (upper - lower), lower, upper)
+    values = ca.Function("f", [form.x], [form.expressions])(points.transpose(1, 0, 2).reshape(form.n, -1)).full()
+    sums = (weights[:, None] * values.reshape(2, 400, 40)).sum(axis=0)
+    size = np.abs(sums).max(axis=0)
+    assert (sums.max(axis=0) <= model.bound() + 1e-12 * size).all()
+    # The bound is of use: on the smaller half of the boxes it is close to the largest value found.
+    narrow = width[0] <= np.median(width[0])
+    spread = sums.max(axis=0) - sums.min(axis=0)
+    assert (model.bound() - sums.max(axis=0) <= spread)[narrow].all()
+    level = np.quantile(sums, 0.95, axis=0)
+    low, high = reaching_part(model, level, lower, upper)
+    reaches = (sums >= level + 1e-12 * size)[:, None]
+    inside = (points >= low) & (points <= high)
+    assert reaches.any()
+    assert (inside | ~reaches).all()
+    assert ((low > lower) | (high < upper)).any()

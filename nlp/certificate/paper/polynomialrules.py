@@ -135,8 +135,9 @@ class _Boxes(Composed[Polynomial]):
         """Return u plus a number."""
         P, number = u.P.copy(), np.array([by])
         P[0] += by
-        size = u.size + (np.abs(P[0]) + abs(by))
-        s = u.s * (1 + _ROUNDED) + _ROUNDED * size
+        centre = np.abs(P[0])
+        size = np.maximum(u.size - np.abs(u.P[0]), 0.0) + centre + _ROUNDED * u.size
+        s = u.s * (1 + _ROUNDED) + _ROUNDED * centre
         return Polynomial(u.on, P, s, ends.add(u.V, (number, number)), u.rad, u.curved, size)
 
     def mul(self, u: Polynomial, v: Polynomial) -> Polynomial:
@@ -195,7 +196,8 @@ class _Boxes(Composed[Polynomial]):
         steep, bent = np.abs(terms.slope), np.abs(terms.curve)
         s = steep * u.s + bent * ((2 * u.rad + u.curved) * u.curved + (2 * moved + u.s) * u.s)
         s = s + terms.third * (reach * reach * reach)
-        s = s + terms.error * (1 + moved + moved * moved)
+        far = moved + u.s
+        s = s + terms.error * (1 + far + far * far)
         s = s + (at.slack * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size)) + _TINY)
         return self.settled(u.on, P, s, V)
 
