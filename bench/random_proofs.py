@@ -1,15 +1,19 @@
 """Random case files of all kinds, certified, and their proofs checked: how many are accepted, and at what cost.
 
-    python -P bench/random_proofs.py [first] [last] [seconds]
+    python -P bench/random_proofs.py [first] [last] [seconds] [journal]
 
 A third of the cases are plain, a third has limits, and a third has several poses, some with limits. Prints each
-rejection, then the counts and the median of the CPU time of the check over the time of the search on one thread.
+rejection, and each bound that is below the best of some starts; then the counts and the CPU time of the check, with the
+building of the program, over that of the search on one thread, with its proof. Each case is a line of JSON in the
+journal; those that it already has are not run again.
 """
 
+import json
 import statistics
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +21,10 @@ from screwsynth.nlp import case_from_tables
 from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
+from screwsynth.nlp.solver.solve import solve
 
-#: Bytes of a tree above which its check is left out: it takes too long for a run of hundreds.
-LARGEST = 12_000
+#: Starts with the best of which a bound is compared, and the part of F by which it may be below, which is rounding.
+STARTS, ROUNDING = 32, 1e-9
 
 
 def random_case(seed: int) -> str:
@@ -76,32 +81,72 @@ def random_case(seed: int) -> str:
     return "\n".join(lines) + "\n"
 
 
+def examine(seed: int, seconds: float) -> dict[str, object]:
+    """Certify a random case and check its proof."""
+    text = random_case(seed)
+    case = case_from_tables(tomllib.loads(text), name=f"random {seed}", source="random")
+    solution = solve(case, starts=STARTS, jobs=1)
+    began = time.process_time()
+    certified = certify(solution, gap=1e-4, time_limit=seconds, jobs=1, with_proof=True)
+    search = time.process_time() - began
+    certificate = certified.certificate
+    row: dict[str, object] = {"seed": seed, "search": search, "outcome": "not proved"}
+    own = solution.outcomes[0].own
+    sign = -own.nlp.sign
+    best = max((sign * start.F for start in own.starts if start.violation <= ROUNDING), default=-np.inf)
+    if certificate is not None:
+        # Where no start is feasible, nothing is compared.
+        row["compared"] = bool(np.isfinite(best))
+        row["below"] = bool(sign * certificate.bound < best - ROUNDING * max(abs(best), 1e-6 * own.nlp.objective_scale))
+    if certified.tree is None or certificate is None:
+        return row
+    row |= {"bytes": len(certified.tree), "boxes": certificate.boxes}
+    proof = proof_of(certified, text)
+    began = time.process_time()
+    try:
+        verified = check_proof(proof, program_of(case, proof.statement))
+        row |= {"outcome": "accepted", "leaves": verified.leaves, "pieces": verified.pieces}
+    except ProofError as error:
+        row |= {"outcome": "rejected", "message": str(error)}
+    return row | {"check": time.process_time() - began}
+
+
+def print_summary(rows: list[dict[str, object]]) -> None:
+    """Print the counts, and the ratios of CPU times."""
+    count = {each: sum(row["outcome"] == each for row in rows) for each in ("accepted", "rejected", "not proved")}
+    ratios = [float(str(row["check"])) / float(str(row["search"])) for row in rows if "check" in row]
+    print(", ".join(f"{name} {number}" for name, number in count.items()))
+    compared = [row for row in rows if row.get("compared")]
+    plain = sum(int(str(row["seed"])) % 3 == 0 for row in compared)
+    print(f"bounds compared with {STARTS} starts: {len(compared)} ({plain} plain), below the best: "
+          f"{sum(bool(row['below']) for row in compared)}")  # fmt: skip
+    if ratios:
+        largest = max((int(str(row["bytes"])) for row in rows if "check" in row), default=0)
+        print(f"check over search: median {statistics.median(ratios):.1f}, largest {max(ratios):.1f}, above 20: "
+              f"{sum(ratio > 20 for ratio in ratios)}; largest tree {largest} bytes", flush=True)  # fmt: skip
+
+
 def main() -> None:
     """Certify and check random cases, and print the counts."""
-    first, last, seconds = (float(text) for text in [*sys.argv[1:], *("0", "300", "4")[len(sys.argv) - 1 :]])
-    accepted, rejected, unproved, large, ratios = 0, 0, 0, 0, []
+    first, last, seconds = (float(text) for text in [*sys.argv[1:4], *("0", "300", "4")[len(sys.argv[1:4]) :]])
+    journal = Path(sys.argv[4]) if len(sys.argv) > 4 else None
+    rows: list[dict[str, object]] = []
+    if journal is not None and journal.exists():
+        rows = [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines()]
+    done = {row["seed"] for row in rows}
     for seed in range(int(first), int(last)):
-        text = random_case(seed)
-        case = case_from_tables(tomllib.loads(text), name=f"random {seed}", source="random")
-        certified = certify(case, gap=1e-4, starts=4, time_limit=seconds, jobs=1, with_proof=True)
-        certificate = certified.certificate
-        if certified.tree is None or certificate is None:
-            unproved += 1
+        if seed in done:
             continue
-        if len(certified.tree) > LARGEST:
-            large += 1
-            continue
-        proof = proof_of(certified, text)
-        began = time.process_time()
-        try:
-            check_proof(proof, program_of(case, proof.statement))
-            accepted += 1
-        except ProofError as error:
-            rejected += 1
-            print(f"{seed}: {error}", flush=True)
-        ratios.append((time.process_time() - began) / max(certificate.seconds, 1e-6))
-    print(f"accepted {accepted}, rejected {rejected}, too large {large}, not proved {unproved}; "
-          f"check over search: median {statistics.median(ratios):.1f}")  # fmt: skip
+        row = examine(seed, seconds)
+        rows.append(row)
+        if row["outcome"] == "rejected":
+            print(f"{seed}: {row['message']}", flush=True)
+        if row.get("below"):
+            print(f"{seed}: the bound is below the best start", flush=True)
+        if journal is not None:
+            with journal.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+    print_summary([row for row in rows if first <= int(str(row["seed"])) < last])
 
 
 if __name__ == "__main__":

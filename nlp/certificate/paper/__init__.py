@@ -1,5 +1,7 @@
 """Proofs as files, and their checker, which imports nothing of the search.
 
-The modules import each other in this order: ``proof`` (JSON and bytes), ``prooftree`` (claims of a proof), ``slopes``,
-``slopebounds``, ``slopeweights``, ``slopecut`` and ``proofcheck``.
+The modules import each other in this order: ``proof`` (JSON and bytes), ``prooftree`` (claims of a proof), ``ends`` and
+``operations`` (what both arithmetics share), ``slopes``, ``slopebounds``, ``slopeweights``, ``slopecut``,
+``polynomials``, ``polynomialrules``, ``polymodels``, ``showing``, ``wrongclaims`` and ``proofcheck``. Proofs of a whole
+box and of independent limbs are checked by polynomials.
 """

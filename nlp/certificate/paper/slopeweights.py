@@ -40,29 +40,45 @@ def lagrangian_weights(
     """
     G = np.array([[0.5 * (g.C[0] + g.C[1]) for g in row] for row in gradients]) * radius
     values = np.array([0.5 * (each.C[0] + each.C[1]) for each in expressions])
-    usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.array([np.isfinite(e.V[1]) for e in expressions])
+    return weights_of(functions, is_equation, values, np.array([each.V[1] for each in expressions]), G)
+
+
+def weights_of(
+    functions: int, is_equation: Sequence[bool], values: FloatArray, high: FloatArray, G: FloatArray
+) -> list[FloatArray]:
+    """Return the two choices of weights (R, N) from numbers.
+
+    Args:
+        functions: number of functions, which come before the conditions.
+        is_equation: whether each of the R expressions must be 0.
+        values: (R, N) values at the centres of the boxes.
+        high: (R, N) largest values on the boxes.
+        G: (R, n, N) gradients at the centres times the radii of the boxes.
+    """
+    usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.isfinite(high)
     for r in range(functions, len(G)):
         if not is_equation[r]:
             # A condition that cannot bind gets no weight.
-            usable[r] &= ~(expressions[r].V[1] < 0)
+            usable[r] &= ~(high[r] < 0)
     G, values = np.where(usable[:, None], G, 0.0), np.where(usable, values, 0.0)
     weights = np.zeros_like(values)
     weights[0] = 1.0
     if len(G) == 1:
         return [weights]
     left = G[0].copy()
+    bind = [r for r in range(functions, len(G)) if usable[r].any()]
     sizes = np.einsum("rin,rin->rn", G, G)
     for _ in range(_SWEEPS):
         for r in range(1, functions):
             _move_towards(r, functions, weights, G, left)
-        for r in range(functions, len(G)):
+        for r in bind:
             step = np.einsum("in,in->n", G[r], left) / np.where(sizes[r] > 0, sizes[r], np.inf)
             new = weights[r] - step if is_equation[r] else np.minimum(weights[r] - step, 0.0)
             left += (new - weights[r]) * G[r]
             weights[r] = new
     edge = weights.copy()
     for _ in range(_EDGE_SWEEPS):
-        for r in range(functions, len(G)):
+        for r in bind:
             _minimise_bound(edge[r], G[r], values[r], left, is_equation[r])
     return [weights, edge]
 

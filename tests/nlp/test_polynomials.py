@@ -1,0 +1,169 @@
+"""The checker's polynomials of second order against 200-bit balls, and what becomes of undefined values."""
+
+import importlib.util
+import itertools
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from screwsynth.nlp import formulate, load_case
+from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
+from screwsynth.nlp.certificate.paper.polymodels import forms_of, polynomial_sum, reaching_part
+from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
+from screwsynth.nlp.certificate.standardform import standard_form
+from screwsynth.nlp.errors import UncoveredError
+
+flint = pytest.importorskip("flint")
+_spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
+assert _spec is not None
+assert _spec.loader is not None
+balls = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(balls)
+
+UNARY = (
+    ca.sin, ca.cos, ca.sqrt, ca.exp, ca.log, ca.atan, ca.tan, ca.asin, ca.acos, ca.sumsqr,
+    ca.fabs, ca.sign, lambda x: -x, lambda x: 2 * x, lambda x: 1 / x, lambda x: x**3, lambda x: x**-2, lambda x: x**1.5,
+)  # fmt: skip
+BINARY = (
+    lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y, lambda x, y: x / y, ca.atan2, ca.hypot,
+    ca.fmin, ca.fmax, lambda x, y: x <= y,
+)  # fmt: skip
+N = 3
+
+
+def random_function(rng: np.random.Generator, steps: int) -> ca.Function:
+    """A graph of random operations on three variables and constants; every value is a result."""
+    x = ca.SX.sym("x", N)
+    values = list(ca.vertsplit(x))
+    while len(values) < N + steps:
+        one = values[rng.integers(len(values))]
+        if rng.random() < 0.45:
+            value = UNARY[rng.integers(len(UNARY))](one)
+        else:
+            other = ca.SX(float(rng.normal())) if rng.random() < 0.3 else values[rng.integers(len(values))]
+            value = BINARY[rng.integers(len(BINARY))](*((one, other) if rng.random() < 0.5 else (other, one)))
+        if not value.is_constant():
+            values.append(value)
+    return ca.Function("random", [x], [ca.densify(ca.vertcat(*values[N:]))])
+
+
+def is_outside(each: Polynomial, box: int, ball: object, e: list[object]) -> tuple[bool, bool]:
+    """Whether an exact value is surely outside of the polynomial's ball, or of the range."""
+    at, d = places(len(each.on)), len(each.on)
+    k = 0 if each.P.shape[1] == 1 else box
+    P = [flint.arb(float(p)) for p in each.P[:, k]]
+    own = [e[i] for i in each.on]
+    value = P[0]
+    for i in range(d):
+        value += P[1 + i] * own[i] + P[1 + d + i] * own[i] * own[i]
+    for p, i, j in zip(P[1 + 2 * d :], at.first, at.second, strict=True):
+        value += p * own[i] * own[j]
+    off = abs(ball - value)  # type: ignore[operator]
+    low, high = float(each.V[0][k]), float(each.V[1][k])
+    return bool(off > flint.arb(float(each.s[k]))), bool(ball < flint.arb(low) or ball > flint.arb(high))  # type: ignore[operator]
+
+
+def violations(function: ca.Function, low: np.ndarray, high: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Numbers of violations of balls, of ranges and of undefined values, and of what was checked, at random points."""
+    tape, values = compile_tape(function), PolynomialArithmetic(function)(low, high)
+    centre, radius = middles(low, high)
+    counts = np.zeros(4, dtype=int)
+    for box in range(low.shape[1]):
+        share = rng.random(len(low)) if box % 2 else rng.integers(0, 2, len(low))
+        point = np.clip(low[:, box] + share * (high[:, box] - low[:, box]), low[:, box], high[:, box])
+        e = [
+            (flint.arb(float(x)) - flint.arb(float(c))) / flint.arb(float(r)) if r > 0 else flint.arb(0)
+            for x, c, r in zip(point, centre[:, box], radius[:, box], strict=True)
+        ]
+        exact, sharp = balls.decided_balls(tape, point)
+        for each, ball, is_sharp in zip(values, exact, sharp, strict=True):
+            k = 0 if each.P.shape[1] == 1 else box
+            if np.isnan(each.s[k]):
+                counts += (0, 0, not np.isnan(each.V[0][k]), 0)
+            elif not ball.is_finite():
+                counts += (0, 0, is_sharp, 1)
+            else:
+                counts += (*is_outside(each, box, ball, e), 0, 1)
+    return counts
+
+
+def test_values_of_random_graphs_and_of_robots_stay_in_their_polynomials() -> None:
+    """Boxes of every size from points to units, some of them with sides of no width."""
+    counts = np.zeros(4, dtype=int)
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        centre = rng.normal(size=(N, 12)) * rng.choice([0.3, 1.0, 3.0], size=(1, 12))
+        width = 10.0 ** rng.uniform(-12, 0, size=(N, 12)) * (rng.random((N, 12)) > 0.15)
+        counts += violations(random_function(rng, 24), centre - width, centre + width, rng)
+    for name in ("paper-4.1-helical", "paper-4.4-max"):
+        form = standard_form(formulate(load_case(name)))
+        function = ca.Function("robot", [form.x], [form.expressions, form.jacobian])
+        whole = (form.upper - form.lower)[:, None]
+        centre = form.lower[:, None] + rng.random((form.n, 6)) * whole
+        width = 10.0 ** rng.uniform(-9, -1, size=(1, 6)) * whole
+        counts += violations(function, centre - width, centre + width, rng)
+    assert counts[:3].tolist() == [0, 0, 0]
+    assert counts[3] > 6000
+
+
+@pytest.mark.parametrize("bad", ["sqrt(x - 2)", "1 / x", "log(x)"])
+def test_what_may_be_undefined_proves_nothing(bad: str) -> None:
+    x = ca.SX.sym("x", 1)
+    inner = eval(bad, {"x": x, "sqrt": ca.sqrt, "log": ca.log})  # noqa: S307 - the three above
+    outer = [ca.sin(inner), ca.cos(inner) ** 2, ca.atan(inner), inner * (x + 3), ca.exp(ca.sin(inner)), inner <= x]
+    outer += [ca.fmax(inner, 0), ca.fmin(inner, x), inner + 2, -inner, 0.5 * inner, 2 - inner]
+    function = ca.Function("f", [x], [ca.vertcat(*outer)])
+    for each in PolynomialArithmetic(function)(np.array([[-1.0]]), np.array([[1.0]])):
+        assert np.isnan([each.s[0], each.V[0][0], each.V[1][0]]).all()
+
+
+def test_the_ball_is_of_third_order() -> None:
+    """Halving a box divides the ball by eight: terms of second order are in the coefficients."""
+    form = standard_form(formulate(load_case("paper-4.1-helical")))
+    arithmetic = PolynomialArithmetic(ca.Function("F", [form.x], [form.expressions[0]]))
+    centre, width = form.lower[:, None] + 0.4 * (form.upper - form.lower)[:, None], (form.upper - form.lower)[:, None]
+    sizes = [arithmetic(centre - h * width, centre + h * width)[0].s[0] for h in (2.0**-6, 2.0**-7, 2.0**-8)]
+    for wide, narrow in itertools.pairwise(sizes):
+        assert 7 < wide / narrow < 9
+
+
+def test_a_power_without_a_rule_is_refused() -> None:
+    x = ca.SX.sym("x", 1)
+    arithmetic = PolynomialArithmetic(ca.Function("f", [x], [x**0.3]))
+    with pytest.raises(UncoveredError, match="power"):
+        arithmetic(np.array([[1.0]]), np.array([[2.0]]))
+
+
+def test_no_point_of_a_box_is_above_the_model_of_a_sum_or_outside_of_the_part_that_reaches_a_level() -> None:
+    form = standard_form(formulate(load_case("paper-4.3")))
+    assert len(form.expressions.elements()) == 2
+    rng = np.random.default_rng(4)
+    whole = (form.upper - form.lower)[:, None]
+    width = 10.0 ** rng.uniform(-3, -0.7, size=(1, 40)) * whole
+    centre = form.lower[:, None] + width + rng.random((form.n, 40)) * (whole - 2 * width)
+    lower, upper = centre - width, centre + width
+    forms = forms_of(
+        PolynomialArithmetic(ca.Function("f", [form.x], [form.expressions]))(lower, upper), lower, upper, form
+    )
+    weights = np.array([rng.random(40), -10 * rng.random(40) * (rng.random(40) > 0.3)])
+    model = polynomial_sum(forms, weights)
+    shares = np.concatenate([rng.random((200, form.n, 40)), rng.integers(0, 2, (200, form.n, 40))])
+    points = np.clip(lower + shares * (upper - lower), lower, upper)
+    values = ca.Function("f", [form.x], [form.expressions])(points.transpose(1, 0, 2).reshape(form.n, -1)).full()
+    sums = (weights[:, None] * values.reshape(2, 400, 40)).sum(axis=0)
+    size = np.abs(sums).max(axis=0)
+    assert (sums.max(axis=0) <= model.bound() + 1e-12 * size).all()
+    # The bound is of use: on the smaller half of the boxes it is close to the largest value found.
+    narrow = width[0] <= np.median(width[0])
+    spread = sums.max(axis=0) - sums.min(axis=0)
+    assert (model.bound() - sums.max(axis=0) <= spread)[narrow].all()
+    level = np.quantile(sums, 0.95, axis=0)
+    low, high = reaching_part(model, level, lower, upper)
+    reaches = (sums >= level + 1e-12 * size)[:, None]
+    inside = (points >= low) & (points <= high)
+    assert reaches.any()
+    assert (inside | ~reaches).all()
+    assert ((low > lower) | (high < upper)).any()
