@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
 from .singularpose import SingularPose
+
+if TYPE_CHECKING:
+    from ..paper.record import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 128
@@ -39,6 +43,7 @@ def prove_rank(
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
+    recorder: TreeRecord | None = None,
 ) -> Regularity:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -49,11 +54,12 @@ def prove_rank(
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
+        recorder: records the boxes for a proof.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, engine)
+    search = _Search(problem, matrix, engine, recorder)
     try:
         reason = search.run(time_limit, most_boxes, progress)
     except KeyboardInterrupt:
@@ -64,9 +70,11 @@ def prove_rank(
 class _Search:
     """The state of a search."""
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, engine: str | None) -> None:
+    def __init__(
+        self, problem: Problem, matrix: RankMatrix, engine: str | None, recorder: TreeRecord | None = None
+    ) -> None:
         self._began = time.perf_counter()
-        self._problem = problem
+        self._problem, self._recorder = problem, recorder
         self._examiner = Examiner(problem, RankTest(matrix, problem.z, problem.start), engine)
         self._newton = SingularPose(problem, matrix)
         self._independent = list(problem.independent)
@@ -138,12 +146,24 @@ class _Search:
         apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
         found = box.contracted(lower, upper)
         kept = ~(apart | found.outside)
-        cells = cells.some(np.flatnonzero(kept))
+        before = cells
         own = [j for j in self._independent if j < count]
         columns = [free[j] for j in own]
         new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
-        new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
-        return cells._replace(lower=new_lower, upper=new_upper)
+        new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
+        cells = cells._replace(lower=new_lower, upper=new_upper)
+        if self._recorder is not None:
+            self._recorder.contractions(self._ends(before), self._ends(cells), ~kept)
+        return cells.some(np.flatnonzero(kept))
+
+    def _ends(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
+        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        box, free = self._problem.box, self._problem.free
+        lower, upper = (np.broadcast_to(each, (len(cells.lower), 6)).copy() for each in (box.lower, box.upper))
+        for j in self._independent:
+            if j < len(free):
+                lower[:, free[j]], upper[:, free[j]] = cells.lower[:, j], cells.upper[:, j]
+        return lower, upper
 
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
@@ -191,6 +211,9 @@ class _Search:
         if small.any():
             self._small.append(part.cells.some(np.flatnonzero(small)))
         if (~small).any():
+            if self._recorder is not None:
+                along = np.array([self._problem.free[own[k]] for k in split[~small]])
+                self._recorder.cuts(*self._ends(part.cells.some(~small)), along)
             halves = self._examiner.halves(part, split)
             self._stack.append(halves.some(np.concatenate([~small, ~small])))
 

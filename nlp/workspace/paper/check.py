@@ -21,7 +21,9 @@ from ...certificate.paper.proofcheck import check_proof
 from ...errors import ScrewsynthError
 from ...program.layout import Layout
 from ..machine import Legs, legs_of, workspace_of_case
-from ..posed import extreme_program, posed_layout
+from ..posed import extreme_program
+from .anyrobot.rankofrobot import rank_claim
+from .anyrobot.robotclaims import robot_claims
 from .ballrows import Joints
 from .clearanceclaim import ClearanceClaim
 from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
@@ -42,6 +44,7 @@ _ROUNDING = 1e-15
 #: Reason that each kind of claim must have.
 _REASONS = {
     "regular": ("regular", "singular"),
+    "constraints": ("regular",),
     "number": ("program",),
     "stroke": ("lengths",),
     "dead length": ("lengths",),
@@ -139,13 +142,16 @@ class _Checker:
             raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         _compare_legs(self._legs, proof)
-        self._layout: Layout = posed_layout(case, workspace)
+        robot = robot_claims(case, workspace, {each.name for each in proof.claims})
+        self._layout: Layout = robot.layout
         self._root: PoseRoot = pose_root(workspace)
         self._eps = leg_error_of(case, proof.leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
-            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, proof.leg_error)
+            self.expected = expected_claims(
+                case, self._layout, self._legs, proof.quantities, proof.leg_error, robot.more
+            )
         except ProofError:
             raise
         except ScrewsynthError as error:
@@ -161,8 +167,10 @@ class _Checker:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         if given.reason == "singular":
             return self._check_sides(each, given)
-        if each.kind == "regular":
-            self._show(RankClaim(self._root, self._joints), given.tree)
+        if each.kind in ("regular", "constraints"):
+            is_legs = self._legs is not None
+            ranks = RankClaim(self._root, self._joints) if is_legs else rank_claim(self._case, self._root, each.name)
+            self._show(ranks, given.tree)
             return CheckedClaim(each.name, each.sense)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
@@ -218,7 +226,7 @@ class _Checker:
         claim = each.claim
         if claim is None or given.bound is None:
             raise ProofError("the claim has no bound")
-        nlp = extreme_program(self._layout, claim.expression, claim.sense)
+        nlp = extreme_program(each.layout or self._layout, claim.expression, claim.sense)
         checked = check_proof(Proof("", each.name, Statement(), given.graph, given.bound, given.tree), nlp)
         self.leaves += checked.leaves
         self.pieces += checked.pieces
