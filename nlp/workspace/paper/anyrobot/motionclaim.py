@@ -11,6 +11,8 @@ column rank then says that there are no more freedoms anywhere in the box.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import casadi as ca
 import numpy as np
 
@@ -21,6 +23,9 @@ from ..pieces import Attempt
 from ..positive import contraction
 from .motions import Motions
 from .posedrobot import PosedRobot
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Part of itself by which a sum of nonnegative products moves outwards: more than the rounding of fewer than 400 terms.
 _UP = 1 + 1024 * UNIT
@@ -73,7 +78,9 @@ class MotionClaim:
         every[:, free] = shares
         return Attempt(holds, every)
 
-    def _judged(self, M: FloatArray, E: FloatArray, S: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _judged(
+        self, M: FloatArray, E: FloatArray, S: FloatArray, h: FloatArray
+    ) -> tuple[NDArray[np.bool_], FloatArray]:
         """Return what is shown (B,), and shares (B, n).
 
         Args:
