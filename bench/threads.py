@@ -94,7 +94,10 @@ def main(pairs: int, names: Iterable[str]) -> None:
             one.append(alone)
             two.append(both)
         ratios = " ".join(f"{a / b:.2f}" for a, b in zip(one, two, strict=True))
-        print(f"{name:10} {first.boxes:9,} {serial:7.1%} {allowed:9.2f} {min(one):12.2f} {min(two):12.2f}  {ratios}", flush=True)
+        print(
+            f"{name:10} {first.boxes:9,} {serial:7.1%} {allowed:9.2f} {min(one):12.2f} {min(two):12.2f}  {ratios}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -95,12 +95,15 @@ def verify_paper(proof: PaperProof, case: Case) -> None:
 
 def _words(claim: CheckedClaim, case: Case) -> str:
     """Return what is shown of a claim."""
+    from ..workspace.claims import CONSTRAINTS
+
     if claim.by_machine:
         return "refuted, at the pose given J is singular for a machine within the tolerance"
     if claim.is_refuted:
         return "refuted, J is singular at a pose between the two given"
     if claim.bound is None:
-        return "J has full rank at every pose"
+        whose = "the constraint wrenches keep their" if claim.name == CONSTRAINTS else "J has full"
+        return f"{whose} rank at every pose"
     side = "at least" if claim.sense == "min" else "at most"
     text = f"{side} {case.units.shown(claim.bound, claim.dimension):.10g} {case.units.label(claim.dimension)}".rstrip()
     if claim.limit is None:

@@ -1,38 +1,29 @@
-"""Ranks of any robot over a workspace, and the reach of limbs whose inverse is known in closed form."""
+"""Ranks of any robot over a workspace."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import casadi as ca
 import numpy as np
-from casadi import SX
 
-from ...models import Dimension, Model, Substitution, frozen_array
-from ...models.joints.closedform import ClosedForm
+from ...models import Model, frozen_array
 from ..case.case import Case
-from ..case.limits.constraint import Reading
-from ..case.limits.limits import Limits
-from ..case.pose import Free
-from ..case.task import Sense
-from ..case.workspace import Workspace
 from ..errors import UncoveredError
-from ..program.layout import Layout
-from .claims import Claim
+from .claims import CONSTRAINTS, REGULAR
 from .general.matrices import RankMatrix
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
-from .posed import posed_layout
 from .regular.search import RankProgress
 from .verdict import Outcome, Regularity
 
+if TYPE_CHECKING:
+    from .paper.record import PaperRecord
+
 #: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
 _POSES, _WORST = 2048, 8
-#: Random poses at which an equation is tested, and its largest residual, of order 1, where it holds by itself.
-_TESTS, _IDENTITY = 32, 1e-11
 _SEED = 0
 
 
@@ -51,6 +42,7 @@ def prove_ranks(
     engine: str | None = None,
     time_limit: float | None = None,
     progress: RankProgress | None = None,
+    paper: PaperRecord | None = None,
 ) -> Ranks:
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
@@ -61,15 +53,20 @@ def prove_ranks(
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds for each of the two searches.
         progress: called during them.
+        paper: records the searches for a proof.
     """
     try:
         problem = build_problem(case, model, box)
-        regular = prove_rank(problem, problem.locked, engine=engine, time_limit=time_limit, progress=progress)
-        constraints = None
-        if problem.unactuated is not None:
-            constraints = prove_rank(
-                problem, problem.unactuated, engine=engine, time_limit=time_limit, progress=progress
-            )
+        found = []
+        for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
+            if matrix is not None:
+                recorder = None if paper is None or problem.dependent else paper.own(name)
+                found.append(
+                    prove_rank(
+                        problem, matrix, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder
+                    )
+                )
+        regular, constraints = found[0], found[1] if len(found) > 1 else None
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(box, str(error)), None)
     return Ranks(_after_newton(regular, problem, problem.locked), constraints)
@@ -81,58 +78,6 @@ def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
         return found
     problem = build_problem(case, case.model, box)
     return _after_newton(found, problem, problem.locked)
-
-
-def without_identities(case: Case, model: Model, box: PoseBox) -> Model:
-    """Return a robot without the loop equations that hold at every pose of a box by themselves.
-
-    A Delta that is held without rotation is such a robot: the second rod of a limb closes with the first.
-
-    Args:
-        case: with fixed dimensions.
-        model: its robot; with unknowns all equations are kept.
-        box: the poses.
-    """
-    if model.unknowns or not model.closure:
-        return model
-    own = Substitution.identity(model)
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    scaled = ca.vertcat(*[each.scaled for each in model.closure])
-    function = ca.Function("closure", own.all, [ca.densify(scaled)])
-    poses = [box.pose(y) for y in box.random(_TESTS, np.random.default_rng(_SEED))]
-    found = [function(np.array(values), 0, pose.rotation, pose.position).full().ravel() for pose in poses]
-    # A limb that does not reach a pose has no value there.
-    largest = np.nanmax(np.abs(found), axis=0, initial=0.0)
-    known = np.isfinite(found).sum(axis=0) >= _TESTS // 2
-    holds = known & (largest <= _IDENTITY)
-    return replace(
-        model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity)
-    )
-
-
-def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, list[Claim]]:
-    """Return the claims that limbs reach every pose, and the case as symbols of the pose.
-
-    Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
-        workspace: the poses.
-    """
-    # No condition is left on a pose: where a limb does not reach it, its loop and its signs have no values.
-    bare = replace(closed.model, closure=(), loops=(), distances=(), signs=())
-    layout = posed_layout(replace(case, model=bare, limits=Limits()), workspace)
-    robot, own = layout.robots[0], Substitution.identity(bare)
-    unknowns = ca.vertcat(
-        SX(0, 1), *[layout.table.variables_vector[k] for at_pose in layout.places.unknowns for k in at_pose]
-    )
-    given = Substitution(robot.parameters, unknowns, robot.rotation, robot.position)
-    values = ca.Function("reach", own.all, [each.value for each in closed.reaches]).call(given.all)
-    reading = Reading(Dimension.NUMBER)
-    claims = [
-        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, "reach", 0.0)
-        for each, value in zip(closed.reaches, values, strict=True)
-    ]
-    return layout, claims
 
 
 def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix) -> Regularity:

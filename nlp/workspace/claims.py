@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from .worstnumber import Worst
 
+#: Names of the claims that J, and that the constraint wrenches alone, have full rank.
+REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
 OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
 

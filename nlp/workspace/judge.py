@@ -15,10 +15,11 @@ from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
-from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
+from .anyrobot import Ranks, not_judged, prove_ranks, touched
 from .built.builtclaims import NO_LEGS, built_claims
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of, exact_length_name, one_machine_name
+from .closedlayout import closed_layout, reach_claims
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
@@ -152,7 +153,7 @@ def _ranks(
         return Ranks(touched(case, box, found), None)
     if case.joint_centre_tolerance:
         return Ranks(not_judged(box, NO_LEGS), None)
-    return prove_ranks(case, closed.model, box, engine=engine, time_limit=time_limit, progress=progress)
+    return prove_ranks(case, closed.model, box, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,13 +198,13 @@ class _Numbers:
         layout = posed_layout(case, self.workspace)
         claims = claims_of(layout, names, with_objective=with_objective)
         if self.closed.reaches:
-            place, reaches = reach_claims(case, self.closed, self.workspace)
-            reaches = _as_built(place, self.workspace, legs, reaches, self._prove(place)).claims
+            reach = reach_claims(case, self.closed, self.workspace)
+            place = reach.layout
+            reaches = _as_built(place, self.workspace, legs, list(reach.claims), self._prove(place)).claims
             yield from self._add_proved(found, place, reaches)
             if all(each.outcome is Outcome.PROVED for each in found):
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
-                model = without_identities(case, self.closed.model, box)
-                layout = posed_layout(replace(case, model=model), self.workspace)
+                layout = closed_layout(case, self.closed, self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         shortest, claims = _as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))

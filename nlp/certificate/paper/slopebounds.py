@@ -26,6 +26,7 @@ class SumModel:
         fixed: (N,) the same, with the widths of all intervals and rounding.
         b: (n, N).
         H: (n, n, N) symmetric.
+        loose: (n, N) part of the width of the second derivatives in ``fixed`` that each variable has a share in.
         slope_low, slope_high: (n, N) gradient over the box.
         radius: (n, N) half widths, rounded up.
     """
@@ -34,6 +35,7 @@ class SumModel:
     fixed: FloatArray
     b: FloatArray
     H: FloatArray
+    loose: FloatArray
     slope_low: FloatArray
     slope_high: FloatArray
     radius: FloatArray
@@ -49,7 +51,7 @@ class SumModel:
 
     def change(self) -> FloatArray:
         """Return how much (n, N) the bound can gain from halving each variable."""
-        return np.asarray(np.abs(self.H).sum(axis=0) + 0.3 * np.abs(self.b))
+        return np.asarray(np.abs(self.H).sum(axis=0) + self.loose + 0.3 * np.abs(self.b))
 
 
 def sum_model(
@@ -91,12 +93,12 @@ def sum_model(
     total = total + _SUMS * sizes
     S_low, S_high = S_low * r[:, None] * r[None], S_high * r[:, None] * r[None]
     S_low, S_high = 0.5 * (S_low + S_low.swapaxes(0, 1)), 0.5 * (S_high + S_high.swapaxes(0, 1))
-    H, loose = 0.5 * (S_low + S_high), 0.5 * (S_high - S_low).sum(axis=(0, 1))
+    H, loose = 0.5 * (S_low + S_high), 0.5 * (S_high - S_low).sum(axis=0)
     b = 0.5 * (b_low + b_high) * r
     spread = (0.5 * (b_high - b_low) * r).sum(axis=0)
     sizes = sizes + np.abs(b).sum(axis=0) + np.abs(S_low).sum(axis=(0, 1)) + np.abs(S_high).sum(axis=(0, 1))
-    fixed = total + 0.5 * loose + spread + _SUMS * sizes
-    return SumModel(total, fixed, b, H, slope_low, slope_high, r)
+    fixed = total + 0.5 * loose.sum(axis=0) + spread + _SUMS * sizes
+    return SumModel(total, fixed, b, H, loose, slope_low, slope_high, r)
 
 
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:

@@ -110,5 +110,3 @@ class _Blocks:
         norms = np.sqrt(total).reshape(-1, self._count, self._count)
         diagonal = np.trace(norms, axis1=1, axis2=2)
         return np.asarray(2 * norms.sum(axis=(1, 2)) - diagonal)
-
-

@@ -75,8 +75,8 @@ def whole_workspace(problem: Problem) -> Cells:
     return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
 
 
-def in_workspace(problem: Problem, cells: Cells) -> Cells:
-    """Return the boxes that hold poses of the workspace, contracted to them."""
+def contracted_cells(problem: Problem, cells: Cells) -> tuple[Cells, NDArray[np.bool_]]:
+    """Return boxes contracted to the workspace, and (B,) whether they hold poses of it."""
     box, free = problem.box, list(problem.free)
     ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
     # Numbers of the pose that are not known yet may be any of the workspace.
@@ -84,13 +84,17 @@ def in_workspace(problem: Problem, cells: Cells) -> Cells:
     upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
     apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
     found = box.contracted(lower, upper)
-    kept = ~(apart | found.outside)
-    cells = cells.some(np.flatnonzero(kept))
     own = [j for j in problem.independent if j < len(free)]
     columns = [free[j] for j in own]
     new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
-    new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
-    return cells._replace(lower=new_lower, upper=new_upper)
+    new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
+    return cells._replace(lower=new_lower, upper=new_upper), ~(apart | found.outside)
+
+
+def in_workspace(problem: Problem, cells: Cells) -> Cells:
+    """Return the boxes that hold poses of the workspace, contracted to them."""
+    found, kept = contracted_cells(problem, cells)
+    return found.some(np.flatnonzero(kept))
 
 
 class Examined(NamedTuple):

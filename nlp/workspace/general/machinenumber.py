@@ -62,9 +62,7 @@ class _Bound:
             terms = np.abs(c) + np.abs(a).sum(axis=1) + (size * relation.reach).sum(axis=1) + whole
             lower = c + (own * relation.off).sum(axis=1) - whole - 2 * ROUNDING * terms
         known = np.isfinite(lower)
-        return Tested(
-            np.zeros(len(c), dtype=bool), np.nan_to_num(np.abs(by_pose)), np.where(known, lower, -np.inf)
-        )
+        return Tested(np.zeros(len(c), dtype=bool), np.nan_to_num(np.abs(by_pose)), np.where(known, lower, -np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +200,10 @@ class _Search:
         """Return the result at this state of the search."""
         open_bounds = self._bounds
         bound = min(closed, float(open_bounds.min(initial=math.inf)), self._best.value)
-        if self._dependent and math.isfinite(bound) and not is_connected(
-            self._examiner, joined(self._roots), self._independent
+        if (
+            self._dependent
+            and math.isfinite(bound)
+            and not is_connected(self._examiner, joined(self._roots), self._independent)
         ):
             bound, reason = -math.inf, "the assemblies in two neighbouring boxes are not proved to be the same"
         has_point = math.isfinite(self._best.value)

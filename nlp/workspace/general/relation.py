@@ -56,9 +56,7 @@ class Relation(NamedTuple):
     @property
     def reach(self) -> FloatArray:
         """Largest sizes (B, k) over the box."""
-        return np.asarray(
-            (np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING)
-        )
+        return np.asarray((np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING))
 
 
 def by_centres(slopes: FloatArray) -> FloatArray:

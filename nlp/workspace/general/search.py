@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +12,16 @@ from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached
 from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
-from .cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
+from .cells import Cells, Examined, Examiner, contracted_cells, joined, whole_workspace
 from .connected import is_connected
 from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
 from .singularpose import SingularPose
+
+if TYPE_CHECKING:
+    from ..paper.record import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 128
@@ -41,6 +45,7 @@ def prove_rank(
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
+    recorder: TreeRecord | None = None,
 ) -> Regularity:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -52,11 +57,12 @@ def prove_rank(
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
+        recorder: records the boxes for a proof.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, family, engine)
+    search = _Search(problem, matrix, family, engine, recorder)
     try:
         reason = search.run(time_limit, most_boxes, progress)
     except KeyboardInterrupt:
@@ -67,9 +73,16 @@ def prove_rank(
 class _Search:
     """The state of a search."""
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, family: Family | None, engine: str | None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        matrix: RankMatrix,
+        family: Family | None,
+        engine: str | None,
+        recorder: TreeRecord | None = None,
+    ) -> None:
         self._began = time.perf_counter()
-        self._problem, self._family = problem, family
+        self._problem, self._family, self._recorder = problem, family, recorder
         self._newtons = [SingularPose(problem, matrix)]
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
@@ -104,7 +117,7 @@ class _Search:
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            cells = in_workspace(self._problem, self._next())
+            cells = self._in_workspace(self._next())
             if not len(cells.lower):
                 continue
             self._boxes += len(cells.lower)
@@ -127,6 +140,22 @@ class _Search:
             self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
             cells = cells.some(np.arange(_BLOCK))
         return cells
+
+    def _in_workspace(self, before: Cells) -> Cells:
+        """Return the boxes that hold poses of the workspace, contracted to them."""
+        cells, kept = contracted_cells(self._problem, before)
+        if self._recorder is not None:
+            self._recorder.contractions(self._ends(before), self._ends(cells), ~kept)
+        return cells.some(np.flatnonzero(kept))
+
+    def _ends(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
+        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        box, free = self._problem.box, self._problem.free
+        lower, upper = (np.broadcast_to(each, (len(cells.lower), 6)).copy() for each in (box.lower, box.upper))
+        for j in self._independent:
+            if j < len(free):
+                lower[:, free[j]], upper[:, free[j]] = cells.lower[:, j], cells.upper[:, j]
+        return lower, upper
 
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
@@ -170,6 +199,9 @@ class _Search:
         if small.any():
             self._small.append(part.cells.some(np.flatnonzero(small)))
         if (~small).any():
+            if self._recorder is not None:
+                along = np.array([self._problem.free[own[k]] for k in split[~small]])
+                self._recorder.cuts(*self._ends(part.cells.some(~small)), along)
             halves = self._examiner.halves(part, split)
             self._stack.append(halves.some(np.concatenate([~small, ~small])))
 

@@ -22,7 +22,9 @@ from ...certificate.paper.proofcheck import check_proof
 from ...errors import ScrewsynthError
 from ...program.layout import Layout
 from ..machine import legs_of, workspace_of_case
-from ..posed import extreme_program, posed_layout
+from ..posed import extreme_program
+from .anyrobot.rankofrobot import rank_claim
+from .anyrobot.robotclaims import robot_claims
 from .ballrows import Joints
 from .built.built import Built
 from .clearanceclaim import ClearanceClaim
@@ -41,6 +43,7 @@ _ROUNDING = 1e-15
 #: Reason that each kind of claim must have.
 _REASONS = {
     "regular": ("regular", "singular", "singular machine"),
+    "constraints": ("regular",),
     "number": ("program",),
     "stroke": ("lengths", "one machine"),
     "dead length": ("lengths", "one machine"),
@@ -140,7 +143,8 @@ class _Checker:
             raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         compare_legs(self._legs, proof)
-        self._layout: Layout = posed_layout(case, workspace)
+        robot = robot_claims(case, workspace, {each.name for each in proof.claims})
+        self._layout: Layout = robot.layout
         self._root: PoseRoot = pose_root(workspace)
         self._tolerance = case.joint_centre_tolerance or 0.0
         if self._tolerance != proof.tolerance:
@@ -149,7 +153,9 @@ class _Checker:
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
-            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, proof.leg_error)
+            self.expected = expected_claims(
+                case, self._layout, self._legs, proof.quantities, proof.leg_error, robot.more
+            )
         except ProofError:
             raise
         except ScrewsynthError as error:
@@ -175,8 +181,11 @@ class _Checker:
             raise ProofError("errors of joint centres are covered for six straight legs alone")
         if given.reason in ("singular", "singular machine"):
             return self._check_sides(each, given) if given.reason == "singular" else self._check_machine(each, given)
-        if each.kind == "regular":
-            self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
+        if each.kind in ("regular", "constraints"):
+            if self._legs is None:
+                self._show(rank_claim(self._case, self._root, each.name), given.tree)
+            else:
+                self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
             return CheckedClaim(each.name, each.sense)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
@@ -240,11 +249,11 @@ class _Checker:
         self._built.refuse_unless_singular(self._root, given.sides)
         return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
 
-    def _bound_of(self, expression: SX, sense: Sense, given: PaperClaim) -> float:
-        """Return the bound of an expression that a tree of ``certify`` proves."""
+    def _bound_of(self, expression: SX, sense: Sense, given: PaperClaim, layout: Layout | None = None) -> float:
+        """Return the bound of an expression that a tree of ``certify`` proves, in a layout or that of the case."""
         if given.reason != "program" or given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
-        nlp = extreme_program(self._layout, expression, sense)
+        nlp = extreme_program(layout or self._layout, expression, sense)
         checked = check_proof(Proof("", given.name, Statement(), given.graph, given.bound, given.tree), nlp)
         self.leaves += checked.leaves
         self.pieces += checked.pieces
@@ -255,13 +264,14 @@ class _Checker:
         claim = each.claim
         if claim is None:
             raise ProofError("the claim has no number")
+        layout = each.layout or self._layout
         read = claim.reading.from_value
         if self._built is None:
-            bound = value = self._bound_of(claim.expression, claim.sense, given)
+            bound = value = self._bound_of(claim.expression, claim.sense, given, layout)
             shown = read(bound)
         else:
             number = self._built.number(claim)
-            bound = self._bound_of(number.expression, claim.sense, given)
+            bound = self._bound_of(number.expression, claim.sense, given, layout)
             shown, value = self._built.shown(claim, number, bound)
         keep_limit(each, value)
         self._bounds[each.key] = bound

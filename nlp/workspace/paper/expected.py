@@ -11,14 +11,12 @@ from ...case.limits.clearance import LegClearance
 from ...case.limits.legs import Actuator
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...program.layout import Layout
-from ..claims import Claim, asked_name, claims_of
+from ..claims import REGULAR, Claim, asked_name, claims_of
 from ..machine import Legs
 from .built.statement import with_further
 
 #: Names of the errors of the pose: of its position and of its rotation.
 ERRORS = ("position error", "rotation error")
-#: Name of the claim that J has full rank.
-REGULAR = "regular"
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +26,13 @@ class ExpectedClaim:
     Attributes:
         name: in the words of the command.
         sense: ``min`` or ``max`` for a number, else empty.
-        kind: ``regular``, ``number``, ``stroke``, ``dead length``, ``clearance``, ``singular value``, ``condition`` or
-            ``error``.
+        kind: ``regular``, ``constraints``, ``number``, ``stroke``, ``dead length``, ``clearance``, ``singular value``,
+            ``condition`` or ``error``.
         limit: of the number, in the unit of its search; None without one.
         claim: of a number that the search of ``certify`` bounds.
         legs: indices of the two legs of a clearance, or of the leg of a stroke.
         length: by which moments are divided.
+        layout: whose symbols the claim has; None for those of the other claims.
     """
 
     name: str
@@ -43,6 +42,7 @@ class ExpectedClaim:
     claim: Claim | None = None
     legs: tuple[int, ...] = ()
     length: float = 1.0
+    layout: Layout | None = None
 
     @property
     def key(self) -> tuple[str, str]:
@@ -56,7 +56,12 @@ def leg_error_of(case: Case, leg_error: float) -> float:
 
 
 def expected_claims(
-    case: Case, layout: Layout, legs: Legs | None, quantities: Sequence[str], leg_error: float
+    case: Case,
+    layout: Layout,
+    legs: Legs | None,
+    quantities: Sequence[str],
+    leg_error: float,
+    more: Sequence[ExpectedClaim] = (),
 ) -> list[ExpectedClaim]:
     """Return the claims about a case over its workspace.
 
@@ -66,11 +71,12 @@ def expected_claims(
         legs: its joint centres; None for a robot that is not six straight legs.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
+        more: claims about another robot than six straight legs alone.
 
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = [ExpectedClaim(REGULAR, "", "regular")]
+    found = [ExpectedClaim(REGULAR, "", "regular"), *more]
     # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
     numbers: dict[tuple[str, str], Claim] = {}
     spectral = (SmallestSingularValue.key, ConditionNumber.key)

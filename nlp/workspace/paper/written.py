@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from ....models.joints.closedform import closed_form
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...certificate.paper.proof import fingerprint
 from ..claims import asked_name, exact_length_name, one_machine_name
 from ..machine import Legs, legs_of
-from ..posed import posed_layout
 from ..verdict import Outcome
+from .anyrobot.robotclaims import RobotClaims, robot_claims
 from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
@@ -23,11 +22,14 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
-#: Reasons of claims about other robots than six straight legs.
+#: Reason of claims about machines within a tolerance that are not six straight legs.
 _AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
+#: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
-_CLOSED = "it was bounded with passive joints in closed form, which the checker of proofs does not know"
 _NO_BOUND = "its search has no bound"
+#: Reasons of claims about other robots than six straight legs.
+_NO_LOOPS = "proofs of ranks are written for robots whose loops are solved in closed form"
+_NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
@@ -44,23 +46,24 @@ def paper_of(
         leg_error: largest error of a leg's length.
     """
     legs = legs_of(judged.case)
-    layout = posed_layout(judged.case, judged.workspace)
+    robot, is_reached = _robot_claims(judged, record)
     # Of numbers of one name the first counts, and of strokes, which come later, that over all poses.
     keys = [_key(judged, each) for each in judged.extremes]
     last = dict(zip(keys, judged.extremes, strict=True))
     first = dict(zip(reversed(keys), reversed(judged.extremes), strict=True))
     proved: dict[tuple[str, str], PaperClaim] = {}
     unproved = []
-    expected = expected_claims(judged.case, layout, legs, quantities, leg_error)
+    expected = expected_claims(judged.case, robot.layout, legs, quantities, leg_error, robot.more)
     for each in expected:
         if judged.case.joint_centre_tolerance and legs is None:
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
             continue
-        if each.kind == "number" and legs is None and closed_form(judged.case.model).reaches:
-            unproved.append(Unproved(each.name, each.sense, _CLOSED))
+        if each.kind == "number" and each.layout is None and not is_reached:
+            unproved.append(Unproved(each.name, each.sense, _NO_REACH))
             continue
         extremes = first if each.kind == "number" else last
-        found = _regular(judged, record) if each.kind == "regular" else _number(each, extremes, record, proved)
+        is_rank = each.kind in ("regular", "constraints")
+        found = _rank(each, judged, record) if is_rank else _number(each, extremes, record, proved)
         if each.kind == "error" and not _has_lengths(judged, record, proved):
             found = _NO_LENGTHS
         if isinstance(found, PaperClaim):
@@ -68,8 +71,7 @@ def paper_of(
         else:
             unproved.append(Unproved(each.name, each.sense, found))
     known = {each.key for each in expected}
-    names = [] if judged.constraints is None else [("constraints regular", "")]
-    unproved += [Unproved(*key, _NO_RULES) for key in (*names, *keys) if key not in known]
+    unproved += [Unproved(*key, _NO_RULES) for key in keys if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
     missing = [each for each in ERRORS if (each, "max") not in proved]
     if len(missing) == 1:
@@ -120,18 +122,38 @@ def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str,
     return all((f"leg_length limb {name}", "min") in proved for name in names)
 
 
-def _regular(judged: Judgement, record: PaperRecord) -> PaperClaim | str:
-    """Return the claim that J has full rank with its proof, or why there is none."""
-    found, legs = judged.regularity, legs_of(judged.case)
-    if legs is None:
-        return "proofs of regular poses are written for robots with six straight legs"
+class _Robot(NamedTuple):
+    """Claims about a robot, and whether its numbers rest on no claim about reach that is not on paper."""
+
+    claims: RobotClaims
+    is_reached: bool
+
+
+def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
+    """Return the claims about the robot of a judgement, with the symbols in which its numbers were bounded."""
+    reaches = [each for each in judged.extremes if each.key == "reach"]
+    proved = {each.name for each in reaches if each.outcome is Outcome.PROVED}
+    on_paper = {each for each in proved if (found := record.programs.get((each, "min"))) and found.tree is not None}
+    # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
+    return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
+
+
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperClaim | str:
+    """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
+    found = judged.regularity if each.kind == "regular" else judged.constraints
+    if found is None:
+        return "it was not judged"
     if found.outcome is Outcome.PROVED:
-        return PaperClaim("regular", "", "regular", tree=record.rank.tree())
+        if legs_of(judged.case) is not None:
+            return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
+        own = record.boxes.get(each.name)
+        return _NO_LOOPS if own is None else PaperClaim(each.name, "", "regular", tree=own.tree())
     if found.outcome is Outcome.REFUTED and found.sides is not None:
-        return PaperClaim("regular", "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
-    if found.outcome is Outcome.REFUTED and found.errors is not None and found.y is not None:
+        return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+    legs = legs_of(judged.case)
+    if found.outcome is Outcome.REFUTED and found.errors is not None and found.y is not None and legs is not None:
         machine = found.errors.applied(legs)
-        return PaperClaim("regular", "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
+        return PaperClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
 
 

@@ -300,5 +300,3 @@ def _next(parts: list[_Boxes], places: list[int], independent: list[int], size: 
     states = np.tile(np.concatenate([each.states for each in parts], axis=1), 4)
     is_regular = np.tile(np.concatenate([each.is_regular for each in parts]), 4)
     return Cells(lower, upper, near, is_known), states, is_regular
-
-

@@ -1,0 +1,6 @@
+"""Claims about robots that are not six straight legs, and the check of their ranks.
+
+The modules import each other in this order: ``robotclaims`` (the claims, for both sides); for the check, ``posedrobot``
+(a robot with its dimensions as expressions of the pose), ``motions`` (the matrix whose null space has the motions that
+nothing resists), ``motionclaim`` (the claim that this matrix keeps its rank over boxes) and ``rankofrobot``.
+"""

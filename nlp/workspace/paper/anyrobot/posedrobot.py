@@ -1,0 +1,104 @@
+"""A robot with its dimensions as expressions of the pose, built for the check from the model and the case alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .....models import FloatArray, Member, Model, Substitution, Wrench
+from ....case.case import Case
+from ....case.pose import Free
+from ....case.workspace import TurnKind
+from ..poseroot import PoseRoot
+
+
+@dataclass(frozen=True, eq=False)
+class PosedRobot:
+    """A robot over a workspace.
+
+    Attributes:
+        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns.
+        free: indices of these coordinates among the six.
+        fixed: (6,) values of the others.
+        equations: (k, 1) that are 0 where the loops are closed, of order 1.
+        rows: rows of limbs, one wrench each.
+        members: members of limbs.
+        actuators: (6, 1) screws of actuators as twists with the world's origin as reference, by name of the limb.
+        position: (3, 1) the platform's origin, length.
+        length: by which rotations are multiplied, length: any positive number.
+    """
+
+    z: SX
+    free: tuple[int, ...]
+    fixed: FloatArray
+    equations: SX
+    rows: tuple[Wrench, ...]
+    members: tuple[Member, ...]
+    actuators: tuple[tuple[str, SX], ...]
+    position: SX
+    length: float
+
+    @property
+    def centre(self) -> FloatArray:
+        """(n,) the middle of the workspace, with unknowns of 0 as at home."""
+        middle = self.fixed[list(self.free)]
+        return np.concatenate([middle, np.zeros(self.z.numel() - len(self.free))])
+
+
+def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
+    """Return a robot over a workspace.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot, some of whose unknowns may have been replaced by expressions.
+        root: the box of coordinates.
+    """
+    middle = 0.5 * root.lower + 0.5 * root.upper
+    free = tuple(np.flatnonzero(root.upper > root.lower).tolist())
+    y = [SX.sym(f"y{k}") if k in free else SX(float(middle[k])) for k in range(6)]
+    unknowns = [SX.sym(item.name) for item in model.unknowns]
+    position = ca.vertcat(*y[:3])
+    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+    given = Substitution(
+        ca.vertcat(SX(0, 1), *values),
+        ca.vertcat(SX(0, 1), *unknowns),
+        _rotation(root, y[3:]),
+        position,
+    )
+    outputs = [
+        *[part for row in model.wrenches for part in (row.force, row.moment)],
+        *[part for member in model.members for part in (member.centre, member.screws)],
+        *[each.screw for each in model.actuators],
+        *[each.scaled for each in model.closure],
+    ]
+    following = iter(ca.Function("robot", Substitution.identity(model).all, outputs).call(given.all))
+    return PosedRobot(
+        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
+        free=free,
+        fixed=middle,
+        rows=tuple(replace(row, force=next(following), moment=next(following)) for row in model.wrenches),
+        members=tuple(
+            replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
+        ),
+        actuators=tuple((each.limb, next(following)) for each in model.actuators),
+        equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
+        position=position,
+        length=case.characteristic_length,
+    )
+
+
+def _rotation(root: PoseRoot, turn: list[SX]) -> SX:
+    """Return the rotation (3, 3) with three coordinates: the matrix of a quaternion, divided by its squared size."""
+    if root.kind is TurnKind.ROLL_PITCH_YAW:
+        roll, pitch, yaw = (_of_quaternion(t * SX.eye(3)[:, k]) for k, t in enumerate(turn))
+        return yaw @ pitch @ roll
+    return _of_quaternion(ca.vertcat(*turn) if root.kind is TurnKind.ANY_AXIS else turn[0] * SX(root.axis.tolist()))
+
+
+def _of_quaternion(r: SX) -> SX:
+    """Return the rotation of the quaternion (1, r)."""
+    square = ca.sumsqr(r)
+    return ((1 - square) * SX.eye(3) + 2 * r @ r.T + 2 * ca.skew(r)) / (1 + square)

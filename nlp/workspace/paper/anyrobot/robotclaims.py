@@ -1,0 +1,62 @@
+"""Claims about a robot that is not six straight legs alone: its constraint wrenches, and the reach of its limbs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+from .....models import Model, WrenchKind
+from .....models.joints.closedform import closed_form
+from ....case.case import Case
+from ....case.workspace import Workspace
+from ....program.layout import Layout
+from ...claims import CONSTRAINTS
+from ...closedlayout import closed_layout, reach_claims
+from ...machine import legs_of
+from ...posed import posed_layout
+from ..expected import ExpectedClaim
+
+
+class RobotClaims(NamedTuple):
+    """Claims about a robot over a workspace.
+
+    Attributes:
+        layout: the case as symbols of the pose in which its numbers are bounded: without the unknowns that follow in
+            closed form, where all limbs reach every pose.
+        more: claims about constraint wrenches and reach; none about six straight legs.
+    """
+
+    layout: Layout
+    more: tuple[ExpectedClaim, ...]
+
+
+def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
+    """Return the claims about a robot that is not six straight legs, and the symbols of its numbers.
+
+    Args:
+        case: with fixed dimensions.
+        workspace: the poses.
+        reached: names of those claims about reach that are proved.
+    """
+    if legs_of(case) is not None:
+        return RobotClaims(posed_layout(case, workspace), ())
+    closed = closed_form(case.model)
+    more = [ExpectedClaim(CONSTRAINTS, "", "constraints")] if has_constraints(closed.model) else []
+    layout = None
+    if closed.reaches:
+        reach = reach_claims(case, closed, workspace)
+        own = [
+            ExpectedClaim(each.name, each.sense.value, "number", each.limit, each, layout=reach.layout)
+            for each in reach.claims
+        ]
+        more += own
+        if all(each.name in reached for each in own):
+            layout = closed_layout(case, closed, workspace)
+    return RobotClaims(layout or posed_layout(case, workspace), tuple(more))
+
+
+def has_constraints(model: Model) -> bool:
+    """Return whether a robot has constraint wrenches, of which a rank is claimed."""
+    if model.generic is not None:
+        return 0 < model.generic.constraints < 6
+    return not model.members and any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
