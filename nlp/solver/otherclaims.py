@@ -12,7 +12,8 @@ from ...models.joints.closedform import closed_form
 from ..case.case import Case
 from ..interruption import is_requested
 from ..program.nlp import Nlp
-from ..workspace.anyrobot import not_judged, reach_claims
+from ..workspace.anyrobot import not_judged
+from ..workspace.closedlayout import reach_claims
 from ..workspace.judge import Judgement, judge_workspace
 from ..workspace.machine import workspace_of_case
 from ..workspace.numbers.extremes import prove_extreme
@@ -35,9 +36,9 @@ def judge(case: Case, *, gap: float, time_limit: float | None) -> Judgement:
     """
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     if closed.reaches:
-        layout, claims = reach_claims(case, closed, workspace)
-        prove = partial(prove_extreme, layout, gap=gap, time_limit=time_limit, jobs=1, interrupted=is_requested)
-        found = tuple(prove(claim) for claim in claims)
+        reach = reach_claims(case, closed, workspace)
+        prove = partial(prove_extreme, reach.layout, gap=gap, time_limit=time_limit, jobs=1, interrupted=is_requested)
+        found = tuple(prove(claim) for claim in reach.claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             unknown = not_judged(pose_box(workspace), _UNREACHED)
             return Judgement(case, workspace, unknown, found)

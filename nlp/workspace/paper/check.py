@@ -179,14 +179,8 @@ class _Checker:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         if self._tolerance and self._built is None:
             raise ProofError("errors of joint centres are covered for six straight legs alone")
-        if given.reason in ("singular", "singular machine"):
-            return self._check_sides(each, given) if given.reason == "singular" else self._check_machine(each, given)
         if each.kind in ("regular", "constraints"):
-            if self._legs is None:
-                self._show(rank_claim(self._case, self._root, each.name), given.tree)
-            else:
-                self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
-            return CheckedClaim(each.name, each.sense)
+            return self._check_rank(each, given)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
         if each.kind == "number":
@@ -229,6 +223,18 @@ class _Checker:
         leaves = read_leaves(tree, self._root.lower, self._root.upper)
         self.leaves += len(leaves.lower)
         self.pieces += show(claim, self._root, leaves)
+
+    def _check_rank(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check that J, or the constraint wrenches, keep their rank, or that J does not."""
+        if given.reason == "singular":
+            return self._check_sides(each, given)
+        if given.reason == "singular machine":
+            return self._check_machine(each, given)
+        if self._legs is None:
+            self._show(rank_claim(self._case, self._root, each.name), given.tree)
+        else:
+            self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
+        return CheckedClaim(each.name, each.sense)
 
     def _check_sides(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
         """Check that two poses of the workspace have determinants of opposite signs."""

@@ -139,7 +139,7 @@ class AnyLimits:
         """
         k, reaches = len(self._dependent), self._reaches
         forms = self._encloser(cells.lower.T, cells.upper.T)
-        relation = relation_of(forms.part(slice(0, k)), self._independent, self._dependent)
+        relation = relation_of(forms.part(slice(0, k)), self._independent, self._dependent, [])
         reach = self._ranges(forms.part(slice(k, k + reaches)), relation)
         values = self._ranges(forms.part(slice(k + reaches, -1)), relation)
         most = np.where(self._sign > 0, values.upper, -values.lower)

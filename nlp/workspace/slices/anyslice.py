@@ -82,7 +82,7 @@ class AnySlices:
             self._limits = AnyLimits(case, closed, problem)
             matrices = [problem.locked, *([] if problem.unactuated is None else [problem.unactuated])]
             tests = [RankTest(each, problem.z, problem.start) for each in matrices]
-            self._examiners = [Examiner(problem, each, None) for each in tests]
+            self._examiners = [Examiner(problem, each, None, None) for each in tests]
         except (NotJudgedError, UncoveredError) as error:
             raise CaseError("workspace", f"has no slices: {error}", source=case.source) from None
         self._dependent = list(problem.dependent)
@@ -147,7 +147,8 @@ class AnySlices:
         """Examine boxes, which are known to be regular already or not, and may have no closed loops."""
         count, k = len(cells.lower), len(self._dependent)
         cells, is_regular = self._with_ranks(cells, is_regular)
-        relation = Relation(np.zeros((count, k)), np.zeros((count, k, len(self.free))), np.full((count, k), np.inf))
+        slopes, errors = np.zeros((count, k, len(self.free))), np.zeros((count, k, 0))
+        relation = Relation(np.zeros((count, k)), slopes, np.full((count, k), np.inf), errors)
         reached, unreached = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         rows = np.flatnonzero(cells.is_known)
         states = known.copy()
