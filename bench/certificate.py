@@ -1,10 +1,12 @@
-"""Boxes and CPU seconds of certificates: by case and engine, by number of free variables, and by gap.
+"""Boxes and CPU seconds of certificates: by case and engine, by number of free variables, and by gap; and of checks.
 
     python -P bench/certificate.py
+    python -P bench/certificate.py proofs
 
 CPU time of this process on one thread, best of three where it is short, because the machine may be shared.
 """
 
+import sys
 import time
 from collections.abc import Iterable
 
@@ -13,6 +15,8 @@ from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solv
 from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import Certificate
+from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 LIMIT = 60.0
 
@@ -37,6 +41,33 @@ def row(name: str, solution: Solution, gap: float, engine: str) -> None:
         f"{name:34} {engine:6} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
         flush=True,
     )
+
+
+def proof_row(name: str, solution: Solution) -> None:
+    """Print the size of a proof for a gap of 1e-4, and the CPU seconds of its search and of its check."""
+    _, seconds = measure(solution, 1e-4, "c" if kernel() is not None else "numpy")
+    certified = certify(solution, gap=1e-4, jobs=1, time_limit=LIMIT, with_proof=True)
+    if certified.tree is None:
+        print(f"{name:34} not proved", flush=True)
+        return
+    proof = proof_of(certified, "")
+    began = time.process_time()
+    verified = check_proof(proof, program_of(solution.case, proof.statement))
+    spent = time.process_time() - began
+    print(
+        f"{name:34} {len(proof.tree):>9,} bytes {verified.leaves:>8,} leaves {verified.pieces:>8,} pieces "
+        f"search {seconds:.3f} s, check {spent:.2f} s, {spent / seconds:.1f} times",
+        flush=True,
+    )
+
+
+def proofs() -> None:
+    """Print what proofs cost."""
+    for name in ("paper-4.1-helical", "paper-4.1-rotation", "paper-4.3"):
+        proof_row(name, solve(load_case(name), starts=8))
+    for free in (6, 8):
+        solution = solve(case_with(free), starts=16)
+        proof_row(f"{solution.nlp.n} free variables", solution)
 
 
 def case_with(free: int) -> Case:
@@ -69,4 +100,4 @@ def main(engines: Iterable[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(["numpy"] if kernel() is None else ["c", "numpy"])
+    proofs() if sys.argv[1:] == ["proofs"] else main(["numpy"] if kernel() is None else ["c", "numpy"])

@@ -1,9 +1,10 @@
 """Random problems: certified bounds against the best of many Ipopt starts, and the cost of the certificates.
 
-    python -P bench/certified_random.py [problems] [starts] [gap] [seconds]
+    python -P bench/certified_random.py [problems] [starts] [gap] [seconds] [processes]
 
 Random platforms, layouts, twists, boxes and senses with 4 to 8 free variables, most with a rotation ball that is often
-active. Prints violations (there must be none), how many searches did not reach the gap, and times.
+active. Prints violations (there must be none), how many searches did not reach the gap, and times. Cases with limits and
+with several poses: ``bench/random_proofs.py``, which compares bounds with starts too.
 """
 
 import statistics
@@ -84,12 +85,12 @@ def print_summary(rows: list[dict[str, object]], starts: float, gap: float, limi
 
 
 def main() -> None:
-    """Examine random problems in two processes, and print a summary now and then."""
-    given = [*sys.argv[1:], *("500", "256", "1e-4", "60")[len(sys.argv) - 1 :]]
-    problems, starts, gap, limit = (float(text) for text in given)
+    """Examine random problems, in two processes unless told, and print a summary now and then."""
+    given = [*sys.argv[1:], *("500", "256", "1e-4", "60", "2")[len(sys.argv) - 1 :]]
+    problems, starts, gap, limit, processes = (float(text) for text in given)
     jobs = [(seed, int(starts), gap, limit) for seed in range(int(problems))]
     rows: list[dict[str, object]] = []
-    with get_context("spawn").Pool(2) as pool:
+    with get_context("spawn").Pool(int(processes)) as pool:
         for row in pool.imap_unordered(compare_with_starts, jobs):
             rows.append(row)
             if len(rows) % 50 == 0 or len(rows) == len(jobs):

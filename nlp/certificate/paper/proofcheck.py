@@ -19,15 +19,11 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm, standard_form
-from .polynomials import places
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
-from .showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
+from .showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown, boxes_at_once
 from .wrongclaims import Centres
 
-#: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of a value over them
-#: in between: a call of NumPy costs as much as a hundred boxes, and more coefficients do not fit in a cache.
-_FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
 #: Number of claims whose boxes wait at a time.
 _CLAIMS = 4096
 #: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
@@ -93,7 +89,7 @@ class _Checker:
 
     def __init__(self, form: StandardForm, bound: float) -> None:
         self._form, self._bound = form, bound
-        self._block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
+        self._block = boxes_at_once(form.n)
         refuse_jumps(form.expressions, form.x)
 
     def _claim(self, kind: Node, index: int) -> BoundClaim | InfeasibleClaim | MonotoneClaim:

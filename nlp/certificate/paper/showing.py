@@ -11,6 +11,7 @@ import numpy as np
 from ..standardform import StandardForm
 from .polymodels import Forms, forms_of, polynomial_sum, reaching_part
 from .polynomialrules import PolynomialArithmetic
+from .polynomials import places
 from .proof import Node
 from .slopeweights import weights_of
 
@@ -18,6 +19,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
+
+#: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of a value over them
+#: in between: a call of NumPy costs as much as a hundred boxes, and more coefficients do not fit in a cache.
+_FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
+
+
+def boxes_at_once(n: int) -> int:
+    """Return the number of boxes of n variables that are best evaluated at once."""
+    return min(max(_COEFFICIENTS // places(n).total, _FEWEST), _MOST)
 
 
 @dataclass(frozen=True, eq=False)
