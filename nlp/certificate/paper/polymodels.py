@@ -110,7 +110,8 @@ def polynomial_sum(forms: Forms, weights: FloatArray) -> PolynomialModel:
         sizes += np.where(used, np.abs(weight) * value.size, 0.0)
     fixed = fixed + ball * (1 + _SUMS) + _SUMS * sizes
     reach = np.abs(H).sum(axis=1)
-    return PolynomialModel(fixed, fixed, b, H, b - reach, b + reach, np.ones_like(b), balls * forms.share)
+    loose = np.zeros_like(b)
+    return PolynomialModel(fixed, fixed, b, H, loose, b - reach, b + reach, np.ones_like(b), balls * forms.share)
 
 
 def reaching_part(
