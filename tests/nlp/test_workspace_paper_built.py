@@ -23,12 +23,12 @@ from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.workspace.built.builtclaims import built_claims
 from screwsynth.nlp.workspace.claims import claims_of
 from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of
+from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.workspace.paper import check
 from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
 from screwsynth.nlp.workspace.paper.built import rules
 from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
-from screwsynth.nlp.workspace.paper.built.statement import with_further
+from screwsynth.nlp.workspace.paper.built.statement import BuiltNumbers, with_further
 from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
 from screwsynth.nlp.workspace.paper.poseroot import pose_root
 from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
@@ -36,7 +36,7 @@ from screwsynth.nlp.workspace.paper.record import PaperRecord
 from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
 from screwsynth.nlp.workspace.paper.written import paper_of
 from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.posed import posed_layout
+from screwsynth.nlp.workspace.posed import extreme_program, posed_layout
 
 Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
@@ -248,6 +248,33 @@ def test_further_claims_are_those_of_the_search(both: tuple[Judgement, PaperProo
     ours = [(each.name, each.sense, each.key) for each in with_further(layout, claims)]
     assert ours == [(each.name, each.sense, each.key) for each in built_claims(layout, workspace, robot, claims, 15.0)]
     assert len(ours) == len(claims) + len(missing)
+
+
+def test_rules_are_those_of_their_claims() -> None:
+    """With two tasks and a tolerance near 0 every number of all machines is that of its claim, in check and search."""
+    second = '[[task]]\nname = "turn"\nsense = "max"\naxis = [2, 1, 1]\npoint = [0, 1, 2]\npitch = 1\n[limits]'
+    case = case_of(TEXT.replace("joint_centre = 0.02", "joint_centre = 1e-9").replace("[limits]", second))
+    workspace, robot = workspace_of_case(case), legs_of(case)
+    assert robot is not None
+    layout = posed_layout(case, workspace)
+    # At one pose the dead length of a leg is no claim of its own: the limit is on all poses.
+    found = with_further(layout, claims_of(layout, ASKED[:1]))
+    claims = [each for each in found if not each.name.startswith("actuator.dead_length")]
+    numbers = BuiltNumbers(layout, rules.Machines(robot, layout.robots[0], 20.0, 21.0))
+    ours = [numbers.of(each).expression for each in claims]
+    searched = built_claims(layout, workspace, robot, claims, 20.0)
+    theirs = [
+        each.expression if each.worst is None or each.worst.expression is None else each.worst.expression
+        for each in searched
+    ]
+    nlp = extreme_program(layout, claims[0].expression, claims[0].sense)
+    values = ca.vertcat(*[each.expression for each in claims], *ours, *theirs)
+    function = ca.Function("values", [nlp.program.x, nlp.program.p], [values])
+    for start in ((0.2, 0.02), (-0.1, -0.03)):
+        exact, own, other = np.array(function(start, nlp.arguments)).reshape(3, -1)
+        np.testing.assert_allclose(own, exact, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(other, exact, rtol=1e-6, atol=1e-6)
+    assert len(claims) == len({(each.name, each.sense, each.key) for each in claims}) > 60
 
 
 class Machine:
