@@ -24,6 +24,7 @@ from screwsynth.nlp.workspace.built.builtclaims import built_claims
 from screwsynth.nlp.workspace.claims import claims_of
 from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.workspace.numbers.askedvalues import spectral_extremes
 from screwsynth.nlp.workspace.paper import check
 from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
 from screwsynth.nlp.workspace.paper.built import rules
@@ -37,6 +38,7 @@ from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
 from screwsynth.nlp.workspace.paper.written import paper_of
 from screwsynth.nlp.workspace.posebox import pose_box
 from screwsynth.nlp.workspace.posed import extreme_program, posed_layout
+from screwsynth.nlp.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
@@ -485,6 +487,11 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
         assert "wrong" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
+    # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
+    case = case_of()
+    options = {"gap": 0.1, "time_limit": 5.0, "interrupted": lambda: False, "shortest": 0.0}
+    for extreme in spectral_extremes(case, case.model, pose_box(judged.workspace), ASKED[1:], **options):  # type: ignore[arg-type]
+        assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 
 @pytest.mark.slow
