@@ -173,7 +173,10 @@ class _Context:
 
     def _of_rates(self, limit: RateShare | ActuatorRate, posed: PosedRobot) -> Iterator[_Limited]:
         """Yield the limits on rates: of each limb, for each task."""
-        places = itertools.product(self.case.model.limbs, range(len(self.rates)))
+        limbs, tasks = self.case.model.limbs, range(len(self.rates))
+        places = [(limb, j) for limb in limbs for j in tasks]
+        if isinstance(limit, RateShare):
+            places = [(limb, j) for j in tasks for limb in limbs]
         for item, (limb, j) in zip(limit.at_pose(posed), places, strict=True):
             i, rates, F = self.names.index(limb), self.rates[j], self.robot.F[j]
             worst = worst_share(rates, F, i) if isinstance(limit, RateShare) else worst_rate(rates, i)

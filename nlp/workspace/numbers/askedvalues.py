@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
+#: Reason for a measure of which nothing is known of every machine.
+_TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
 _POINTS, _SEED = 64, 0
 
@@ -79,9 +81,16 @@ def spectral_extremes(
         found = prove_minimum(
             oracle, box, gap=allowed, time_limit=time_limit, interrupted=interrupted, recorder=recorder
         )
-        outcome = Outcome.OPEN if found.reason else Outcome.PROVED
-        reached = (sign * found.bound, sign * found.value, box.pose(found.y), outcome)
-        extreme = Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, found.reason)
+        # A smallest singular value of at least 0, or an infinite condition number, says nothing.
+        is_bound = math.isfinite(found.bound) and (is_condition or found.bound > 0)
+        reason = found.reason or ("" if is_bound or not case.joint_centre_tolerance else _TOO_LARGE)
+        reached = (
+            sign * found.bound,
+            sign * found.value,
+            box.pose(found.y),
+            Outcome.OPEN if reason else Outcome.PROVED,
+        )
+        extreme = Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, reason)
         if case.joint_centre_tolerance and isinstance(oracle, SingularValues):
             extreme = replace(extreme, errors=oracle.errors(found.y))
         yield extreme

@@ -201,6 +201,6 @@ def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> PaperCla
         # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
         limit = reached + sign * _OUTWARDS * abs(reached) if each.limit is None else each.limit
         bound = sign * max(sign * limit, sign * reached)
-        if not math.isfinite(bound):
+        if not math.isfinite(bound) or (each.limit is None and not bound > 0):
             return _NO_BOUND
     return PaperClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())

@@ -75,10 +75,12 @@ def _changing(layout: Layout) -> Iterator[_Changing]:
     for limit in case.limits:
         if not isinstance(limit, _CHANGING):
             continue
-        # Constraints on angles are one for each leg, those on rates for each limb, and for each task of it.
-        tasks = 1 if isinstance(limit, JointAngle) else len(case.tasks)
-        order = names if isinstance(limit, JointAngle) else list(case.model.limbs)
-        places = [(names.index(name), j) for name, j in itertools.product(order, range(tasks))]
+        # Those on angles are one for each leg; those on rates are one for each limb and task, in two orders.
+        tasks = range(1 if isinstance(limit, JointAngle) else len(case.tasks))
+        order = [names.index(name) for name in (names if isinstance(limit, JointAngle) else case.model.limbs)]
+        places = list(itertools.product(order, tasks))
+        if isinstance(limit, RateShare):
+            places = [(i, j) for j in tasks for i in order]
         for item, place in zip(limit.at_pose(posed), places, strict=True):
             yield _Changing(item, limit, place)
 
