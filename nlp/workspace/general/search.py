@@ -103,7 +103,7 @@ class _Search:
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
                 progress(seconds, self._boxes, self._open)
-            cells = self._in_workspace(self._next())
+            cells = cells_in_workspace(self._problem, self._next())
             if not len(cells.lower):
                 continue
             self._boxes += len(cells.lower)
@@ -126,24 +126,6 @@ class _Search:
             self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
             cells = cells.some(np.arange(_BLOCK))
         return cells
-
-    def _in_workspace(self, cells: Cells) -> Cells:
-        """Return the boxes that hold poses of the workspace, contracted to them."""
-        problem, free = self._problem, list(self._problem.free)
-        box, count = problem.box, len(free)
-        ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
-        # Numbers of the pose that are not known yet may be any of the workspace.
-        lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
-        upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
-        apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
-        found = box.contracted(lower, upper)
-        kept = ~(apart | found.outside)
-        cells = cells.some(np.flatnonzero(kept))
-        own = [j for j in self._independent if j < count]
-        columns = [free[j] for j in own]
-        new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
-        new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
-        return cells._replace(lower=new_lower, upper=new_upper)
 
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
@@ -223,3 +205,22 @@ class _Search:
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,
         )
+
+
+def cells_in_workspace(problem: Problem, cells: Cells) -> Cells:
+    """Return the boxes that hold poses of the workspace, contracted to them."""
+    free = list(problem.free)
+    box, count = problem.box, len(free)
+    ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
+    # Numbers of the pose that are not known yet may be any of the workspace.
+    lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
+    upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
+    apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
+    found = box.contracted(lower, upper)
+    kept = ~(apart | found.outside)
+    cells = cells.some(np.flatnonzero(kept))
+    own = [j for j in problem.independent if j < count]
+    columns = [free[j] for j in own]
+    new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
+    new_lower[:, own], new_upper[:, own] = found.lower[kept][:, columns], found.upper[kept][:, columns]
+    return cells._replace(lower=new_lower, upper=new_upper)
