@@ -23,8 +23,8 @@ from casadi import SX
 
 from ...models import FloatArray, RobotInstance, Substitution, instantiate
 from ..case.case import Case
-from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.clearance import LegClearance
+from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.joints import JointAngle
 from ..case.limits.legs import Actuator
 from ..case.limits.limit import Design, PosedRobot

@@ -165,7 +165,7 @@ class _Search:
         size = np.maximum(np.abs(self._best), _NEAR_ZERO)
         with np.errstate(invalid="ignore"):
             beyond = self._best + self._gap * size
-        return np.where(self._best > self._values.limit, beyond, self._values.limit)
+        return np.asarray(np.where(self._best > self._values.limit, beyond, self._values.limit))
 
     def _add_points(self, cells: Cells, enclosed: Enclosed) -> None:
         """Try the middles of boxes, and for each number the end of the box with the largest bound."""
@@ -198,7 +198,10 @@ class _Search:
         found, values = [], self._values
         for k, claim in enumerate(values.claims):
             sign, read = float(values.sign[k]), claim.reading.from_value
-            best, bound = float(self._best[k]), math.inf if is_open else max(float(self._bound[k]), float(self._best[k]))
+            best, bound = (
+                float(self._best[k]),
+                math.inf if is_open else max(float(self._bound[k]), float(self._best[k])),
+            )
             pose = None
             if math.isfinite(best):
                 pose = self._problem.box.pose(self._problem.pose_of(self._at[k]))

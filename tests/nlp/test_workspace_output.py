@@ -25,9 +25,9 @@ from screwsynth.nlp.results.workspace import WorkspaceResult
 from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
 from screwsynth.nlp.workspace.machine import legs_of
 from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.workspace.slices.limitcells import LimitCells, LimitState
 from screwsynth.nlp.workspace.slices.regions import UNDECIDED
 from screwsynth.nlp.workspace.slices.slices import slices_of
-from screwsynth.nlp.workspace.slices.limitcells import LimitCells, LimitState
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -74,7 +74,8 @@ class AnyLimits:
             self._sampled.append(SampledLimit(key, oracle, -bound if is_condition else bound))
             limits[key] = SliceLimit(key, bound, Dimension.NUMBER, is_enclosed=False)
         places = {key: k for k, key in enumerate(limits)}
-        self._places = [places[each.key] for each in (*self._values.claims, *self._sampled)]
+        self._places = [places[each.key] for each in self._values.claims]
+        self._places += [places[each.key] for each in self._sampled]
         #: Keys of limits that are not decided on boxes.
         self.uncovered = tuple(uncovered)
         #: The limits, one for each key.

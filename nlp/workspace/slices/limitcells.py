@@ -10,8 +10,8 @@ from __future__ import annotations
 import enum
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -22,24 +22,20 @@ from ....models import Dimension, FloatArray
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
-from ...case.workspace import TurnKind
 from ...certificate.enclosing.enclosure import enclose
 from ...certificate.enclosing.instructions import compile_tape
 from ...errors import UncoveredError
-from ...program.layout import Layout, StatedPoseSymbols, lay_out
-from ...program.places import SymbolTable
+from ...program.layout import Layout
 from ..boxlayout import box_layout
 from ..claims import Claim, claims_of
+from ..general.limitvalues import ON_LIMIT
 from ..general.spectrum import Spectrum
 from ..machine import Legs
 from ..numbers.clearance import Clearance
 from ..numbers.singular import SingularValues
 from ..posebox import PoseBox
 
-#: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in the proofs.
-ON_LIMIT = 1e-9
 #: Boxes that are examined at once: the terms of six legs over one box take some ten thousand numbers.
 _BLOCK = 1024
 _CLEARANCE = "leg_clearance.min"
@@ -222,6 +218,7 @@ class SampledLimit:
         self._limit = limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
+        """Return the states (B,) over boxes (B, 6)."""
         kept = self._oracle.bounds(lower, upper).lower >= self._limit
         free = np.flatnonzero((upper > lower).any(axis=0))
         violated = self.violated(0.5 * lower + 0.5 * upper)
@@ -233,6 +230,7 @@ class SampledLimit:
         return states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return whether it is violated at points (P, 6): (P,)."""
         return np.asarray(self._oracle.values(points) < self._limit)
 
 
