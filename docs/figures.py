@@ -69,6 +69,8 @@ draw_gallery()
 plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
 machine = load_case("hexapod-linuxcnc")
 (FOLDER / "hexapod-linuxcnc-slices.png").write_bytes(slices_picture(machine, slices_of(machine), ".png"))
+head = load_case("reachy-mini-envelope")
+(FOLDER / "reachy-mini-slices.png").write_bytes(slices_picture(head, slices_of(head), ".png"))
 for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in (name for name in model_names() if name not in gallery_names()):

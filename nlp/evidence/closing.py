@@ -31,7 +31,7 @@ def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
     Returns:
         (n,) the point, as :func:`.kkt.close_equations` returns it.
     """
-    own = [index for at_pose in nlp.program.places.unknowns for index in at_pose]
+    own = list(nlp.program.places.inner)
     target = x.copy()
     target[own] = first[own]
     return close_equations(nlp, target)
@@ -42,8 +42,7 @@ def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found
-    # Unknowns at further poses of a workspace have a start of their own.
-    for pose, own in enumerate(nlp.program.places.unknowns[: len(nlp.program.robots)]):
+    for pose, own in enumerate(nlp.program.places.unknowns):
         state = evaluate(nlp, x, pose)
         parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
         place = np.concatenate([state.angle * state.axis, state.position])

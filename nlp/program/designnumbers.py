@@ -8,7 +8,7 @@ from .program import Program
 def design_indices(program: Program) -> tuple[int, ...]:
     """Return the indices in ``x`` of dimensions and poses: of all variables but joints, and an epigraph's level."""
     places = program.places
-    others = {index for each in places.unknowns for index in each}
+    others = set(places.inner)
     if places.epigraph is not None:
         others.add(places.epigraph.level)
     return tuple(k for k in range(len(program.variables)) if k not in others)
@@ -17,8 +17,7 @@ def design_indices(program: Program) -> tuple[int, ...]:
 def design_names(program: Program) -> frozenset[str]:
     """Return the names of the variables of a design, with those of its limits: all but joints and closed loops."""
     model = program.model
-    indices = {index for each in program.places.unknowns for index in each}
-    inner = {program.variables[index].name for index in indices}
+    inner = {program.variables[index].name for index in program.places.inner}
     names = {each.name for each in program.variables} | {each.name for each in program.constraints}
     closed = tuple(equation.name for equation in (*model.closure, *model.loops))
     return frozenset(name for name in names - inner if name.split(" at ")[0] not in closed)

@@ -139,7 +139,7 @@ class Nlp(Whole):
     def is_fixed(self) -> bool:
         """Whether the case leaves nothing free: all variables are internal unknowns, or the level of a worst pose."""
         places = self.program.places
-        own = {index for at_pose in places.unknowns for index in at_pose}
+        own = set(places.inner)
         own |= set() if places.epigraph is None else {places.epigraph.level}
         return len(own) == self.n
 

@@ -96,6 +96,7 @@ class Places:
         directions: indices in ``x`` of the three components of each unit vector with three free components.
         epigraph: places of the epigraph of a worst case; None where the objective consists of F itself.
         weights: indices in ``p`` of the tasks' weights; empty for one task.
+        further: indices in ``x`` of unknowns, and dependent numbers, at poses of a workspace that are constraints.
     """
 
     numbers: tuple[Place, ...]
@@ -105,6 +106,12 @@ class Places:
     directions: tuple[tuple[int, int, int], ...] = ()
     epigraph: Epigraph | None = None
     weights: tuple[int, ...] = ()
+    further: tuple[int, ...] = ()
+
+    @property
+    def inner(self) -> tuple[int, ...]:
+        """Indices in ``x`` of all unknowns: variables that closed loops determine."""
+        return (*(index for at_pose in self.unknowns for index in at_pose), *self.further)
 
 
 class PlacedSymbols(NamedTuple):

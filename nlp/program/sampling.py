@@ -41,9 +41,9 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
         # spreads it.
         radii = np.cbrt(inner + unit[:, rotation.q[0]] * (outer - inner))
         points[:, rotation.q] = radii[:, None] * _sphere_points(generator, count - 1)
-    for at_pose in nlp.program.places.unknowns:
-        # Joints start at home, from which the loops close: other values belong to other ways to assemble the robot.
-        points[:, list(at_pose)] = nlp.start[list(at_pose)]
+    # Joints start at home, from which the loops close: other values belong to other ways to assemble the robot.
+    inner = list(nlp.program.places.inner)
+    points[:, inner] = nlp.start[inner]
     return np.vstack([nlp.start, np.clip(points, nlp.lower, nlp.upper)])
 
 

@@ -158,15 +158,12 @@ class AnyBinder:
     def program(self, bound: Sequence[BoundPose]) -> Nlp:
         """Return the program with claims at poses as constraints."""
         nlp, program = self._nlp, self._nlp.program
-        unknowns, at = list(program.places.unknowns), nlp.n
-        for each in bound:
-            unknowns.append(tuple(range(at, at + len(each.variables))))
-            at += len(each.variables)
+        count = sum(len(each.variables) for each in bound)
         wider = replace(
             program,
             variables=(*program.variables, *(item for each in bound for item in each.variables)),
             x=ca.vertcat(program.x, *[each.symbols for each in bound]),
-            places=replace(program.places, unknowns=tuple(unknowns)),
+            places=replace(program.places, further=tuple(range(nlp.n, nlp.n + count))),
         )
         wide = replace(
             nlp,

@@ -43,14 +43,14 @@ class Distinct:
     def __init__(self) -> None:
         self._known: list[tuple[str, FloatArray, float]] = []
 
-    def adds(self, name: str, values: FloatArray) -> bool:
+    def adds(self, key: str, values: FloatArray) -> bool:
         """Return whether a claim's constraints are new, and note them.
 
         Args:
-            name: of the claim.
+            key: of their kind.
             values: (designs, constraints) their numbers.
         """
-        key, size = name.partition(" ")[0], float(np.abs(values).max(initial=0.0))
+        size = float(np.abs(values).max(initial=0.0))
         alike = (
             k == key and v.shape == values.shape and np.abs(v - values).max() <= _ALIKE * s for k, v, s in self._known
         )

@@ -234,7 +234,7 @@ def _without_images(nlp: Nlp, case: Case, fresh: Sequence[BindingPose], x: Float
         expressions = ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
         function = ca.Function("constraints", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
         values = np.array([function(point, nlp.arguments).full().ravel() for point in points])
-        if distinct.adds(each.name, values):
+        if distinct.adds(each.name.partition(" ")[0], values):
             kept.append(each)
     return kept
 

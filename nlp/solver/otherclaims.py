@@ -84,7 +84,8 @@ class OtherClaims:
             if bound is None:
                 continue
             values = np.array([bound.values(point, self._nlp.arguments) for point in points])
-            if distinct.adds(each.name, values):
+            # Limits of one size on joints of different limbs repeat each other too.
+            if distinct.adds(repr([(item.lower, item.upper) for item in bound.constraints]), values):
                 kept.append(each)
                 self._bound.append(bound)
         return kept

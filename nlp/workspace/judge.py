@@ -20,6 +20,7 @@ from .built.builtclaims import NO_LEGS, built_claims
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of, exact_length_name, one_machine_name
 from .closedlayout import closed_layout, reach_claims
+from .looplimits import loop_extremes
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
@@ -208,6 +209,12 @@ class _Numbers:
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         shortest, claims = _as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
+        if legs is None and self.paper is None and not case.joint_centre_tolerance:
+            search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            own = search(case, self.closed, box)
+            yield from _add(found, own)
+            known = {(each.name, each.sense) for each in own}
+            claims = [each for each in claims if each.limit is None or (each.name, each.sense) not in known]
         yield from self._add_proved(found, layout, claims)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
@@ -215,8 +222,8 @@ class _Numbers:
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
             yield from (each.outcome for each in found[before:])
-            own = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            yield from _add(found, own(case, legs, box, shortest=shortest, paper=self.paper))
+            others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
         spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
         yield from _add(found, spectral(case, self.closed.model, box, asked, shortest=shortest, paper=self.paper))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)

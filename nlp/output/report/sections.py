@@ -86,7 +86,7 @@ def _case(report: Report) -> Markup:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
     program = first.nlp.program
     # The epigraph's level and the joint positions that close the loops are the program's, not the case's.
-    internal = {k for indices in program.places.unknowns for k in indices}
+    internal = set(program.places.inner)
     if program.places.epigraph is not None:
         internal.add(program.places.epigraph.level)
     free = () if first.nlp.is_fixed else enumerate(program.variables)

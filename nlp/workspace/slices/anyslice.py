@@ -181,12 +181,12 @@ class AnySlices:
             for whole, part in zip(parts, found.cells, strict=True):
                 whole[some] = part
             regular[some] = found.is_regular
-        whole = Cells(*(each.copy() for each in cells))
-        for target, part in zip(whole, parts, strict=True):
+        every = cells.some(np.arange(len(cells.lower)))
+        for target, part in zip(every, parts, strict=True):
             target[rows] = part
         is_regular = is_regular.copy()
         is_regular[rows] = regular
-        return whole, is_regular
+        return every, is_regular
 
     def _grid(self, places: list[int], lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return closed loops (N, N, n) at the points of the grid, followed from the middle; NaN where they end."""
@@ -204,7 +204,7 @@ class AnySlices:
             back = at - np.sign(away[at[:, 0], at[:, 1]]) * (np.abs(away[at[:, 0], at[:, 1]]) == r) * (r > 0)
             z = grid[at[:, 0], at[:, 1]]
             z[:, dependent] = grid[back[:, 0], back[:, 1]][:, dependent]
-            known = np.isfinite(z).all(axis=1)
+            known = np.asarray(np.isfinite(z).all(axis=1))
             z[known] = loops.all_closed(z[known].T, dependent).T
             grid[at[:, 0], at[:, 1]] = np.where(known[:, None], z, np.nan)
         return grid

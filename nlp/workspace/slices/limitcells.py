@@ -10,8 +10,8 @@ from __future__ import annotations
 import enum
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -22,23 +22,20 @@ from ....models import Dimension, FloatArray
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
-from ...case.workspace import TurnKind
 from ...certificate.enclosing.enclosure import enclose
 from ...certificate.enclosing.instructions import compile_tape
 from ...errors import UncoveredError
-from ...program.layout import Layout, StatedPoseSymbols, lay_out
-from ...program.places import SymbolTable
+from ...program.layout import Layout
+from ..boxlayout import box_layout
 from ..claims import Claim, claims_of
+from ..general.limitvalues import ON_LIMIT
 from ..general.spectrum import Spectrum
 from ..machine import Legs
 from ..numbers.clearance import Clearance
 from ..numbers.singular import SingularValues
 from ..posebox import PoseBox
 
-#: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in the proofs.
-ON_LIMIT = 1e-9
 #: Boxes that are examined at once: the terms of six legs over one box take some ten thousand numbers.
 _BLOCK = 1024
 _CLEARANCE = "leg_clearance.min"
@@ -97,7 +94,7 @@ class LimitCells:
         parts: list[_Part] = []
         limits: dict[str, SliceLimit] = {}
         uncovered: dict[str, None] = {}
-        layout = slice_layout(case, box, chosen)
+        layout = box_layout(case, box, chosen)
         claims = [claim for claim in claims_of(layout, with_objective=False) if claim.limit is not None]
         for key in dict.fromkeys(claim.key for claim in claims):
             own = [claim for claim in claims if claim.key == key]
@@ -221,6 +218,7 @@ class SampledLimit:
         self._limit = limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
+        """Return the states (B,) over boxes (B, 6)."""
         kept = self._oracle.bounds(lower, upper).lower >= self._limit
         free = np.flatnonzero((upper > lower).any(axis=0))
         violated = self.violated(0.5 * lower + 0.5 * upper)
@@ -232,61 +230,10 @@ class SampledLimit:
         return states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return whether it is violated at points (P, 6): (P,)."""
         return np.asarray(self._oracle.values(points) < self._limit)
-
-
-class _Quaternion(NamedTuple):
-    """A quaternion of any size as expressions."""
-
-    w: SX
-    x: SX
-    y: SX
-    z: SX
 
 
 def states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
     """Return states from whether each claim is proved to be kept, or violated."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
-
-
-def slice_layout(case: Case, box: PoseBox, chosen: Sequence[int]) -> Layout:
-    """Return a case as symbols of the chosen coordinates; the others are at the middle of the box."""
-    middle = 0.5 * (box.lower + box.upper)
-    values: list[Value] = [
-        Free(float(box.lower[k]), float(box.upper[k])) if k in chosen else float(middle[k]) for k in range(6)
-    ]
-    one = replace(
-        case,
-        position=tuple(values[:3]),
-        rotation=Rotation(None, 0.0),
-        displacements=(HERE,),
-        further=(),
-        workspace=None,
-    )
-
-    def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
-        """Add a pose whose rotation is in the coordinates of the box."""
-        position = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
-        turns = [table.add(f"{prefix}turn_{k}", Dimension.NUMBER, value).symbols for k, value in enumerate(values[3:])]
-        rotation = _rotation(_quaternion(box, turns))
-        return StatedPoseSymbols(rotation, position.symbols, position.places, position.symbols, None, [], (HERE,))
-
-    return lay_out(one, one.tasks, add_pose)
-
-
-def _quaternion(box: PoseBox, turns: Sequence[SX]) -> _Quaternion:
-    """Return the quaternion of coordinates of a rotation, as :meth:`.PoseBox.quaternion`."""
-    a, b, c = turns
-    if box.kind is TurnKind.ANY_AXIS:
-        return _Quaternion(SX(1), a, b, c)
-    if box.kind is TurnKind.AXIS:
-        return _Quaternion(SX(1), *(a * float(part) for part in box.axis))
-    return _Quaternion(1 + a * b * c, a - b * c, b + a * c, c - a * b)
-
-
-def _rotation(quaternion: _Quaternion) -> SX:
-    """Return the rotation matrix (3, 3) of a quaternion of any size."""
-    w, x, y, z = quaternion
-    vector = ca.vertcat(x, y, z)
-    cross = ca.skew(vector)
-    return SX.eye(3) + 2 / (w * w + ca.sumsqr(vector)) * (w * cross + cross @ cross)

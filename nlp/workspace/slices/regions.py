@@ -26,7 +26,7 @@ class Region(enum.Enum):
     OTHER_SIGN = "regular, with the other sign of the determinant"
     OPEN = "open: too close to a singular pose"
     UNREACHED = "out of reach, proved"
-    UNKNOWN = "open: closed loops are not proved"
+    UNKNOWN = "open: reach or closed loops are not proved"
 
 
 class Cover(NamedTuple):
