@@ -3,8 +3,8 @@
     python -P bench/certified_random.py [problems] [starts] [gap] [seconds] [processes]
 
 Random platforms, layouts, twists, boxes and senses with 4 to 8 free variables, most with a rotation ball that is often
-active. Prints violations (there must be none), how many searches did not reach the gap, and times. Cases with limits and
-with several poses: ``bench/random_proofs.py``, which compares bounds with starts too.
+active. Prints violations (there must be none), how many searches did not reach the gap, and times. Cases with limits or
+several poses: ``bench/random_proofs.py``, which compares bounds with starts too.
 """
 
 import statistics

@@ -2,19 +2,24 @@
 
 import importlib.util
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from screwsynth.nlp import formulate, load_case
+from screwsynth.models import robot_function
+from screwsynth.nlp import Case, Free, Rotation, Task, formulate, load_case
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
 from screwsynth.nlp.certificate.paper.polymodels import forms_of, polynomial_sum, reaching_part
 from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
+from screwsynth.nlp.certificate.paper.proof import ProofError
+from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 flint = pytest.importorskip("flint")
 _spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
@@ -94,7 +99,7 @@ def test_values_of_random_graphs_and_of_robots_stay_in_their_polynomials() -> No
     """Boxes of every size from points to units, some of them with sides of no width."""
     counts = np.zeros(4, dtype=int)
     rng = np.random.default_rng(2)
-    for _ in range(60):
+    for _ in range(40):
         centre = rng.normal(size=(N, 12)) * rng.choice([0.3, 1.0, 3.0], size=(1, 12))
         width = 10.0 ** rng.uniform(-12, 0, size=(N, 12)) * (rng.random((N, 12)) > 0.15)
         counts += violations(random_function(rng, 24), centre - width, centre + width, rng)
@@ -106,7 +111,7 @@ def test_values_of_random_graphs_and_of_robots_stay_in_their_polynomials() -> No
         width = 10.0 ** rng.uniform(-9, -1, size=(1, 6)) * whole
         counts += violations(function, centre - width, centre + width, rng)
     assert counts[:3].tolist() == [0, 0, 0]
-    assert counts[3] > 6000
+    assert counts[3] > 4000
 
 
 @pytest.mark.parametrize("bad", ["sqrt(x - 2)", "1 / x", "log(x)"])
@@ -167,3 +172,22 @@ def test_no_point_of_a_box_is_above_the_model_of_a_sum_or_outside_of_the_part_th
     assert reaches.any()
     assert (inside | ~reaches).all()
     assert ((low > lower) | (high < upper)).any()
+
+
+def test_a_proof_whose_cuts_are_within_rounding_of_loop_equations_is_accepted() -> None:
+    """At home the rods of a 6-PUS fix its slides, and the search cuts down to widths of 1e-12."""
+    model = robot_function("6-pus")()
+    parameters: dict[str, object] = {item.name: item.typical[0] for item in model.parameters}
+    for name in ("rb", "rp"):
+        typical = float(parameters[name])  # type: ignore[arg-type]
+        parameters[name] = Free(0.95 * typical, 1.05 * typical)
+    size = float(np.linalg.norm(model.home))
+    task = Task(np.array([0.3, -0.5, 0.8, size, -0.4 * size, 0.6 * size]), "max")
+    case = Case(model, parameters, list(model.home), [task], Rotation(), characteristic_length=0.7 * size)
+    certified = certify(case, gap=1e-4, starts=4, with_proof=True)
+    proof = proof_of(certified, "")
+    nlp = program_of(case, proof.statement)
+    assert check_proof(proof, nlp).bound == proof.bound
+    assert proof.bound is not None
+    with pytest.raises(ProofError, match="could not be shown"):
+        check_proof(replace(proof, bound=certified.solution.F * (1 - 1e-6)), nlp)

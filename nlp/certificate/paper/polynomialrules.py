@@ -10,7 +10,7 @@ import numpy as np
 
 from . import ends
 from .operations import Composed, Steps
-from .polynomials import Places, Polynomial, middles, places
+from .polynomials import UNIT, Places, Polynomial, middles, places
 
 if TYPE_CHECKING:
     from ....models import FloatArray
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 #: More than underflow can cost an operation.
 _TINY = 1e-290
-#: Several roundings of a number, in parts of its size.
-_ROUNDED = 2.0**-50
+#: Roundings of each term of an operation, in parts of its size, with a margin. A sum, a multiple and a shift make one,
+#: a product and a square at most three, a quotient at most six, and a Taylor polynomial at most twelve with those of
+#: its slope and its curve.
+_ONCE, _PRODUCT, _QUOTIENT, _TAYLOR = 2 * UNIT, 6 * UNIT, 12 * UNIT, 16 * UNIT
 
 
 class PolynomialArithmetic:
@@ -108,16 +110,14 @@ class _Boxes(Composed[Polynomial]):
             if number is not None:
                 return self.shift(other, number)
         on, P, R = _together(u, v)
-        at, P = places(len(on)), P + R
-        return self.settled(on, P, u.s + v.s + at.slack * (u.size + v.size), ends.add(u.V, v.V))
+        return self.settled(on, P + R, u.s + v.s + _ONCE * (u.size + v.size), ends.add(u.V, v.V))
 
     def sub(self, u: Polynomial, v: Polynomial) -> Polynomial:
         number = self.number(v)
         if number is not None:
             return self.shift(u, -number)
         on, P, R = _together(u, v)
-        at, P = places(len(on)), P - R
-        return self.settled(on, P, u.s + v.s + at.slack * (u.size + v.size), ends.sub(u.V, v.V))
+        return self.settled(on, P - R, u.s + v.s + _ONCE * (u.size + v.size), ends.sub(u.V, v.V))
 
     def scale(self, u: Polynomial, by: float) -> Polynomial:
         if abs(by) == 1:
@@ -125,7 +125,7 @@ class _Boxes(Composed[Polynomial]):
             return Polynomial(u.on, by * u.P, u.s, V, u.rad, u.curved, u.size)
         slack, factor = places(len(u.on)).slack, np.array([by])
         size = abs(by) * (1 + slack)
-        s = size * u.s + (slack * (size * u.size) + _TINY)
+        s = size * u.s + (_ONCE * (size * u.size) + _TINY)
         V = ends.mul(u.V, (factor, factor))
         return Polynomial(
             u.on, u.P * by, s + 0.0 * size, V, size * u.rad + _TINY, size * u.curved + _TINY, size * u.size + _TINY
@@ -136,8 +136,8 @@ class _Boxes(Composed[Polynomial]):
         P, number = u.P.copy(), np.array([by])
         P[0] += by
         centre = np.abs(P[0])
-        size = np.maximum(u.size - np.abs(u.P[0]), 0.0) + centre + _ROUNDED * u.size
-        s = u.s * (1 + _ROUNDED) + _ROUNDED * centre
+        size = np.maximum(u.size - np.abs(u.P[0]), 0.0) + centre + _ONCE * u.size
+        s = u.s * (1 + _ONCE) + _ONCE * centre
         return Polynomial(u.on, P, s, ends.add(u.V, (number, number)), u.rad, u.curved, size)
 
     def mul(self, u: Polynomial, v: Polynomial) -> Polynomial:
@@ -150,7 +150,7 @@ class _Boxes(Composed[Polynomial]):
         P = X[0] * Y
         P[1:] += Y[0] * X[1:]
         _add_product(P, X[at.linear], Y[at.linear], at)
-        rest = _size_of_rest(u, v) + at.slack * (u.size * v.size) + _TINY
+        rest = _size_of_rest(u, v) + _PRODUCT * (u.size * v.size) + _TINY
         return self.settled(on, P, u.size * v.s + v.size * u.s + u.s * v.s + rest, ends.mul(u.V, v.V))
 
     def square(self, u: Polynomial) -> Polynomial:
@@ -158,7 +158,7 @@ class _Boxes(Composed[Polynomial]):
         P = (2 * u.P[0]) * u.P
         P[0] *= 0.5
         _add_square(P, u.P[at.linear], at, 1.0)
-        rest = (2 * u.rad + u.curved) * u.curved + at.slack * (u.size * u.size) + _TINY
+        rest = (2 * u.rad + u.curved) * u.curved + _PRODUCT * (u.size * u.size) + _TINY
         return self.settled(u.on, P, (2 * u.size + u.s) * u.s + rest, ends.square(u.V))
 
     def div(self, u: Polynomial, v: Polynomial) -> Polynomial:
@@ -183,13 +183,13 @@ class _Boxes(Composed[Polynomial]):
         near = np.maximum(v.V[0], -v.V[1])
         near = np.where(near > 0, near, np.nan)
         rest = rad * v.curved + curved * (v.rad + v.curved) + u.s + size * v.s
-        rest = rest + (at.slack * (u.size + size * v.size) + _TINY)
+        rest = rest + (_QUOTIENT * (u.size + size * v.size) + _TINY)
         return self.settled(on, P, rest / near, ends.mul(u.V, ends.inverse(v.V)))
 
     def taylor(self, u: Polynomial, terms: Taylor, V: Ends) -> Polynomial:
         """Return ``f(c + Y)``, Y without its constant, ``f = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3``."""
         at, moved = places(len(u.on)), u.rad + u.curved
-        reach = np.fmin(moved + u.s, np.maximum(u.V[1] - u.P[0], u.P[0] - u.V[0]) + at.slack * u.size)
+        reach = np.fmin(moved + u.s, np.maximum(u.V[1] - u.P[0], u.P[0] - u.V[0]))
         P = terms.slope * u.P
         P[0] = terms.value
         _add_square(P, u.P[at.linear], at, terms.curve)
@@ -198,7 +198,7 @@ class _Boxes(Composed[Polynomial]):
         s = s + terms.third * (reach * reach * reach)
         far = moved + u.s
         s = s + terms.error * (1 + far + far * far)
-        s = s + (at.slack * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size)) + _TINY)
+        s = s + (_TAYLOR * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size)) + _TINY)
         return self.settled(u.on, P, s, V)
 
     def sqrt(self, u: Polynomial) -> Polynomial:
@@ -253,7 +253,7 @@ class _Boxes(Composed[Polynomial]):
         half = np.where((low < 0) & (high > 0), 0.5 * np.maximum(-part * low, (1 - part) * high), 0.0)
         P = part * u.P
         P[0] += half
-        s = part * u.s + half + (places(len(u.on)).slack * (u.size + half) + _TINY)
+        s = part * u.s + half + (2 * _ONCE * (u.size + half) + _TINY)
         return self.settled(u.on, P, s, (np.maximum(low, 0.0), np.maximum(high, 0.0)))
 
     def step(self, u: Polynomial) -> Polynomial:

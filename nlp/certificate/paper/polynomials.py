@@ -6,9 +6,9 @@ On boxes ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, every value v is enclosed by
 
 ``s`` holds all terms of third and higher order, bounded by sums of sizes, and all rounding. A function of one variable
 is its Taylor polynomial with Lagrange's remainder of third order, or an identity that replaces it. A value keeps only
-the coefficients of the variables that it depends on. Coefficients are computed in round to nearest: an operation on
-values with m coefficients makes less than ``m + 32`` roundings of each of its terms, and ``s`` grows by four times as
-many, in parts of the sizes of the operands.
+the coefficients of the variables that it depends on. Coefficients are computed in round to nearest, and ``s`` grows by
+the number of roundings that an operation makes of each of its terms, counted with a margin, in parts of the sizes of
+its operands.
 
 A value that may be undefined has NaN for ``s`` and ``V``, and so has every value computed from it; NaN proves nothing.
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .ends import Ends
 
 #: Rounding unit of doubles.
-_UNIT = 2.0**-53
+UNIT = 2.0**-53
 
 
 class Places(NamedTuple):
@@ -37,7 +37,7 @@ class Places(NamedTuple):
     Attributes:
         linear, squares, products: slices of rows.
         first, second: (d (d - 1) / 2,) the two variables of each product.
-        slack: bound of the relative rounding error of an operation.
+        slack: bound of the relative rounding error of sums of sizes of m coefficients and of a formula of them.
     """
 
     linear: slice
@@ -64,7 +64,7 @@ def places(d: int) -> Places:
         slice(1 + 2 * d, count),
         first,
         second,
-        4 * (count + 32) * _UNIT,
+        2 * (count + 32) * UNIT,
     )
 
 
