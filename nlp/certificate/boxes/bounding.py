@@ -30,6 +30,7 @@ from ..kinks import refuse_jumps
 from ..standardform import StandardForm
 from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
 from .firstpass import LINEAR, MOST_VARIABLES, Cuts, FirstPass, first_pass, value_tape, without_conditions
+from .tangents import tangent_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,17 +87,19 @@ class NumpyEngine:
         form: the form whose box is searched.
         apart: whether N and D of the functions' squared quotients are enclosed, and not the quotients. The first pass
             over a box does without.
+        tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
     name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm, *, apart: bool = False) -> None:
+    def __init__(self, form: StandardForm, *, apart: bool = False, tangents: bool = True) -> None:
         self.form = form
         rows = search_rows(form, apart=apart)
         self._tape, self._quotients = search_tape(form, rows), rows.quotients
-        self._values = value_tape(form)
+        squares = tangent_rows(form) if tangents else None
+        self._values, self._squared = value_tape(form, squares), () if squares is None else squares.functions
         alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
         self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
@@ -117,7 +120,9 @@ class NumpyEngine:
         with np.errstate(all="ignore"):
             if self._values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
-            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            first = first_pass(
+                self._values, self.equation, self.functions, lower, upper, threshold, self._squared
+            )
             whole = Remainder.whole(lower, upper)
             result = Examination(
                 verdict=first.verdict,
