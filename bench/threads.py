@@ -4,8 +4,8 @@
     python bench/threads.py 5 axes     # five pairs of one case
 
 Runs with one and two threads alternate; wall times mean something on a machine that does nothing else. "serial" is the
-part of the CPU time outside of what threads share, and "of pieces" the ratio of wall times that the CPU times of all pieces allow:
-each piece is run by itself, and goes to the thread that would be free first. The boxes must be the same.
+part of the CPU time outside of what threads share, and "of pieces" the ratio of wall times that the CPU times of all
+pieces allow: each piece is run by itself, and goes to the thread that would be free first. The boxes must be the same.
 """
 
 import heapq
@@ -94,7 +94,10 @@ def main(pairs: int, names: Iterable[str]) -> None:
             one.append(alone)
             two.append(both)
         ratios = " ".join(f"{a / b:.2f}" for a, b in zip(one, two, strict=True))
-        print(f"{name:10} {first.boxes:9,} {serial:7.1%} {allowed:9.2f} {min(one):12.2f} {min(two):12.2f}  {ratios}", flush=True)
+        print(
+            f"{name:10} {first.boxes:9,} {serial:7.1%} {allowed:9.2f} {min(one):12.2f} {min(two):12.2f}  {ratios}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

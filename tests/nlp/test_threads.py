@@ -1,4 +1,4 @@
-"""Threads of a search: pieces cover every box once, and the results are the same bit for bit for any number of threads."""
+"""Threads of a search: pieces cover every box once, and results are the same bit for bit for any number of threads."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,11 @@ def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
 @needs_kernel
 @pytest.mark.parametrize(
     ("case", "gap", "whole", "least"),
-    [(load_case("paper-4.1-helical"), 0.1, 12, 1000), (load_case("paper-4.4-max"), 0.9, 12, 1000), (poses(0), 1e-4, 0, 50)],
+    [
+        (load_case("paper-4.1-helical"), 0.1, 12, 1000),
+        (load_case("paper-4.4-max"), 0.9, 12, 1000),
+        (poses(0), 1e-4, 0, 50),
+    ],
     ids=["whole box", "limbs", "limbs with shared variables"],
 )
 def test_boxes_and_bounds_do_not_depend_on_the_number_of_threads(

@@ -23,7 +23,7 @@ import numpy as np
 from ..enclosing.enclosure import Enclosures, Midpoints, enclose, midpoints
 from ..enclosing.instructions import compile_tape
 from ..enclosing.intervals import ULP
-from ..enclosing.quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers
+from ..enclosing.quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers, ranges
 from ..enclosing.quotients import SearchRows, search_rows, with_quotients
 from ..enclosing.tape import Tape
 from ..kinks import refuse_jumps
@@ -120,9 +120,7 @@ class NumpyEngine:
         with np.errstate(all="ignore"):
             if self._values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
-            first = first_pass(
-                self._values, self.equation, self.functions, lower, upper, threshold, self._squared
-            )
+            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold, self._squared)
             whole = Remainder.whole(lower, upper)
             result = Examination(
                 verdict=first.verdict,
@@ -353,13 +351,3 @@ def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> N
     for name, values in vars(result).items():
         if name not in ("value", "centre"):
             values[..., places] = getattr(found, name)
-
-
-def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
-    steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
-    middle, error = model.value.c, model.value.s
-    spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
-    high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
-    low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
-    return low, high

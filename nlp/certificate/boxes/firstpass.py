@@ -71,6 +71,11 @@ class Cuts(NamedTuple):
         self.low[raised], self.high[lowered] = part.low[raised], part.high[lowered]
         self.why_low[raised], self.why_high[lowered] = r, r
 
+    def put(self, which: NDArray[np.intp], other: Cuts) -> None:
+        """Set those of some boxes, in place."""
+        self.low[:, which], self.high[:, which] = other.low, other.high
+        self.why_low[:, which], self.why_high[:, which] = other.why_low, other.why_high
+
     def select(self, which: NDArray[np.intp]) -> Cuts:
         """Return those of some boxes."""
         return Cuts(self.low[:, which], self.high[:, which], self.why_low[:, which], self.why_high[:, which])
@@ -124,8 +129,7 @@ def first_pass(
     again = _pass(forms, equation, functions, threshold, first.cuts.select(rest)).result
     first.bound[rest] = np.fmin(first.bound[rest], again.bound)
     first.verdict[rest], first.reason[rest] = again.verdict, again.reason
-    for ends, tighter in zip(first.cuts, again.cuts, strict=True):
-        ends[:, rest] = tighter
+    first.cuts.put(rest, again.cuts)
     unknown = ~found.defined[rest]
     first.scores[:, rest[unknown]] = again.scores[:, unknown]
     return first

@@ -4,9 +4,9 @@ A term of F is ``N^2 / D``, with N and D polynomials in the joint coordinates, a
 
     N^2 / D >= 2 rho N - rho^2 D,
 
-since the difference is ``(N - rho D)^2 / D``. The right side has neither quotient nor square, so that its form of second
-order is accurate on large boxes. ``rho`` is ``N / D`` at a point where the sum of squares is small, found with N as its
-linear form: there the right side is a tangent plane to a convex function, and the largest of all of them is that
+since the difference is ``(N - rho D)^2 / D``. The right side has neither quotient nor square, so that its form of
+second order is accurate on large boxes. ``rho`` is ``N / D`` at a point where the sum of squares is small, found with N
+as its linear form: there the right side is a tangent plane to a convex function, and the largest of all of them is that
 function. Any other point gives a bound that holds too.
 """
 
@@ -79,7 +79,7 @@ def tangent_forms(rows: Forms, squared: tuple[int, ...], count: int) -> TangentF
         count: number J of functions.
     """
     N, D = slice(count, None, 2), slice(count + 1, None, 2)
-    usable = (rows.lo[D] > 0).all(axis=0) & (rows.s < np.inf).all(axis=0)
+    usable = np.asarray((rows.lo[D] > 0).all(axis=0) & (rows.s < np.inf).all(axis=0))
     every: list[Forms] = []
     for j in range(count):
         of = np.array(squared) == j

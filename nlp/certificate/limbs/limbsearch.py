@@ -34,9 +34,7 @@ class LimbPoint:
         parts: the best known part of each limb while there is no incumbent; shared by all limbs.
     """
 
-    def __init__(
-        self, limbs: Sequence[Limb], whole: Incumbent, parts: dict[tuple[int, ...], FloatArray]
-    ) -> None:
+    def __init__(self, limbs: Sequence[Limb], whole: Incumbent, parts: dict[tuple[int, ...], FloatArray]) -> None:
         self._limbs, self._whole, self._parts = limbs, whole, parts
         self._at: FloatArray | None = None
         self._value = -math.inf
