@@ -1,11 +1,11 @@
 """Two threads beside one: wall times of searches that take over a second, and what their CPU times allow.
 
     python bench/threads.py            # all cases, three pairs of runs each
-    python bench/threads.py 5 axes     # five pairs of one case
+    python bench/threads.py 5 paper    # five pairs of one case
 
 Runs with one and two threads alternate; wall times mean something on a machine that does nothing else. "serial" is the
-part of the CPU time outside of what threads share, and "of pieces" the ratio of wall times that the CPU times of all pieces allow:
-each piece is run by itself, and goes to the thread that would be free first. The boxes must be the same.
+part of the CPU time outside of what threads share, and "of pieces" the ratio of wall times that the CPU times of all
+pieces allow: each piece is run by itself, and goes to the thread that would be free first. The boxes must be the same.
 """
 
 import heapq
@@ -24,7 +24,6 @@ from screwsynth.nlp.certificate.certificate import Certificate
 
 #: Cases by name, and gaps for which the search takes a second or more.
 CASES: dict[str, tuple[Callable[[], Case], float]] = {
-    "axes": (lambda: load_case("paper-4.4-max"), 1e-4),
     "paper": (lambda: load_case("paper-4.3"), 1e-4),
     "eight": (lambda: case_with(8), 1e-4),
     "machining": (lambda: load_case("hexapod-machining"), 0.5),

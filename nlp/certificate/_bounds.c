@@ -5,7 +5,7 @@
  * loops become vector instructions; the boxes are then examined one by one. Every formula is that of the Python
  * modules, in the same order; their docstrings and docs/certificate.md explain them. The headers of kernel/ have an idea
  * each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, enclosure,
- * quadratic, quotients, contraction, examination, secondorder, firstpass, blocks, enclosed, models.
+ * quadratic, quotients, contraction, examination, secondorder, firstpass, tangents, blocks, enclosed, models.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
  * nor with contraction to fused operations, which would make the two engines differ.
@@ -48,7 +48,7 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *arrays[12];
+    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *squared, *arrays[12];
     PyObject *models = NULL, *least = NULL;
     Form form = {0};
     Report report = {0};
@@ -56,8 +56,8 @@ static PyObject *examine(PyObject *module, PyObject *args)
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OO)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &whose, &PyTuple_Type, &tape, &values, &objective, &arrays[0], &arrays[1], &arrays[2],
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
+                          &high, &whose, &PyTuple_Type, &tape, &values, &objective, &squared, &arrays[0], &arrays[1], &arrays[2],
                           &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
                           &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
                           &report.shared, &models, &least))
@@ -67,6 +67,9 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && pairs >= 0 && (form.whose = borrow(&all, whose, pairs, sizeof(int), 0));
     form.quotients = (int)(pairs / 2);
     form.expressions = good ? form.tape.outputs / (form.n + 1) - 2 * form.quotients : 0;
+    Py_ssize_t squares = good ? PyObject_Length(squared) : 0;
+    good = good && squares >= 0 && (form.squared = borrow(&all, squared, squares, sizeof(int), 0));
+    form.tangents = values == Py_None ? 0 : (int)squares;
     good = good && (values == Py_None || read_tape(&all, values, &form.values) == 0);
     good = good && (objective == Py_None || read_tape(&all, objective, &form.objective) == 0);
     Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
@@ -94,7 +97,9 @@ static PyObject *examine(PyObject *module, PyObject *args)
     int fits = form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
     for (int k = 0; good && k < form.quotients; k++)
         fits = fits && form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
-    fits = fits && (values == Py_None || form.values.outputs == R);
+    for (int k = 0; good && k < form.tangents; k++)
+        fits = fits && form.squared[k] >= 0 && form.squared[k] < form.functions;
+    fits = fits && (values == Py_None || form.values.outputs == R + rows_of_tangents(&form));
     if (good && !(fits && (objective == Py_None || form.objective.outputs == form.functions * (n + 1)))) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
@@ -209,10 +214,11 @@ static PyMethodDef methods[] = {
      "enclose(n, tape, (lower, upper, c, p, q, s, a), B)\n\n"
      "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a."},
     {"examine", examine, METH_VARARGS,
-     "examine((n, functions, equation, depends, low, high, whose, tape, values, objective), arrays, B,\n"
+     "examine((n, functions, equation, depends, low, high, whose, tape, values, objective, squared), arrays, B,\n"
      "        begin, finish, threshold, shared=0, models=None, least=None)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
-     "values is the tape of the expressions without their gradients, or None; objective that of the functions and\n"
+     "values is the tape of the expressions without their gradients and the rows for tangents to squares, whose functions\n"
+     "are in squared, or None; objective that of the functions and\n"
      "their gradients where conditions are evaluated only if needed, or None.\n"
      "With models the first variables are shared with other limbs."},
     {NULL, NULL, 0, NULL},

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _ODD = frozenset({Op.SCALE, Op.SIN, Op.ATAN})
 #: Even functions of one value.
 _EVEN = frozenset({Op.SQUARE, Op.COS})
+#: Operations whose result changes its sign with the first value, where it keeps or changes it.
+_LIKE_THE_FIRST = _ODD | {Op.ADD, Op.SUB, Op.SHIFT}
 
 
 class _Equations:
@@ -126,23 +128,20 @@ def _conditions_of(tape: Tape, is_equation: tuple[bool, ...]) -> Iterable[int]:
     for op, to, a, b, k in rows:
         if op == Op.INPUT:
             signs[to] = 1 << a
-        elif op == Op.CONSTANT or op in _EVEN:
-            signs[to] = 0
-        elif op in (Op.MUL, Op.DIV):
-            signs[to] = signs[a] ^ signs[b]
-        elif op in _ODD:
-            signs[to] = signs[a]
-        elif op in (Op.ADD, Op.SUB):
-            yield signs[a] ^ signs[b]
-            signs[to] = signs[a]
-        elif op == Op.SHIFT:
-            signs[to] = signs[a]
-            if k != 0:
-                yield signs[a]
-        elif op == Op.OUTPUT:
-            if not is_equation[to]:
-                yield signs[a]
+            continue
+        one, other = signs.get(a, 0), signs.get(b, 0)
+        if op == Op.OUTPUT:
+            yield 0 if is_equation[to] else one
         else:
-            # A function that is neither odd nor even.
-            yield signs[a]
-            signs[to] = 0
+            yield _condition(op, one, other, k)
+            signs[to] = one ^ other if op in (Op.MUL, Op.DIV) else one if op in _LIKE_THE_FIRST else 0
+
+
+def _condition(op: int, one: int, other: int, k: float) -> int:
+    """Return the sum that must be 0 for the result of an operation to keep or change its sign."""
+    if op in (Op.ADD, Op.SUB):
+        return one ^ other
+    if op in (Op.CONSTANT, Op.MUL, Op.DIV) or op in _ODD or op in _EVEN or (op == Op.SHIFT and k == 0):
+        return 0
+    # A function that is neither odd nor even, or a sum with a constant.
+    return one

@@ -83,12 +83,8 @@ class _Search:
     def run(self, time_limit: float | None, interrupted: Callable[[], bool]) -> list[Extreme]:
         """Search until every claim is decided, or the time is over."""
         began, problem = time.perf_counter(), self._problem
-        free = list(problem.free)
-        lower, upper = (np.full((1, len(problem.start)), np.nan) for _ in range(2))
-        lower[0, : len(free)], upper[0, : len(free)] = problem.box.lower[free], problem.box.upper[free]
-        lower[0, self._dependent] = upper[0, self._dependent] = np.nan
-        whole = (upper - lower)[0, self._independent]
-        start = Cells(lower, upper, problem.start[None].copy(), np.full(1, not self._dependent))
+        start = whole_workspace(problem)
+        whole = (start.upper - start.lower)[0, self._independent]
         stack, reason = [start], ""
         while stack and not reason:
             if interrupted():

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.boxes import bounding, firstpass
+from screwsynth.nlp.certificate.boxes import bounding, firstpass, tangents
 from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine, search_tape
 from screwsynth.nlp.certificate.boxes.engines import engine_for, kernel
 from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
@@ -365,6 +365,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
         "ROOT_SLACK": quadratic._ROOT_SLACK,
         "MULTIPLIER_ROUNDS": quadratic._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
+        "SWEEPS": tangents._SWEEPS,
     }
     for name, value in numbers.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"#define {name} ")]

@@ -1,4 +1,4 @@
-"""Threads of a search: pieces cover every box once, and the results are the same bit for bit for any number of threads."""
+"""Threads of a search: pieces cover every box once, and results are the same bit for bit for any number of threads."""
 
 import numpy as np
 import pytest

@@ -23,13 +23,14 @@ import numpy as np
 from ..enclosing.enclosure import Enclosures, Midpoints, enclose, midpoints
 from ..enclosing.instructions import compile_tape
 from ..enclosing.intervals import ULP
-from ..enclosing.quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers
+from ..enclosing.quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers, ranges
 from ..enclosing.quotients import SearchRows, search_rows, with_quotients
 from ..enclosing.tape import Tape
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm
 from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
 from .firstpass import LINEAR, MOST_VARIABLES, Cuts, FirstPass, first_pass, value_tape, without_conditions
+from .tangents import tangent_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,17 +87,19 @@ class NumpyEngine:
         form: the form whose box is searched.
         apart: whether N and D of the functions' squared quotients are enclosed, and not the quotients. The first pass
             over a box does without.
+        tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
     name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm, *, apart: bool = False) -> None:
+    def __init__(self, form: StandardForm, *, apart: bool = False, tangents: bool = True) -> None:
         self.form = form
         rows = search_rows(form, apart=apart)
         self._tape, self._quotients = search_tape(form, rows), rows.quotients
-        self._values = value_tape(form)
+        squares = tangent_rows(form) if tangents else None
+        self._values, self._squared = value_tape(form, squares), () if squares is None else squares.functions
         alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
         self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
@@ -117,7 +120,7 @@ class NumpyEngine:
         with np.errstate(all="ignore"):
             if self._values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
-            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold, self._squared)
             whole = Remainder.whole(lower, upper)
             result = Examination(
                 verdict=first.verdict,
@@ -348,13 +351,3 @@ def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> N
     for name, values in vars(result).items():
         if name not in ("value", "centre"):
             values[..., places] = getattr(found, name)
-
-
-def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
-    steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
-    middle, error = model.value.c, model.value.s
-    spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
-    high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
-    low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
-    return low, high

@@ -116,7 +116,8 @@ class BoxSearch(BoundedSearch[Boxes]):
         if once.size:
             self._opened.push(Boxes(lower[:, once], upper[:, once], bound[once], first_once))
         if at.size:
-            lower, upper, bound, split, middle = (each[..., cut] for each in (lower, upper, bound, split, middle))
+            lower, upper, bound = lower[:, cut], upper[:, cut], bound[cut]
+            split, middle = split[cut], middle[cut]
         halves = np.concatenate([lower, lower], axis=1), np.concatenate([upper, upper], axis=1)
         columns = np.arange(cut.size)
         halves[1][split, columns] = halves[0][split, cut.size + columns] = middle

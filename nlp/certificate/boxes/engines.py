@@ -17,6 +17,7 @@ from ..standardform import StandardForm
 from .bounding import NumpyEngine, objective_tape, search_tape
 from .examination import Examination, Verdict
 from .firstpass import value_tape
+from .tangents import tangent_rows
 from .threads import Threads, pieces
 
 if TYPE_CHECKING:
@@ -53,12 +54,19 @@ class KernelEngine:
         module: the kernel.
         jobs: threads; one for each processor when left out.
         shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
+        tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
     name = "c"
 
     def __init__(
-        self, form: StandardForm, module: ModuleType, jobs: int | None = None, shared: int | None = None
+        self,
+        form: StandardForm,
+        module: ModuleType,
+        jobs: int | None = None,
+        shared: int | None = None,
+        *,
+        tangents: bool = True,
     ) -> None:
         self._module, self._shared = module, shared or 0
         self._threads = Threads(jobs)
@@ -66,7 +74,8 @@ class KernelEngine:
         self.block = 2 * _BOXES_PER_JOB
         functions = len(form.functions)
         rows = search_rows(form, apart=shared is not None)
-        tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
+        squares = tangent_rows(form) if tangents and shared is None else None
+        tape, values = search_tape(form, rows), None if shared is not None else value_tape(form, squares)
         objective = objective_tape(form, len(tape))
         equation = np.array(form.is_equation, dtype=np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
@@ -81,6 +90,7 @@ class KernelEngine:
             _kernel_tape(tape),
             None if values is None else _kernel_tape(values),
             None if values is None or objective is None else _kernel_tape(objective),
+            np.array(() if squares is None else squares.functions, dtype=np.int32),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
@@ -187,20 +197,25 @@ def chosen_kernel(name: str | None, built: Callable[[], ModuleType | None]) -> M
     return module
 
 
-def engine_for(form: StandardForm, name: str | None = None, jobs: int | None = None) -> Engine:
+def engine_for(
+    form: StandardForm, name: str | None = None, jobs: int | None = None, *, tangents: bool = True
+) -> Engine:
     """Return an engine for a form.
 
     Args:
         form: the form whose box is searched.
         name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         jobs: threads of the C kernel.
+        tangents: whether the first pass has tangents to the squares of a minimum.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
         ValueError: there is no engine of that name here.
     """
     module = chosen_kernel(name, kernel)
-    return NumpyEngine(form) if module is None else KernelEngine(form, module, jobs)
+    if module is None:
+        return NumpyEngine(form, tangents=tangents)
+    return KernelEngine(form, module, jobs, tangents=tangents)
 
 
 def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jobs: int | None = None) -> LimbEngine:

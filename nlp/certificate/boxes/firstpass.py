@@ -20,6 +20,7 @@ from ..enclosing.intervals import TINY, ULP
 from ..enclosing.quadratic import Ends, QuadraticModel, multipliers
 from ..enclosing.secondorder import Forms, enclose_second, monomials
 from .examination import UNMOVED, Verdict
+from .tangents import TangentRows, tangent_forms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,11 +35,15 @@ MOST_VARIABLES = 12
 LINEAR = 0.3
 
 
-def value_tape(form: StandardForm) -> Tape | None:
-    """Compile a form's R expressions alone, for the first pass; None for a form with too many variables for one."""
+def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+    """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
+
+    None is returned for a form with too many variables for a first pass.
+    """
     if form.n > MOST_VARIABLES:
         return None
-    return compile_tape(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
+    every = form.expressions if rows is None else ca.densify(ca.vertcat(form.expressions, rows.expressions))
+    return compile_tape(ca.Function("values", [form.x], [ca.cse(every)]))
 
 
 def without_conditions(form: StandardForm) -> StandardForm:
@@ -66,6 +71,11 @@ class Cuts(NamedTuple):
         self.low[raised], self.high[lowered] = part.low[raised], part.high[lowered]
         self.why_low[raised], self.why_high[lowered] = r, r
 
+    def put(self, which: NDArray[np.intp], other: Cuts) -> None:
+        """Set those of some boxes, in place."""
+        self.low[:, which], self.high[:, which] = other.low, other.high
+        self.why_low[:, which], self.why_high[:, which] = other.why_low, other.why_high
+
     def select(self, which: NDArray[np.intp]) -> Cuts:
         """Return those of some boxes."""
         return Cuts(self.low[:, which], self.high[:, which], self.why_low[:, which], self.why_high[:, which])
@@ -86,7 +96,13 @@ class FirstPass(NamedTuple):
 
 
 def first_pass(
-    tape: Tape, equation: NDArray[np.bool_], functions: int, lower: FloatArray, upper: FloatArray, threshold: float
+    tape: Tape,
+    equation: NDArray[np.bool_],
+    functions: int,
+    lower: FloatArray,
+    upper: FloatArray,
+    threshold: float,
+    squared: tuple[int, ...] = (),
 ) -> FirstPass:
     """Return the first pass over boxes.
 
@@ -97,9 +113,44 @@ def first_pass(
         lower: (n, B) lower ends.
         upper: (n, B) upper ends.
         threshold: boxes whose bound is at most this are closed.
+        squared: functions of the squares that tangents may replace, whose rows the tape has behind the expressions.
     """
-    J, forms = functions, enclose_second(tape, lower, upper)
-    matrices = _matrices(forms, len(lower))
+    R, every = len(equation), enclose_second(tape, lower, upper)
+    found = _pass(_some(every, slice(0, R)), equation, functions, threshold, Cuts.none(lower.shape))
+    if not squared:
+        return found.result
+    tangents = tangent_forms(_some(every, slice(R, None)), squared, functions)
+    rest = np.flatnonzero((found.result.verdict == Verdict.OPEN) & tangents.usable)
+    expressions, steep = _some(every, slice(functions, R)), tangents.forms
+    forms = Forms(
+        *(np.concatenate([getattr(part, name)[..., rest] for part in (steep, expressions)]) for name in vars(every))
+    )
+    first = found.result
+    again = _pass(forms, equation, functions, threshold, first.cuts.select(rest)).result
+    first.bound[rest] = np.fmin(first.bound[rest], again.bound)
+    first.verdict[rest], first.reason[rest] = again.verdict, again.reason
+    first.cuts.put(rest, again.cuts)
+    unknown = ~found.defined[rest]
+    first.scores[:, rest[unknown]] = again.scores[:, unknown]
+    return first
+
+
+class _Passed(NamedTuple):
+    """Results of a pass over B boxes, and whether every function is defined in each (B,)."""
+
+    result: FirstPass
+    defined: NDArray[np.bool_]
+
+
+def _some(forms: Forms, rows: slice) -> Forms:
+    """Return the forms of some rows."""
+    return Forms(*(values[rows] for values in vars(forms).values()))
+
+
+def _pass(forms: Forms, equation: NDArray[np.bool_], functions: int, threshold: float, cuts: Cuts) -> _Passed:
+    """Return a pass over boxes with the forms of all expressions, and cuts that move further, in place."""
+    J, n = functions, forms.a.shape[1]
+    matrices = _matrices(forms, n)
     size = np.abs(forms.c) + (forms.q - forms.p) + forms.s
     size = size + np.abs(forms.a).sum(axis=1) + np.abs(matrices).sum(axis=(1, 2))
     defined = np.asarray((forms.s[:J] < np.inf).all(axis=0))
@@ -111,7 +162,6 @@ def first_pass(
     is_bounded = bound <= threshold
     verdict = np.where(is_bounded, Verdict.BOUNDED, verdict).astype(np.int32)
     reason = np.where(is_bounded, 0, impossible.argmax(axis=0)).astype(np.int32)
-    cuts = Cuts.none(lower.shape)
     for r in range(len(equation)):
         for sign in (1.0, -1.0):
             if (r < J and sign > 0) or (r >= J and (sign < 0 or equation[r])):
@@ -121,7 +171,8 @@ def first_pass(
         cuts.keep(_where(defined, L.ends_reaching(threshold)), 0)
     holds = (forms.c[J:] + forms.s[J:] <= 0).all(axis=0)
     value = np.where(holds, (forms.c[:J] - forms.s[:J]).min(axis=0), -np.inf)
-    return FirstPass(verdict, reason, bound, value, cuts, LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0))
+    scores = LINEAR * np.abs(L.b) + np.abs(L.H).sum(axis=0)
+    return _Passed(FirstPass(verdict, reason, bound, value, cuts, scores), defined)
 
 
 def _where(usable: NDArray[np.bool_], ends: Ends) -> Ends:

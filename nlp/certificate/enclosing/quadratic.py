@@ -313,3 +313,13 @@ def multipliers(
     bad = weights[0] < 0
     weights[:J, bad], weights[0, bad] = 0.0, 1.0
     return weights
+
+
+def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
+    steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
+    middle, error = model.value.c, model.value.s
+    spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
+    high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
+    low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
+    return low, high

@@ -83,7 +83,7 @@ def search_rows(form: StandardForm, *, apart: bool) -> SearchRows:
     for j, function in enumerate(form.functions if apart else ()):
         rest = SX(0)
         for term in terms_of(function):
-            quotient = _as_quotient(term, j)
+            quotient = as_quotient(term, j)
             if quotient is None:
                 rest = rest + term
             else:
@@ -98,7 +98,7 @@ def search_rows(form: StandardForm, *, apart: bool) -> SearchRows:
     return SearchRows(expressions, jacobian, tuple(found))
 
 
-def _as_quotient(term: SX, function: int) -> Quotient | None:
+def as_quotient(term: SX, function: int) -> Quotient | None:
     """Return a term as a squared quotient; None for another one."""
     factor = 1.0
     while True:

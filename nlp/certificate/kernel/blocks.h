@@ -5,6 +5,7 @@
 #include "firstpass.h"
 #include "quotients.h"
 #include "secondorder.h"
+#include "tangents.h"
 
 static double *carve(double **rest, size_t count)
 {
@@ -31,11 +32,11 @@ static void load(const Form *form, const Report *report, const Py_ssize_t *list,
     }
 }
 
-/* The forms of second order of a box: centre, gradient and matrix of every expression. */
-static void read_form2(Box *x, Store out, int l)
+/* The forms of second order of a box: centre, gradient and matrix of each row. */
+static void read_form2(Box *x, int rows, Store out, int l)
 {
     int n = x->n;
-    for (int k = 0; k < x->R; k++) {
+    for (int k = 0; k < rows; k++) {
         Form2 *v = form2_of(out, k);
         const Lane *a = terms_of_form2(v), *Q = a + n;
         x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
@@ -98,10 +99,26 @@ typedef struct {
     double *scores;
 } Kept;
 
+/* Rows of a box that are known at once. */
+static size_t rows_needed(const Form *form)
+{
+    return larger_size((size_t)rows_of(form), (size_t)(form->expressions + rows_of_tangents(form)));
+}
+
+/* The first pass over a box, and again with tangents to its squares where it is still open: whether it is closed. */
+static int pass_first(const Form *form, Box *x, const double *centre, Report *report, Py_ssize_t at, double threshold,
+                      double *scores)
+{
+    int closed = judge2(form, x, centre, report, at, threshold, scores, FIRST);
+    if (closed <= 0 && form->tangents && take_tangents(form, x))
+        closed = judge2(form, x, centre, report, at, threshold, scores, closed ? UNDEFINED_BEFORE : DEFINED_BEFORE);
+    return closed > 0;
+}
+
 static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py_ssize_t finish, double threshold,
                           double *memory, Kept *kept)
 {
-    size_t n = (size_t)form->n, E = (size_t)rows_of(form), J = form->quotients ? (size_t)form->functions : 0;
+    size_t n = (size_t)form->n, E = rows_needed(form), J = form->quotients ? (size_t)form->functions : 0;
     double *rest = memory, *registers = carve(&rest, registers_needed(form));
     Lane *lanes[4];
     for (int i = 0; i < 4; i++)
@@ -136,8 +153,8 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
             for (int l = 0; l < LANES && start + l < finish; l++) {
                 for (size_t i = 0; i < n; i++)
                     c[i] = centre[i][l];
-                read_form2(&x, out, l);
-                if (!judge2(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
+                read_form2(&x, form->values.outputs, out, l);
+                if (!pass_first(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
                     kept->open[count++] = start + l;
             }
         }
@@ -170,7 +187,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
 
 static size_t memory_needed(const Form *form)
 {
-    size_t n = (size_t)form->n, E = (size_t)rows_of(form), J = (size_t)form->functions;
+    size_t n = (size_t)form->n, E = rows_needed(form), J = (size_t)form->functions;
     size_t vectors = 10 * E + 9 * E * n + 22 * n, matrices = (E + 4) * n * n + J * n * (n + 1);
     return registers_needed(form) + 4 * n * LANES + scratch_needed(form) + vectors + matrices;
 }

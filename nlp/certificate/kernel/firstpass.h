@@ -31,24 +31,27 @@ static void combine2(Box *x)
     }
 }
 
-/* Whether the box is closed. If not, the report holds what contraction leaves, in parts of the radius, and why; and
- * scores, unless NULL, how much the Lagrangian can change along each variable. */
+enum { FIRST, DEFINED_BEFORE, UNDEFINED_BEFORE };
+
+/* Whether the box is closed; -1 where it is not and a function may be undefined. If not, the report holds what contraction leaves, in parts of the radius, and why; and
+ * scores, unless NULL, how much the Lagrangian can change along each variable. After a pass over the same box, with
+ * other rows of the functions, what that has found is kept where it is tighter. */
 static int judge2(const Form *form, Box *x, const double *centre, Report *report, Py_ssize_t at, double threshold,
-                  double *scores)
+                  double *scores, int before)
 {
     int n = x->n, J = x->J, R = x->R, defined = 1, impossible = -1;
     Py_ssize_t B = report->B;
-    double bound = INFINITY, value = INFINITY;
+    double bound = before ? report->bound[at] : INFINITY, value = before ? report->value[at] : INFINITY;
     for (int r = 0; r < R; r++) {
         x->high[r] = x->hi[r];
         if (r < J) {
             defined = defined && x->s[r] < INFINITY;
             bound = smaller(bound, x->hi[r]);
-            value = smaller(value, x->c[r] - x->s[r]);
+            value = before ? value : smaller(value, x->c[r] - x->s[r]);
         } else {
             if (impossible < 0 && (x->lo[r] > 0 || (form->equation[r] && x->hi[r] < 0)))
                 impossible = r;
-            if (!(x->c[r] + x->s[r] <= 0))
+            if (!before && !(x->c[r] + x->s[r] <= 0))
                 value = -INFINITY;
         }
     }
@@ -63,12 +66,12 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
     combine2(x);
     double lagrangian = quadratic_bound(x);
     bound = lagrangian < bound ? lagrangian : bound;
-    bound = defined ? bound : INFINITY;
+    bound = defined ? bound : before ? report->bound[at] : INFINITY;
     int closed = bound <= threshold || impossible >= 0;
     report->bound[at] = bound, report->value[at] = value, report->split[at] = 0;
     report->verdict[at] = bound <= threshold ? BOUNDED : impossible >= 0 ? INFEASIBLE : OPEN;
     report->reason[at] = bound <= threshold || impossible < 0 ? 0 : impossible;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !before; i++) {
         x->e_lo[i] = -1.0, x->e_hi[i] = 1.0;
         x->why_lo[i] = x->why_hi[i] = -2;
     }
@@ -88,7 +91,7 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
         if (R > 1)
             reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, none, x->q_rounding, threshold, 0);
     }
-    for (int i = 0; i < n && scores; i++) {
+    for (int i = 0; i < n && scores && before != DEFINED_BEFORE; i++) {
         scores[i] = LINEAR * fabs(x->qb[i]);
         for (int j = 0; j < n; j++)
             scores[i] += fabs(x->H[i * n + j]);
@@ -100,7 +103,7 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
         report->left_upper[end] = closed ? report->upper[end] : x->e_hi[i];
         report->cut_lower[end] = closed ? -2 : x->why_lo[i], report->cut_upper[end] = closed ? -2 : x->why_hi[i];
     }
-    return closed;
+    return closed ? 1 : defined ? 0 : -1;
 }
 
 #endif

@@ -40,8 +40,10 @@ typedef struct {
     const double *low, *high; /* (n) ends of the whole box */
     int quotients;       /* terms sign N^2 / D of functions: the rows after the expressions are N and D of each */
     const int *whose;    /* (quotients, 2) function and sign */
+    int tangents;        /* terms -N^2 / D of functions that tangents may replace: tangents.h */
+    const int *squared;  /* (tangents) function of each; the values have a rest of each function and N and D behind */
     Tape tape;   /* the rows and their derivatives */
-    Tape values; /* the expressions alone; without instructions where forms of second order are not used */
+    Tape values; /* the expressions alone, and the rows for tangents; without instructions where forms of second order are not used */
     Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
 } Form;
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..boxes.bounding import NumpyEngine, ranges
+from ..boxes.bounding import NumpyEngine
 from ..boxes.examination import Verdict
 from ..enclosing.enclosure import midpoints
-from ..enclosing.quadratic import Ends, QuadraticModel
+from ..enclosing.quadratic import Ends, QuadraticModel, ranges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..boxes.bounding import NumpyEngine, ranges
+from ..boxes.bounding import NumpyEngine
 from ..boxes.boxsearch import reason_without_bound
 from ..boxes.engines import limb_engine_for
 from ..boxes.openboxes import BoundedSearch
 from ..boxes.threads import Threads
 from ..enclosing.enclosure import midpoints
-from ..enclosing.quadratic import GradientModel
+from ..enclosing.quadratic import GradientModel, ranges
 from .limbmodels import LimbModels
 from .limbsums import LimbBound, bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes

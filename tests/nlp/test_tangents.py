@@ -1,0 +1,165 @@
+"""Tangents to the squares of a minimum: against 200-bit ball arithmetic, in both engines, and what they save."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import casadi as ca
+import numpy as np
+import pytest
+from limb_cases import poses
+
+from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
+from screwsynth.nlp.certificate.boxes import tangents
+from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
+from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
+from screwsynth.nlp.certificate.boxes.examination import Verdict
+from screwsynth.nlp.certificate.boxes.firstpass import value_tape
+from screwsynth.nlp.certificate.boxes.tangents import tangent_forms, tangent_rows
+from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.certificate.certificate import CertificateStatus
+from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
+from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
+from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+
+flint = pytest.importorskip("flint")
+
+
+def _load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+balls = _load("balls")
+needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
+NAMES = ("paper-4.3", "drilling-spindle", "two poses")
+
+
+def minimum(name: str) -> StandardForm:
+    nlp = formulate(poses(1) if name == "two poses" else load_case(name))
+    return standard_form(replace(nlp, sense=Sense.MIN))
+
+
+def boxes_of(form: StandardForm, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes of many widths near the program's start, about which conditions often hold."""
+    rng = np.random.default_rng(4)
+    room = (form.upper - form.lower)[:, None]
+    middle = form.nlp.start[: form.n, None] + 0.2 * room * (rng.random((form.n, count)) - 0.5)
+    half = 0.5 * room * 10.0 ** rng.uniform(-2, 0, (1, count)) * rng.uniform(0.3, 1, (form.n, count))
+    lower, upper = form.lower[:, None], form.upper[:, None]
+    return np.clip(middle - half, lower, upper), np.clip(middle + half, lower, upper)
+
+
+def violations(form: StandardForm, count: int) -> tuple[int, int]:
+    """Points at which a function is surely above its form with tangents; and points that were looked at."""
+    flint.ctx.prec = 200
+    rng, (lower, upper) = np.random.default_rng(5), boxes_of(form, count)
+    rows, R = tangent_rows(form), form.expressions.numel()
+    assert rows is not None
+    tape = value_tape(form, rows)
+    assert tape is not None
+    every = enclose_second(tape, lower, upper)
+    with np.errstate(all="ignore"):
+        found, usable = tangent_forms(Forms(*(each[R:] for each in vars(every).values())), rows.functions, 1)
+    functions = compile_tape(ca.Function("f", [form.x], list(form.functions)))
+    (centre, radius), at = midpoints(lower, upper), monomials(form.n)
+    bad = 0
+    for box in np.flatnonzero(usable):
+        share = rng.random(form.n) if rng.random() < 0.5 else rng.integers(0, 2, form.n)
+        point = np.clip(lower[:, box] + share * (upper - lower)[:, box], lower[:, box], upper[:, box])
+        e = [
+            (flint.arb(float(x)) - flint.arb(float(c))) / flint.arb(float(r)) if r > 0 else flint.arb(0)
+            for x, c, r in zip(point, centre[:, box], radius[:, box], strict=True)
+        ]
+        (ball,), (is_sharp,) = balls.decided_balls(functions, point)
+        value = (
+            flint.arb(float(found.c[0, box])) + flint.arb(float(found.q[0, box])) + flint.arb(float(found.s[0, box]))
+        )
+        value += sum((flint.arb(float(a)) * step for a, step in zip(found.a[0, :, box], e, strict=True)), flint.arb(0))
+        for q, i, j in zip(found.Q[0, :, box].tolist(), at.first.tolist(), at.second.tolist(), strict=True):
+            value += flint.arb(q) * e[i] * e[j]
+        bad += int(is_sharp and bool(ball > value))
+    return bad, int(usable.sum())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_function_is_above_its_form_with_tangents(name: str) -> None:
+    bad, points = violations(minimum(name), 60)
+    assert bad == 0
+    assert points > 20
+
+
+def test_a_tangent_that_is_a_secant_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test of the test above: ``rho^2 D`` a hundredth too small."""
+    whole = tangents._sum
+
+    def careless(rows: Forms, weights: np.ndarray) -> Forms:
+        return whole(rows, np.where(weights > 0, weights * 0.99, weights))
+
+    monkeypatch.setattr(tangents, "_sum", careless)
+    assert violations(minimum("paper-4.3"), 60)[0] > 0
+
+
+@needs_kernel
+@pytest.mark.parametrize("name", NAMES)
+def test_both_engines_have_the_same_tangents(name: str) -> None:
+    form, module = minimum(name), kernel()
+    assert module is not None
+    lower, upper = boxes_of(form, 100)
+    every = KernelEngine(form, module, 1).examine(lower, upper, -np.inf).bound
+    threshold = float(np.quantile(every[np.isfinite(every)], 0.9))
+    one, other = (each.examine(lower, upper, threshold) for each in (NumpyEngine(form), KernelEngine(form, module, 1)))
+    assert (one.verdict == other.verdict).mean() > 0.98
+    same = one.verdict == other.verdict
+    np.testing.assert_allclose(other.bound[same], one.bound[same], rtol=1e-9)
+    opened = same & (one.verdict == Verdict.OPEN) & (one.cut_lower == other.cut_lower).all(axis=0)
+    np.testing.assert_allclose(other.lower[:, opened], one.lower[:, opened], rtol=1e-8, atol=1e-8)
+    np.testing.assert_array_equal(one.split[opened], other.split[opened])
+    # They close boxes that are open without, and leave none open that is not.
+    without = NumpyEngine(form, tangents=False).examine(lower, upper, threshold)
+    left, before = (each.verdict == Verdict.OPEN for each in (one, without))
+    assert (left <= before).all()
+    assert name == "two poses" or left.sum() < before.sum()
+    # Points of the box that keep the conditions have no larger value than the bound.
+    rng, points = np.random.default_rng(6), 50
+    x = np.repeat(lower, points, axis=1) + rng.random((form.n, 100 * points)) * np.repeat(upper - lower, points, axis=1)
+    values = np.array(ca.Function("values", [form.x], [form.expressions])(x))
+    keeps = (values[1:] <= 0).all(axis=0) & np.isfinite(values).all(axis=0)
+    of = np.repeat(np.arange(100), points)[keeps]
+    assert (values[0, keeps] <= other.bound[of] + 1e-12 * abs(values[0, keeps])).all()
+
+
+def test_a_maximum_has_no_tangents_and_a_quotient_that_may_be_undefined_none_either() -> None:
+    assert tangent_rows(standard_form(formulate(load_case("paper-4.3")))) is None
+    form = minimum("paper-4.3")
+    rows = tangent_rows(form)
+    assert rows is not None
+    assert rows.functions == (0,) * 6
+    x = form.x
+    narrow = replace(form, functions=(-((x[0] + 1) ** 2) / (x[1] ** 2 + x[2] ** 2),), conditions=(), signs=())
+    rows = tangent_rows(narrow)
+    assert rows is not None
+    tape = value_tape(narrow, rows)
+    assert tape is not None
+    lower = np.full((form.n, 2), -1.0)
+    lower[1:3, 1] = 0.5
+    every = enclose_second(tape, lower, np.ones((form.n, 2)))
+    with np.errstate(all="ignore"):
+        usable = tangent_forms(Forms(*(each[1:] for each in vars(every).values())), rows.functions, 1).usable
+    assert usable.tolist() == [False, True]
+
+
+@needs_kernel
+def test_a_minimum_takes_fewer_boxes_than_without_and_has_the_same_bound() -> None:
+    nlp = replace(formulate(load_case("paper-4.3")), sense=Sense.MIN)
+    x = solve_program(nlp, Search(starts=2), jobs=1).x
+    found = certify_program(nlp, x, gap=1e-4)
+    assert found.status is CertificateStatus.PROVED
+    assert found.boxes < 1500
+    assert 94.9 < found.bound < 94.94
