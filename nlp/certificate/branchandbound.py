@@ -131,16 +131,13 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
 def _method(
     form: StandardForm, incumbent: Incumbent, engine: str | None, jobs: int | None, recorder: ProofWriter | None
 ) -> SearchMethod:
-    """Return the search for a form: by limbs where it separates, else of the whole box.
-
-    The proof of limbs that share variables would need lists of boxes of their own: it is one of the whole box.
-    """
+    """Return the search for a form: by limbs where it separates, else of the whole box."""
     separation = separate(form)
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
-    if separation is None or recorder is not None or form.n <= _WHOLE_BOX:
+    if separation is None or form.n <= _WHOLE_BOX:
         return BoxSearch(form, engine_for(form, engine, jobs), incumbent, recorder)
-    return SharedSearch(form, separation, incumbent, engine, jobs)
+    return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
 
 
 class SearchMethod(Protocol):

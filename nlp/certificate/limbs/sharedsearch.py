@@ -22,11 +22,13 @@ from ..enclosing.quadratic import GradientModel
 from .limbsums import bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
+from .sharedrecord import SharedRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
+    from ..boxes.proofwriter import ProofWriter
     from ..incumbent import Incumbent
     from ..separation import Separation
     from ..standardform import StandardForm
@@ -52,10 +54,18 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         incumbent: the best point known, which the search improves.
         engine: name of the engine.
         jobs: threads of the engine.
+        recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
+            dropped because of the other limbs: the search makes none then.
     """
 
     def __init__(
-        self, form: StandardForm, separation: Separation, incumbent: Incumbent, engine: str | None, jobs: int | None
+        self,
+        form: StandardForm,
+        separation: Separation,
+        incumbent: Incumbent,
+        engine: str | None,
+        jobs: int | None,
+        recorder: ProofWriter | None = None,
     ) -> None:
         if separation.common is None:
             raise ValueError("the limbs share no variable")
@@ -77,6 +87,10 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         root = SharedBoxes(
             self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
         )
+        self._record: SharedRecord | None = None
+        if recorder is not None:
+            self._record = SharedRecord(self._common_form.lower, self._common_form.upper)
+            recorder.leave_to(self._record.tree)
         super().__init__(root)
 
     @property
@@ -167,12 +181,19 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
     def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> None:
         """Drop and contract, and bisect shared boxes or own boxes."""
         bounded = sums.bound <= threshold
+        if self._record is not None:
+            # An inherited bound says nothing of the numbers of this box, which the proof needs.
+            bounded = sums.sums <= self._record.closing(threshold, self._incumbent.value)
         if (bounded & sums.is_possible).any():
             self._closed_bound = max(self._closed_bound, float(sums.bound[bounded & sums.is_possible].max()))
-        left = contract_shared(self._common_form, boxes, sums, threshold)
-        lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
         parts = zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
-        lists = [cut_own(*each, sums.sums, threshold) for each in parts]
+        if self._record is None:
+            left = contract_shared(self._common_form, boxes, sums, threshold)
+            lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
+            lists = [cut_own(*each, sums.sums, threshold) for each in parts]
+        else:
+            lower, upper, alive = boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool)
+            lists = [cut_own(*each, sums.sums, -np.inf) for each in parts]
         good = tuple(each.good for each in lists)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         self._closed_bound = max(self._closed_bound, threshold)
@@ -188,6 +209,10 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
         rest = SharedBoxes(lower, upper, sums.bound, tuple(each.own for each in lists), good)
+        if self._record is not None:
+            emptied = sizes == 0
+            self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
+            self._record.bisect(boxes, np.where(cut, change.argmax(axis=0), -1))
         if cut.any():
             places = np.flatnonzero(cut)
             self._opened.push(rest.select(places).bisect(change.argmax(axis=0)[places]))
