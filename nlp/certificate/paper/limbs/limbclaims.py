@@ -110,9 +110,7 @@ class LimbChecker:
             np.add.at(used, some.of, 1)
             total += some.of.size
             halves = self._attempt(some, claims, used)
-            left = _Pieces(
-                *(np.concatenate(pair, axis=-1) for pair in zip(left, halves, strict=True))  # type: ignore[arg-type]
-            )
+            left = _Pieces(*(np.concatenate(pair, axis=-1) for pair in zip(left, halves, strict=True)))
             open_now = np.unique(left.of).size
             done(open_before - open_now)
             open_before = open_now

@@ -49,7 +49,8 @@ def check_shared(
     ]
     whole = [each for each in leaves.bounded if np.isfinite(each.bounds).all()]
     total = _claims_of_sum(whole, leaves.infeasible, bound, m)
-    every = [*zip((limb.form for limb in limbs), claims, strict=True), (common, total)]
+    # The sums first: they are quick, and without them the limbs' bounds show nothing.
+    every = [(common, total), *zip((limb.form for limb in limbs), claims, strict=True)]
     shown, count = 0, sum(each.bounds.size for _, each in every)
 
     def done(more: int) -> None:
