@@ -21,6 +21,7 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm, standard_form
+from .limbs.limbpart import ClaimChecker, LimbPartChecker
 from .limbs.sharedcheck import check_shared
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
@@ -75,7 +76,9 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     parts = read_parts(proof.tree, form, bound)
     leaves, pieces, done = sum(len(part.claims) for part in parts), 0, 0
     for part in parts:
-        checker = _Checker(part.form, part.bound)
+        checker: ClaimChecker = _Checker(part.form, part.bound)
+        if part.form is not form:
+            checker = LimbPartChecker(part.form, part.bound, checker)
         groups: dict[tuple[Node, int], list[Claim]] = {}
         for claim in part.claims:
             groups.setdefault((claim.kind, claim.index), []).append(claim)

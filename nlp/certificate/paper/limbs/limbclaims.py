@@ -3,6 +3,7 @@
 A box is bisected until one of these holds on each piece:
 
 - a condition of the limb cannot hold;
+- the limb minus its tilt is at most the bound by the ranges of its parts;
 - the limb minus its tilt, and minus a weighted sum of its conditions, is at most the bound;
 - what is left of the piece, where neither of these is shown point by point, is empty.
 
@@ -84,7 +85,7 @@ class LimbChecker:
         self._equation = [each.is_equation for each in form.conditions]
         self._depends = np.array(form.dependence, dtype=bool)[1:]
 
-    def show(self, claims: LimbClaims, done: Callable[[int], None]) -> int:
+    def show(self, claims: LimbClaims, done: Callable[[int], None] | None = None) -> int:
         """Show claims, bisecting boxes until each holds, and return the number of boxes evaluated.
 
         Args:
@@ -112,7 +113,8 @@ class LimbChecker:
             halves = self._attempt(some, claims, used)
             left = _Pieces(*(np.concatenate(pair, axis=-1) for pair in zip(left, halves, strict=True)))
             open_now = np.unique(left.of).size
-            done(open_before - open_now)
+            if done is not None:
+                done(open_before - open_now)
             open_before = open_now
         return total
 
@@ -126,8 +128,9 @@ class LimbChecker:
         tilts = claims.tilts.select(some.of)
         with np.errstate(all="ignore"):
             holds, low, high = self._feasible_part(slopes)
+            holds |= slopes.is_below(bound - tilts.total() * (1 + _SUMS))
             change = np.zeros_like(low)
-            for model in self._tilted.sums(slopes, tilts):
+            for model in [] if holds.all() else self._tilted.sums(slopes, tilts):
                 holds |= slopes.defined & (model.bound() <= bound)
                 change = np.fmax(change, model.change())
                 above = bound - model.total - _SUMS * (np.abs(bound) + np.abs(model.total))
@@ -137,7 +140,7 @@ class LimbChecker:
                 high = np.where(usable, np.fmin(high, ends[1]), high)
             is_wrong = self._is_wrong(slopes, tilts, bound)
             holds |= (low > high).any(axis=0)
-            self._collapse(slopes, low, high)
+            low, high = self._collapsed(slopes, low, high)
             width = np.where(some.upper > some.lower, some.upper - some.lower, 1.0)
             score = change * (high - low) / width
             whole = (self._form.upper - self._form.lower)[:, None]
@@ -173,8 +176,9 @@ class LimbChecker:
                 low, high = np.fmax(low, below), np.fmin(high, above)
         return excluded, low, high
 
-    def _collapse(self, slopes: TiltedSlopes, low: FloatArray, high: FloatArray) -> None:
-        """Collapse boxes with ends (n, N), in place, on faces of own variables along which the limb rises."""
+    def _collapsed(self, slopes: TiltedSlopes, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return boxes with ends (n, N) collapsed on faces of own variables along which the limb rises."""
+        low, high = low.copy(), high.copy()
         for i in range(self._m, len(low)):
             up, down = slopes.rises_low[i] > 0, slopes.rises_high[i] < 0
             for r, (each, gradient) in enumerate(zip(slopes.conditions, slopes.d_conditions, strict=True)):
@@ -183,6 +187,7 @@ class LimbChecker:
                     up &= free | ((falls[1] < 0) & (not self._equation[r]))
                     down &= free | ((falls[0] > 0) & (not self._equation[r]))
             low[i], high[i] = np.where(up, high[i], low[i]), np.where(down & ~up, low[i], high[i])
+        return low, high
 
     def _is_wrong(self, slopes: TiltedSlopes, tilts: Tilts, bound: FloatArray) -> NDArray[np.bool_]:
         """Return whether the centre (N,) of a piece is a counterexample to its claim, by more than rounding."""

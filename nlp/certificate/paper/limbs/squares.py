@@ -59,6 +59,15 @@ class SquareSlopes:
         return np.asarray((self.D.V[0] > 0) & np.isfinite(self.D.V[1]) & np.isfinite(self.N.V[0] + self.N.V[1]))
 
     @property
+    def high(self) -> FloatArray:
+        """Upper bound (N,) of the term from the ranges of N and D, where it is defined."""
+        low, high = self.N.V
+        if self.factor > 0:
+            return np.asarray(self.factor * np.maximum(low * low, high * high) / self.D.V[0] * (1 + _SUMS) + _TINY)
+        least = np.where((low <= 0) & (high >= 0), 0.0, np.minimum(low * low, high * high))
+        return np.asarray(self.factor * least / self.D.V[1] * (1 - _SUMS) + _TINY)
+
+    @property
     def middle(self) -> FloatArray:
         """Approximate value (N,) at the centre."""
         N, D = (0.5 * (each.C[0] + each.C[1]) for each in (self.N, self.D))

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from .....models import FloatArray
 
+#: Error of a sum of a few rounded terms, in parts of their sizes.
+_SUMS = 1e-13
+
 
 @dataclass(frozen=True, eq=False)
 class TiltedSlopes:
@@ -47,6 +50,12 @@ class TiltedSlopes:
     rises_low: FloatArray
     rises_high: FloatArray
     defined: NDArray[np.bool_]
+
+    def is_below(self, bound: FloatArray) -> NDArray[np.bool_]:
+        """Return whether the function is at most a bound (N,) by the ranges of its parts alone."""
+        parts = [self.rest.V[1], *(each.high for each in self.squares)]
+        size = np.sum([np.abs(each) for each in parts], axis=0)
+        return np.asarray(self.defined & (np.sum(parts, axis=0) + _SUMS * size <= bound), dtype=bool)
 
     def value_at_centre(self) -> FloatArray:
         """Return the function (N,) at the centres, as computed in doubles."""
