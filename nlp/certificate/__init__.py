@@ -3,6 +3,6 @@
 ``standardform`` (a program as functions and conditions), ``separation`` (its limbs) and ``kinks`` (derivatives of
 fmin and fmax) serve search and check. The search is in the rooms ``enclosing`` (ranges over boxes), ``boxes`` (their
 examination) and ``limbs`` (F taken apart), which import each other in this order, and in ``symmetry``, ``incumbent``,
-``certificate`` and ``branchandbound``. The check is in the room ``paper``, of which the search imports ``proof``
-alone.
+``certificate`` and ``branchandbound``. The check is in the room ``paper``, of which the search imports ``proof`` and
+``limbs.sharedtree`` alone.
 """

@@ -134,17 +134,16 @@ def _method(
 ) -> SearchMethod:
     """Return the search for a form: by limbs where it separates, else of the whole box.
 
-    The proof of limbs that share variables would need lists of boxes of their own: it is one of the whole box. A proof
-    covers the whole box too where mirrors would leave a part of it, and boxes are closed without tangents to squares,
-    which its checker does not have.
+    A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
+    squares, which its checker does not have.
     """
     form = halved(form) if recorder is None else form
     separation = separate(form)
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
-    if separation is None or recorder is not None or form.n <= _WHOLE_BOX:
+    if separation is None or form.n <= _WHOLE_BOX:
         return BoxSearch(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
-    return SharedSearch(form, separation, incumbent, engine, jobs)
+    return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
 
 
 class SearchMethod(Protocol):

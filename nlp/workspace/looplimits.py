@@ -18,7 +18,7 @@ from ...models import FloatArray
 from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..errors import UncoveredError
-from .general.cells import Cells, Examined, Examiner, in_workspace, joined
+from .general.cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
 from .general.connected import is_connected
 from .general.limitvalues import Enclosed, LimitValues
 from .general.problem import NotJudgedError, Problem, build_problem
@@ -73,7 +73,7 @@ class _Search:
     def __init__(self, problem: Problem, values: LimitValues, gap: float) -> None:
         self._problem, self._values, self._gap = problem, values, gap
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
-        self._examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None)
+        self._examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None, None)
         count, n = len(values.claims), len(problem.start)
         self._best, self._at = np.full(count, -np.inf), np.full((count, n), np.nan)
         self._bound = np.full(count, -np.inf)

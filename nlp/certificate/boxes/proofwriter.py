@@ -47,11 +47,17 @@ class ProofWriter:
         self._functions = functions
         self._nodes: dict[int, _NodeRecord] = {}
         self._limbs: list[_LimbRecord] = []
+        self._shared: Callable[[], bytes] | None = None
 
     def clear(self) -> None:
         """Forget everything recorded: the search begins again."""
         self._nodes.clear()
         self._limbs.clear()
+        self._shared = None
+
+    def leave_to(self, tree: Callable[[], bytes]) -> None:
+        """Let another record return the tree, as that of limbs that share variables does."""
+        self._shared = tree
 
     def limb(self, bound: Callable[[], float]) -> ProofWriter:
         """Return the record of the next limb's tree; the tree of the whole is that of its limbs then.
@@ -102,6 +108,8 @@ class ProofWriter:
         Raises:
             ProofError: a box is not closed.
         """
+        if self._shared is not None:
+            return self._shared()
         if self._limbs:
             return self._tree_of_limbs(with_open=with_open)
         parts: list[bytes] = []

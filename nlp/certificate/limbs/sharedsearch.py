@@ -8,6 +8,7 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,11 +25,13 @@ from .limbmodels import LimbModels
 from .limbsums import LimbBound, bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
+from .sharedrecord import SharedRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
+    from ..boxes.proofwriter import ProofWriter
     from ..incumbent import Incumbent
     from ..separation import Separation
     from ..standardform import StandardForm
@@ -61,10 +64,18 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         incumbent: the best point known, which the search improves.
         engine: name of the engine.
         jobs: threads, which share the limbs.
+        recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
+            dropped because of the other limbs: the search makes none then.
     """
 
     def __init__(
-        self, form: StandardForm, separation: Separation, incumbent: Incumbent, engine: str | None, jobs: int | None
+        self,
+        form: StandardForm,
+        separation: Separation,
+        incumbent: Incumbent,
+        engine: str | None,
+        jobs: int | None,
+        recorder: ProofWriter | None = None,
     ) -> None:
         if separation.common is None:
             raise ValueError("the limbs share no variable")
@@ -88,6 +99,10 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         root = SharedBoxes(
             self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
         )
+        self._record: SharedRecord | None = None
+        if recorder is not None:
+            self._record = SharedRecord(self._common_form.lower, self._common_form.upper)
+            recorder.leave_to(self._record.tree)
         super().__init__(root)
 
     @property
@@ -188,12 +203,20 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
     def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> None:
         """Drop and contract, and bisect shared boxes or own boxes."""
         bounded = sums.bound <= threshold
+        if self._record is not None:
+            # An inherited bound says nothing of the numbers of this box, which the proof needs.
+            bounded = sums.sums <= self._record.closing(threshold, self._incumbent.value)
         if (bounded & sums.is_possible).any():
             self._closed_bound = max(self._closed_bound, float(sums.bound[bounded & sums.is_possible].max()))
-        left = contract_shared(self._common_form, boxes, sums, threshold)
-        lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
         limbs = range(len(self._engines))
-        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, threshold), limbs)
+        if self._record is None:
+            left = contract_shared(self._common_form, boxes, sums, threshold)
+            lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
+            below = threshold
+        else:
+            lower, upper, alive = boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool)
+            below = -math.inf
+        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), limbs)
         good = tuple(each.good for each in lists)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         self._closed_bound = max(self._closed_bound, threshold)
@@ -209,6 +232,10 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
         rest = SharedBoxes(lower, upper, sums.bound, tuple(each.own for each in lists), good)
+        if self._record is not None:
+            emptied = sizes == 0
+            self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
+            self._record.bisect(boxes, np.where(cut, change.argmax(axis=0), -1))
         if cut.any():
             places = np.flatnonzero(cut)
             self._opened.push(rest.select(places).bisect(change.argmax(axis=0)[places]))

@@ -2,6 +2,7 @@
 
 The modules import each other in this order: ``proof`` (JSON and bytes), ``prooftree`` (claims of a proof), ``ends`` and
 ``operations`` (what both arithmetics share), ``slopes``, ``slopebounds``, ``slopeweights``, ``slopecut``,
-``polynomials``, ``polynomialrules``, ``polymodels``, ``showing``, ``wrongclaims`` and ``proofcheck``. Proofs of a whole
+``polynomials``, ``polynomialrules``, ``polymodels``, ``showing``, ``wrongclaims``, the room ``limbs`` (limbs that share
+variables) and ``proofcheck``. Proofs of a whole
 box and of independent limbs are checked by polynomials.
 """

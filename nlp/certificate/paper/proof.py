@@ -15,6 +15,9 @@ Where the limbs of a form share no variable, the tree may begin with the byte ``
 bound and its tree, over its own variables, and the sum of the bounds must not exceed the proven one. A limb with the
 bound minus infinity has no feasible point, and then the trees of the others are bare leaves without a bound.
 
+Where the limbs share variables, the tree may begin with the byte ``SHARED``: then it is one of boxes of these, as
+:mod:`screwsynth.nlp.certificate.paper.limbs.sharedtree` states it.
+
 The boxes therefore cover the root by construction, and a tree with too few or too many bytes is no proof. Expressions
 are counted from 0, the functions first and then the conditions. ``docs/certificate.md`` explains the reasons and why
 they suffice; :mod:`screwsynth.nlp.certificate.paper.proofcheck` checks them.
@@ -57,6 +60,7 @@ class Node(enum.IntEnum):
     INFEASIBLE = 7
     MONOTONE = 8
     LIMBS = 9
+    SHARED = 10
 
 
 class ProofError(InputError):

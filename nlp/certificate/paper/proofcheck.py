@@ -19,6 +19,8 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm, standard_form
+from .limbs.limbpart import ClaimChecker, LimbPartChecker
+from .limbs.sharedcheck import check_shared
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
 from .showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown, boxes_at_once
@@ -62,10 +64,15 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     bound = -np.inf if proof.bound is None else proof.bound
+    if proof.tree[:1] == bytes([Node.SHARED]):
+        shared = check_shared(proof.tree, form, bound, progress)
+        return VerifiedProof(shared.leaves, shared.pieces, bound)
     parts = read_parts(proof.tree, form, bound)
     leaves, pieces, done = sum(len(part.claims) for part in parts), 0, 0
     for part in parts:
-        checker = _Checker(part.form, part.bound)
+        checker: ClaimChecker = _Checker(part.form, part.bound)
+        if part.form is not form:
+            checker = LimbPartChecker(part.form, part.bound, checker)
         groups: dict[tuple[Node, int], list[Claim]] = {}
         for claim in part.claims:
             groups.setdefault((claim.kind, claim.index), []).append(claim)
