@@ -26,6 +26,7 @@ from casadi import SX
 from .. import Closure, Dimension, Model, Substitution, Unknown, Wrench
 from ..drawing import Scene
 from ..limbjoints import expressions_of
+from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
 _SAME = 1e-9
@@ -62,19 +63,10 @@ class ClosedForm:
     reaches: tuple[Reach, ...]
 
 
-class _Solved(NamedTuple):
-    """An unknown in closed form: itself, its sine and cosine where it is an angle, and the edge of its reach."""
-
-    value: SX
-    sine: SX | None
-    cosine: SX | None
-    reach: SX
-
-
 def closed_form(model: Model) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form."""
     symbols = [item.symbol for item in model.unknowns]
-    found: dict[int, _Solved] = {}
+    found: dict[int, Solved] = {}
     dropped: set[int] = set()
     reaches: list[Reach] = []
     for k, unknown in enumerate(model.unknowns):
@@ -103,7 +95,7 @@ def _depends_on(expression: SX, symbols: Sequence[SX]) -> list[int]:
     return [k for k, each in enumerate(symbols) if ca.depends_on(expression, each)]
 
 
-def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None:
+def _solved(model: Model, unknown: Unknown, equation: Closure) -> Solved | None:
     """Return an unknown that an equation determines in closed form; None where the equation has another form."""
     q = unknown.symbol
     expression = equation.expression / equation.size
@@ -117,7 +109,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None
     sign = 1.0 if slope > 0 else -1.0
     if unknown.dimension is Dimension.ANGLE:
         # pi and its half are not doubles: sine and cosine are put in instead.
-        none, half, quarter = (_at_turn(expression, q, *turn) for turn in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0)))
+        none, half, quarter = (at_turn(expression, q, *turn) for turn in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0)))
         middle = (none + half) / 2
         A, B = (none - half) / 2, quarter - middle
         if not _is_same(model, expression, middle + A * ca.cos(q) + B * ca.sin(q)):
@@ -125,22 +117,14 @@ def _solved(model: Model, unknown: Unknown, equation: Closure) -> _Solved | None
         D, square = -middle, A * A + B * B
         root = sign * ca.sqrt(square - D * D)
         cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
-        return _Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
+        return Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
     c0, plus, minus = at(0.0), at(1.0), at(-1.0)
     c1, c2 = (plus - minus) / 2, (plus + minus) / 2 - c0
     if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
         return None
     square = c1 * c1 - 4 * c0 * c2
     # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
-    return _Solved((sign * ca.sqrt(square) - c1) / (2 * c2), None, None, square / (2 * c2))
-
-
-def _at_turn(expression: SX, q: SX, sine: float, cosine: float) -> SX:
-    """Return an expression with numbers in the place of sine and cosine of an angle; 0 in that of the angle itself."""
-    others = ca.symvar(expression)
-    rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
-    turned = _Solved(SX(0), SX(sine), SX(cosine), SX(0))
-    return _walk([rest, q], [expression], 1, {0: turned})[0]
+    return Solved((sign * ca.sqrt(square) - c1) / (2 * c2), None, None, square / (2 * c2))
 
 
 def _symbols(model: Model) -> list[SX]:
@@ -172,54 +156,7 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
     return True
 
 
-def _walk(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, solved: dict[int, _Solved]) -> list[SX]:
-    """Return expressions with unknowns replaced; sines and cosines of theirs are replaced as a whole.
-
-    Args:
-        symbols: arguments of the expressions.
-        outputs: the expressions.
-        argument: index of the argument whose elements are the unknowns.
-        solved: what replaces an element of it, by its index.
-    """
-    function = ca.Function("outputs", list(symbols), [ca.densify(each) for each in outputs])
-    work: list[SX] = [SX(0)] * function.sz_w()
-    # The unknown that a register holds, and its sign.
-    held: list[tuple[int, float] | None] = [None] * function.sz_w()
-    results = [[SX(0)] * function.numel_out(i) for i in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_OUTPUT:
-            results[target[0]][target[1]] = work[source[0]]
-            continue
-        to = target[0]
-        own = None
-        if op == ca.OP_INPUT:
-            is_solved = source[0] == argument and source[1] in solved
-            value = solved[source[1]].value if is_solved else ca.vec(symbols[source[0]])[source[1]]
-            own = (source[1], 1.0) if is_solved else None
-        elif op == ca.OP_CONST:
-            value = SX(function.instruction_constant(k))
-        else:
-            value, own = _applied(op, [work[i] for i in source], held[source[0]], solved)
-        work[to], held[to] = value, own
-    return [ca.reshape(ca.vertcat(*result), each.shape) for result, each in zip(results, outputs, strict=True)]
-
-
-def _applied(
-    op: int, operands: list[SX], held: tuple[int, float] | None, solved: dict[int, _Solved]
-) -> tuple[SX, tuple[int, float] | None]:
-    """Return the result of an operation, and the unknown that it is, with its sign."""
-    if held is not None and op in (ca.OP_SIN, ca.OP_COS, ca.OP_NEG):
-        index, sign = held
-        own = solved[index]
-        if op == ca.OP_NEG:
-            return -operands[0], (index, -sign)
-        if own.sine is not None and own.cosine is not None:
-            return (sign * own.sine if op == ca.OP_SIN else own.cosine), None
-    return (SX.unary(op, operands[0]) if len(operands) == 1 else SX.binary(op, *operands)), None
-
-
-def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure, ...]) -> Model:
+def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, ...]) -> Model:
     """Return a model with unknowns replaced.
 
     Args:
@@ -237,7 +174,7 @@ def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure,
         *[each.all for each in model.joint_screws],
         *expressions_of((*model.joints, *model.links)),
     ]
-    following = iter(_walk(_symbols(model), outputs, 1, solved))
+    following = iter(with_replaced(_symbols(model), outputs, 1, solved))
 
     def equations(given: Sequence[Closure]) -> tuple[Closure, ...]:
         return tuple(replace(each, expression=next(following)) for each in given)

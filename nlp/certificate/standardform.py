@@ -24,6 +24,7 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from ..program.program import Program
 from .kinks import without_ties
+from .lift import Lift
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,8 @@ class StandardForm:
         sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
         signs: conditions of a robot's assembly, which are no constraints of the program.
         has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
-        places: places of its variables in the program, where it is a part of another form; else they are the first.
+        places: places of its variables in the program, where they are not the first ones.
+        lift: what replaces variables of the program that this form does not have; None where it has them all.
     """
 
     nlp: Nlp
@@ -61,6 +63,7 @@ class StandardForm:
     sign: float
     has_epigraph: bool
     places: tuple[int, ...] | None = None
+    lift: Lift | None = None
 
     @property
     def n(self) -> int:
@@ -98,9 +101,20 @@ class StandardForm:
         """Return the value that is maximised at a point (n,), as computed in doubles."""
         return float(np.min(np.array(self._functions_at(x))))
 
+    def point_of(self, x: FloatArray) -> FloatArray:
+        """Return the form's variables (n,) of those of the program (m,)."""
+        point = np.asarray(x, dtype=np.float64)
+        return point[: self.n] if self.lift is None else self.lift.point(point)
+
+    def program_variables(self, point: FloatArray) -> FloatArray:
+        """Return the program's variables (m,), an epigraph variable left out, at a point (n,) of the form."""
+        return np.array(point, dtype=np.float64) if self.lift is None else self.lift.variables(point)
+
     def keeps_signs(self, x: FloatArray) -> bool:
-        """Return whether the conditions of the assembly hold at a point (n,), as computed in doubles."""
-        return not self.signs or bool(np.all(np.array(self._signs_at(x)) <= 0))
+        """Return whether the conditions of the assembly hold at a point (m,) of the program, as computed in doubles."""
+        if self.lift is not None:
+            return self.lift.holds(np.asarray(x)[: self.lift.x.numel()])
+        return not self.signs or bool(np.all(np.array(self._signs_at(x[: self.n])) <= 0))
 
     @cached_property
     def _signs_at(self) -> ca.Function:
@@ -143,19 +157,33 @@ def standard_form(nlp: Nlp) -> StandardForm:
             if constraint in epigraph.constraints
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
-    constraints += _further_loop_equations(program, x, nlp.arguments)
-    signs = _signs(nlp, x)
-    return StandardForm(
+    further = _further_loop_equations(program, x, nlp.arguments)
+    stated, implied, signs = _conditions(constraints), _conditions(further), _signs(nlp, x)
+    form = StandardForm(
         nlp=nlp,
         x=x[:count],
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        conditions=(*_conditions(constraints), *signs),
+        conditions=(*stated, *implied, *signs),
         signs=tuple(signs),
         sign=-nlp.sign,
         has_epigraph=epigraph is not None,
     )
+    if not nlp.in_home_mode:
+        return form
+    # Loaded where it is used: it builds forms from forms.
+    from .reduction import without_unknowns
+
+    loops = _loop_names(program)
+    return without_unknowns(form, [*(each for each in stated if each.name in loops), *implied, *signs])
+
+
+def _loop_names(program: Program) -> set[str]:
+    """Return the names of all loop equations that a program may have as constraints."""
+    count = len(program.robots)
+    where = [f" pose {k + 1}" for k in range(count)] if count > 1 else [""]
+    return {f"{each.name}{own}" for each in program.model.closure for own in where}
 
 
 def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
@@ -193,7 +221,7 @@ def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
     form = standard_form(replace(nlp, in_home_mode=True))
-    return form.keeps_signs(x[: form.n])
+    return form.keeps_signs(x)
 
 
 def _signs(nlp: Nlp, x: SX) -> list[Condition]:

@@ -1,0 +1,305 @@
+"""Elimination of a robot's unknowns: those that its loop equations give in closed form, one after the other.
+
+The equations of a limb are those of its loop, its distances, and its loop's gap along the axis of each of its joints.
+A joint's own rotation changes neither a distance from its axis nor a gap along it, so that many of these equations
+have one unknown less than the gap itself. An unknown follows from one equation, or from the three of the gap:
+
+* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: one of two solutions, that of home,
+  at which the derivative of the equation has the same sign;
+* an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
+  and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
+
+What replaces an unknown depends on dimensions and pose, and on no other unknown. Each form is read off an equation at
+a few values of the unknown, and tested at random dimensions and poses near home; of these expressions, which are
+analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v, 0))``, so that it has a value beyond
+the edge of reach too; a search excludes what is beyond by ``v >= 0``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .. import Dimension, FloatArray, Model, Substitution
+from .replacing import Solved, at_turn, with_replaced
+
+#: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
+_SAME = 1e-9
+#: Points at which identities are tested, and how far they are from home, in parts of the dimensions, of the robot's
+#: size and in radians: far enough for other expressions to differ, near enough for limbs to reach them.
+_TESTS, _SPREAD = 4, 0.02
+#: Part of its size below which a coefficient or a slope is 0 at home: home is on the edge of reach there.
+_EDGE = 1e-6
+_SEED = 0
+#: Name of one of the equations of a path's loop.
+_LOOP = re.compile(r"loop (\S+) \((\d+)\)")
+
+
+class Eliminated(NamedTuple):
+    """An unknown in closed form.
+
+    Attributes:
+        index: of the unknown in the model.
+        solved: what replaces it, in the model's parameters and pose.
+        reach: (1, 1) not negative where the equation has a solution, about 1 at home; None where it always has one.
+    """
+
+    index: int
+    solved: Solved
+    reach: SX | None
+
+
+class _Equation(NamedTuple):
+    """A left side of an equation (k, 1), and the length or number by which it is of order 1."""
+
+    expression: SX
+    size: SX
+
+
+@dataclass(eq=False)
+class _Elimination:
+    """The state of an elimination.
+
+    Attributes:
+        model: the robot.
+        symbols: its symbols: parameters, unknowns, rotation, position.
+        solved: what replaces the unknowns found by now.
+        found: these unknowns, in the order in which they were found.
+        points: arguments of functions of the symbols: home, then those of the tests.
+    """
+
+    model: Model
+    symbols: list[SX]
+    points: list[list[FloatArray]]
+    solved: dict[int, Solved] = field(default_factory=dict)
+    found: list[Eliminated] = field(default_factory=list)
+
+    def turned(self, equation: _Equation, rotation: FloatArray | None) -> _Equation:
+        """Return an equation with numbers in the place of the platform's rotation, where it is given."""
+        if rotation is None:
+            return equation
+        expression = ca.substitute(equation.expression, self.symbols[2], SX(rotation.tolist()))
+        return _Equation(expression, equation.size)
+
+    def open_unknowns(self, expression: SX) -> list[int]:
+        """Return the indices of the unknowns that an expression depends on."""
+        names = {each.element_hash(): k for k, each in enumerate(ca.vertsplit(self.symbols[1]))}
+        return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)
+
+    def replaced(self, expression: SX) -> SX:
+        """Return an expression without the unknowns found by now."""
+        return with_replaced(self.symbols, [expression], 1, self.solved)[0] if self.solved else expression
+
+    def values(self, expression: SX) -> FloatArray:
+        """Return the values (t, k) of an expression (k, 1) at home and at the points of the tests."""
+        function = ca.Function("values", self.symbols, [ca.densify(expression)])
+        return np.array([function(*each).full().ravel() for each in self.points])
+
+    def is_zero(self, expression: SX, size: SX | float = 1.0) -> bool:
+        """Return whether an expression is 0 at all points of the tests, in parts of a size and of 1."""
+        found = self.values(ca.vertcat(ca.vec(expression), SX(size)))
+        return bool(np.all(np.abs(found[:, :-1]) <= _SAME * (1 + np.abs(found[:, -1:]))))
+
+    def without_absent(self, equation: _Equation) -> _Equation:
+        """Return an equation with zeros in the place of unknowns on which its value does not depend."""
+        expression = equation.expression
+        for k in self.open_unknowns(expression):
+            q, size = self.model.unknowns[k].symbol, equation.size / self.model.unknowns[k].size
+            if self.is_zero(ca.jacobian(expression, q) / size):
+                expression = ca.substitute(expression, q, SX(0))
+        return _Equation(expression, equation.size)
+
+    def add(self, index: int, solved: Solved, reach: SX | None) -> None:
+        """Add an unknown in closed form."""
+        self.solved[index] = solved
+        self.found.append(Eliminated(index, solved, reach))
+
+
+def eliminated(model: Model, rotation: FloatArray | None = None) -> tuple[Eliminated, ...]:
+    """Return the unknowns of a robot that follow from dimensions and pose in closed form, each in home's solution.
+
+    Args:
+        model: the robot.
+        rotation: (3, 3) rotation of the platform where it is fixed: more unknowns may follow then.
+    """
+    if not model.unknowns:
+        return ()
+    own = Substitution.identity(model)
+    work = _Elimination(model, own.all, _points(model, rotation))
+    gaps = {name: work.turned(gap, rotation) for name, gap in _gaps(model).items()}
+    single = [_Equation(each.expression, each.size) for each in model.distances]
+    single += [
+        _Equation(ca.dot(axis, gap.expression), gap.size) for name, gap in gaps.items() for axis in _axes(model, name)
+    ]
+    single += [_Equation(each.expression, each.size) for each in model.closure]
+    single = [work.without_absent(work.turned(each, rotation)) for each in single]
+    while _eliminate_one(work, list(gaps.values()), single):
+        pass
+    return tuple(work.found)
+
+
+def _eliminate_one(work: _Elimination, gaps: Sequence[_Equation], single: Sequence[_Equation]) -> bool:
+    """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
+    for given, solve in (
+        *((gap, _from_gap) for gap in gaps),
+        *((each, _from_linear) for each in single),
+        *((each, _from_one) for each in single),
+    ):
+        left = [k for k in work.open_unknowns(given.expression) if k not in work.solved]
+        if not left:
+            continue
+        equation = _Equation(work.replaced(given.expression), given.size)
+        if len(left) > 1:
+            equation = work.without_absent(equation)
+            left = work.open_unknowns(equation.expression)
+        if len(left) == 1 and solve(work, left[0], equation):
+            return True
+    return False
+
+
+def _from_gap(work: _Elimination, k: int, gap: _Equation) -> bool:
+    """Eliminate an unknown on which a gap (3, 1) depends linearly, by its sine and cosine or by itself."""
+    q, e = work.model.unknowns[k].symbol, gap.expression / gap.size
+    slope = ca.jacobian(e, q)
+    if work.model.unknowns[k].dimension is not Dimension.ANGLE:
+        a = ca.substitute(slope, q, SX(0))
+        c = ca.substitute(e, q, SX(0))
+        if not work.is_zero(a * q + c - e) or not _is_positive(work, ca.sumsqr(a * work.model.unknowns[k].size)):
+            return False
+        work.add(k, Solved(-ca.dot(a, c) / ca.sumsqr(a), None, None, SX(0)), None)
+        return True
+    a, b, c = _harmonics(work, e, q)
+    same = ca.vertcat(ca.dot(a, b), ca.sumsqr(a) - ca.sumsqr(b), a * ca.cos(q) + b * ca.sin(q) + c - e)
+    if not work.is_zero(same) or not _is_positive(work, ca.sumsqr(a)):
+        return False
+    cosine, sine = -ca.dot(a, c) / ca.sumsqr(a), -ca.dot(b, c) / ca.sumsqr(b)
+    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), None)
+    return True
+
+
+def _from_one(work: _Elimination, k: int, equation: _Equation) -> bool:
+    """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
+    unknown = work.model.unknowns[k]
+    q, e = unknown.symbol, equation.expression / equation.size
+    slope = float(work.values(ca.jacobian(e, q) * unknown.size)[0, 0])
+    if not abs(slope) > _EDGE:
+        return False
+    sign = 1.0 if slope > 0 else -1.0
+    if unknown.dimension is Dimension.ANGLE:
+        A, B, C = _harmonics(work, e, q)
+        if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
+            return False
+        square = A * A + B * B
+        reach = square - C * C
+        root = sign * ca.sqrt(ca.fmax(reach, 0))
+        cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
+        work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), _of_order_one(work, reach))
+        return True
+    c0, c1, c2 = _coefficients(e, q)
+    if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
+        return False
+    if not abs(float(work.values(c2 * unknown.size**2)[0, 0])) > _EDGE:
+        return False
+    reach = c1 * c1 - 4 * c0 * c2
+    value = (sign * ca.sqrt(ca.fmax(reach, 0)) - c1) / (2 * c2)
+    work.add(k, Solved(value, None, None, SX(0)), _of_order_one(work, reach))
+    return True
+
+
+def _from_linear(work: _Elimination, k: int, equation: _Equation) -> bool:
+    """Eliminate a slide on which one equation (1, 1) depends linearly."""
+    unknown = work.model.unknowns[k]
+    if unknown.dimension is Dimension.ANGLE:
+        return False
+    q, e = unknown.symbol, equation.expression / equation.size
+    c0, c1, _ = _coefficients(e, q)
+    if not work.is_zero(c0 + c1 * q - e) or not abs(float(work.values(c1 * unknown.size)[0, 0])) > _EDGE:
+        return False
+    work.add(k, Solved(-c0 / c1, None, None, SX(0)), None)
+    return True
+
+
+def _coefficients(e: SX, q: SX) -> tuple[SX, SX, SX]:
+    """Return c0, c1 and c2 of ``e = c0 + c1 q + c2 q^2``, whatever the form of e is."""
+    slope = ca.jacobian(e, q)
+    at_zero = ca.substitute(ca.vertcat(e, slope, ca.jacobian(slope, q) / 2), q, SX(0))
+    return at_zero[0], at_zero[1], at_zero[2]
+
+
+def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
+    """Return a, b and c of ``e = a cos q + b sin q + c``, whatever the form of e is.
+
+    a and b are those of the derivative, in which terms that do not depend on q cancel.
+    """
+    slope = ca.jacobian(e, q)
+    a, b = at_turn(slope, q, -1.0, 0.0), at_turn(slope, q, 0.0, 1.0)
+    c = at_turn(e, q, 0.0, 0.0)
+    if not work.is_zero(a * ca.cos(q) + b * ca.sin(q) + c - e):
+        c = at_turn(e, q, 0.0, 1.0) - a
+    return a, b, c
+
+
+def _angle(sine: SX, cosine: SX) -> SX:
+    """Return the angle (1, 1) of a sine and cosine, without a value at half a turn."""
+    return 2 * ca.atan(sine / (1 + cosine))
+
+
+def _of_order_one(work: _Elimination, reach: SX) -> SX:
+    """Return a number of an equation's solutions in parts of its value at home, where it is positive."""
+    return reach / float(work.values(reach)[0, 0])
+
+
+def _is_positive(work: _Elimination, value: SX) -> bool:
+    """Return whether a coefficient (1, 1) of order 1 is positive at home."""
+    return bool(float(work.values(value)[0, 0]) > _EDGE)
+
+
+def _gaps(model: Model) -> dict[str, _Equation]:
+    """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
+
+    Any three equations of a path would do, as its gap is read off by its form alone: others have another one.
+    """
+    parts: dict[str, dict[int, _Equation]] = {}
+    for each in (*model.loops, *model.closure):
+        match = _LOOP.match(each.name)
+        if match is not None:
+            parts.setdefault(match[1], {}).setdefault(int(match[2]), _Equation(each.expression, each.size))
+    first = {name: [own[k] for k in (1, 2, 3) if k in own] for name, own in parts.items()}
+    return {
+        name: _Equation(ca.vertcat(*[each.expression for each in own]), own[0].size)
+        for name, own in first.items()
+        if len(own) == 3
+    }
+
+
+def _axes(model: Model, name: str) -> Iterator[SX]:
+    """Yield the current direction (3, 1) of each rotation of a path's limb."""
+    for each in model.joint_screws:
+        if each.limb == name.partition(".")[0] and not each.is_nested:
+            for k in range(each.all.shape[1]):
+                if not each.all[:3, k].is_zero():
+                    yield each.all[:3, k]
+
+
+def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]:
+    """Return home and points near it: values of parameters, unknowns, rotation and position."""
+    rng = np.random.default_rng(_SEED)
+    typical = np.array([value for item in model.parameters for value in item.typical])
+    home = np.array(model.home)
+    size = float(np.linalg.norm(home)) or 1.0
+    points = [[typical, np.zeros(len(model.unknowns)), np.eye(3) if rotation is None else rotation, home]]
+    lengths = np.array([item.dimension is not Dimension.ANGLE for item in model.unknowns])
+    for _ in range(_TESTS):
+        x, y, z = _SPREAD * rng.uniform(-1, 1, 3)
+        turn = np.linalg.qr(np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))[0]
+        turn = turn * np.sign(np.diag(turn)) if rotation is None else rotation
+        unknowns = rng.uniform(-1.5, 1.5, len(model.unknowns)) * np.where(lengths, size, 1.0)
+        values = typical * (1 + _SPREAD * rng.uniform(-1, 1, typical.shape))
+        points.append([values, unknowns, turn, home + _SPREAD * size * rng.uniform(-1, 1, 3)])
+    return points
