@@ -64,12 +64,12 @@ class Eliminated(NamedTuple):
     """An unknown that follows from dimensions, pose, and the unknowns that are held as variables.
 
     Attributes:
-        index: of the unknown in the model.
+        place: index of the unknown in the model.
         solved: what replaces it; None for one that is held as a variable.
         root: of the equation that determines it; None where there is one solution.
     """
 
-    index: int
+    place: int
     solved: Solved | None
     root: Root | None
 
@@ -93,6 +93,7 @@ class _Elimination:
         found: these unknowns, in the order in which they were found.
         points: arguments of functions of the symbols: home, then those of the tests.
         held: indices of unknowns that stay variables where they have two solutions.
+        failed: attempts without success: number of the attempt, and the unknowns that were open.
     """
 
     model: Model
@@ -101,6 +102,7 @@ class _Elimination:
     held: frozenset[int]
     solved: dict[int, Solved] = field(default_factory=dict)
     found: list[Eliminated] = field(default_factory=list)
+    failed: set[tuple[int, ...]] = field(default_factory=set)
 
     def turned(self, equation: _Equation, rotation: FloatArray | None) -> _Equation:
         """Return an equation with numbers in the place of the platform's rotation, where it is given."""
@@ -111,7 +113,7 @@ class _Elimination:
 
     def open_unknowns(self, expression: SX) -> list[int]:
         """Return the indices of the unknowns that an expression depends on, and that are not determined by now."""
-        known = {each.index for each in self.found}
+        known = {each.place for each in self.found}
         every = enumerate(ca.vertsplit(self.symbols[1]))
         names = {each.element_hash(): k for k, each in every if k not in known}
         return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)
@@ -178,14 +180,15 @@ def eliminated(
 
 def _eliminate_one(work: _Elimination, gaps: Sequence[_Equation], single: Sequence[_Equation]) -> bool:
     """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
-    for given, solve in (
-        *((gap, _from_gap) for gap in gaps),
-        *((each, _from_linear) for each in single),
-        *((each, _from_one) for each in single),
-    ):
+    attempts = [
+        (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
+    ]
+    for attempt, (solve, given) in enumerate(attempts):
         left = work.open_unknowns(given.expression)
-        if not left:
+        if not left or (attempt, *left) in work.failed:
             continue
+        # Repeated only where another unknown is determined by then.
+        work.failed.add((attempt, *left))
         equation = given._replace(expression=work.replaced(given.expression))
         if len(left) > 1:
             equation = work.without_absent(equation)

@@ -125,12 +125,13 @@ def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
         of_roots: list[int] = []
         for each in eliminated(program.model, _numbers(rotation), held[k]):
             parts = _at_pose(nlp, each, numbers)
-            name = program.model.unknowns[each.index].name + where
+            name = program.model.unknowns[each.place].name + where
             if each.solved is not None:
-                found.solved[places[each.index]] = Solved(parts[0], *parts[1:3], SX(0))
+                sine, cosine = (None, None) if each.solved.sine is None else parts[1:3]
+                found.solved[places[each.place]] = Solved(parts[0], sine, cosine, SX(0))
             if each.root is None:
                 continue
-            of_roots.append(each.index)
+            of_roots.append(each.place)
             reaches.append(parts[3])
             if each.solved is None:
                 found.stated.add(f"{each.root.equation}{where}")
@@ -156,14 +157,16 @@ def _edges(form: StandardForm, unknowns: Sequence[int], reaches: Sequence[SX]) -
 
 
 def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
-    """Return value, sine, cosine, reach, equation and slope of an unknown at a robot's dimensions and pose."""
+    """Return value, sine, cosine, reach, equation and slope of an unknown at a robot's dimensions and pose.
+
+    Those that the unknown does not have are 0.
+    """
     symbols = Substitution.identity(nlp.program.model).all
     solved, root = each.solved, each.root
     parts = [None] * 3 if solved is None else [solved.value, solved.sine, solved.cosine]
     parts += [None] * 3 if root is None else [root.reach, root.value, root.slope]
-    function = ca.Function("unknown", symbols, [SX(0) if part is None else part for part in parts])
-    found = function.call(given)
-    return [each if part is not None else None for part, each in zip(parts, found, strict=True)]  # type: ignore[misc]
+    outputs = [SX(0) if part is None else part for part in parts]
+    return list(ca.Function("unknown", symbols, outputs).call(given))
 
 
 def _numbers(expression: SX) -> tuple[float, ...] | None:
