@@ -27,6 +27,7 @@ from casadi import SX
 from .. import Closure, Dimension, Model, Substitution, Unknown, Wrench
 from ..drawing import Scene
 from ..limbjoints import expressions_of
+from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
 _SAME = 1e-9
@@ -65,15 +66,6 @@ class ClosedForm:
     reaches: tuple[Reach, ...]
 
 
-class _Solved(NamedTuple):
-    """An unknown in closed form: itself, its sine and cosine where it is an angle, and the edge of its reach."""
-
-    value: SX
-    sine: SX | None
-    cosine: SX | None
-    reach: SX
-
-
 def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
 
@@ -83,7 +75,7 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
     """
     symbols = [item.symbol for item in model.unknowns]
-    found: dict[int, _Solved] = {}
+    found: dict[int, Solved] = {}
     dropped: set[int] = set()
     reaches: list[Reach] = []
     for k, unknown in enumerate(model.unknowns):
@@ -112,7 +104,7 @@ def _depends_on(expression: SX, symbols: Sequence[SX]) -> list[int]:
     return [k for k, each in enumerate(symbols) if ca.depends_on(expression, each)]
 
 
-def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> _Solved | None:
+def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
     """Return an unknown that an equation determines in closed form; None where the equation has another form."""
     q = unknown.symbol
     expression = equation.expression / equation.size
@@ -123,7 +115,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
     sign = 1.0 if slope > 0 else -1.0
     if unknown.dimension is Dimension.ANGLE:
         sine, cosine = SX.sym("sine"), SX.sym("cosine")
-        turned = _at_turn(expression, q, sine, cosine)
+        turned = at_turn(expression, q, sine, cosine)
         value, B, A, twice = _at_zero(turned, ca.vertcat(sine, cosine), [sine, cosine, (cosine, cosine)])
         # With the squares of sine and cosine as one term, which is 1.
         middle = value + twice / 2
@@ -132,14 +124,14 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
         D, square = -middle, A * A + B * B
         root = sign * _root(square - D * D, square, extended)
         cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
-        return _Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
+        return Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
     c0, c1, twice = _at_zero(expression, q, [q, (q, q)])
     c2 = twice / 2
     if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
         return None
     square = c1 * c1 - 4 * c0 * c2
     # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
-    return _Solved((sign * _root(square, 2 * c2, extended) - c1) / (2 * c2), None, None, square / (2 * c2))
+    return Solved((sign * _root(square, 2 * c2, extended) - c1) / (2 * c2), None, None, square / (2 * c2))
 
 
 def _root(value: SX, size: SX, extended: bool) -> SX:
@@ -149,14 +141,6 @@ def _root(value: SX, size: SX, extended: bool) -> SX:
     least = ca.fmax(value, _EXTENDED * size)
     root = ca.sqrt(least)
     return root + (value - least) / (2 * root)
-
-
-def _at_turn(expression: SX, q: SX, sine: SX, cosine: SX) -> SX:
-    """Return an expression with symbols in the place of sine and cosine of an angle; 0 in that of the angle itself."""
-    others = ca.symvar(expression)
-    rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
-    turned = _Solved(SX(0), sine, cosine, SX(0))
-    return _walk([rest, q], [expression], 1, {0: turned})[0]
 
 
 def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> list[SX]:
@@ -207,54 +191,7 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
     return True
 
 
-def _walk(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, solved: dict[int, _Solved]) -> list[SX]:
-    """Return expressions with unknowns replaced; sines and cosines of theirs are replaced as a whole.
-
-    Args:
-        symbols: arguments of the expressions.
-        outputs: the expressions.
-        argument: index of the argument whose elements are the unknowns.
-        solved: what replaces an element of it, by its index.
-    """
-    function = ca.Function("outputs", list(symbols), [ca.densify(each) for each in outputs])
-    work: list[SX] = [SX(0)] * function.sz_w()
-    # The unknown that a register holds, and its sign.
-    held: list[tuple[int, float] | None] = [None] * function.sz_w()
-    results = [[SX(0)] * function.numel_out(i) for i in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_OUTPUT:
-            results[target[0]][target[1]] = work[source[0]]
-            continue
-        to = target[0]
-        own = None
-        if op == ca.OP_INPUT:
-            is_solved = source[0] == argument and source[1] in solved
-            value = solved[source[1]].value if is_solved else ca.vec(symbols[source[0]])[source[1]]
-            own = (source[1], 1.0) if is_solved else None
-        elif op == ca.OP_CONST:
-            value = SX(function.instruction_constant(k))
-        else:
-            value, own = _applied(op, [work[i] for i in source], held[source[0]], solved)
-        work[to], held[to] = value, own
-    return [ca.reshape(ca.vertcat(*result), each.shape) for result, each in zip(results, outputs, strict=True)]
-
-
-def _applied(
-    op: int, operands: list[SX], held: tuple[int, float] | None, solved: dict[int, _Solved]
-) -> tuple[SX, tuple[int, float] | None]:
-    """Return the result of an operation, and the unknown that it is, with its sign."""
-    if held is not None and op in (ca.OP_SIN, ca.OP_COS, ca.OP_NEG):
-        index, sign = held
-        own = solved[index]
-        if op == ca.OP_NEG:
-            return -operands[0], (index, -sign)
-        if own.sine is not None and own.cosine is not None:
-            return (sign * own.sine if op == ca.OP_SIN else own.cosine), None
-    return (SX.unary(op, operands[0]) if len(operands) == 1 else SX.binary(op, *operands)), None
-
-
-def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure, ...]) -> Model:
+def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, ...]) -> Model:
     """Return a model with unknowns replaced.
 
     Args:
@@ -272,7 +209,7 @@ def _rewritten(model: Model, solved: dict[int, _Solved], closure: tuple[Closure,
         *[each.all for each in model.joint_screws],
         *expressions_of((*model.joints, *model.links)),
     ]
-    following = iter(_walk(_symbols(model), outputs, 1, solved))
+    following = iter(with_replaced(_symbols(model), outputs, 1, solved))
 
     def equations(given: Sequence[Closure]) -> tuple[Closure, ...]:
         return tuple(replace(each, expression=next(following)) for each in given)

@@ -299,8 +299,8 @@ class _Search:
         if self._has_counterexample():
             status = CertificateStatus.REFUSED
             at = ", ".join(
-                f"{name} = {value:.6g}"
-                for name, value in zip(self.form.names, self.incumbent.program_point(), strict=False)
+                f"{variable.name} = {value:.6g}"
+                for variable, value in zip(nlp.program.variables, self.incumbent.program_point(), strict=True)
             )
             reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
         elif left:

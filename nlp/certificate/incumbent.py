@@ -81,9 +81,9 @@ class Incumbent:
         form, nlp = self._form, self._form.nlp
         if x is None:
             for point in starting_points(nlp, _POINTS, seed=0):
-                self.improve_near(point[: form.n])
+                self.improve_near(form.point_of(point))
             return
-        point = np.asarray(x, dtype=np.float64)[: form.n]
+        point = form.point_of(x)
         value = form.value_at(point)
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
@@ -107,16 +107,17 @@ class Incumbent:
         at = linearise(nlp, whole)
         if not math.isfinite(at.violation):
             return
-        self._keep_if_better(whole[: self._form.n])
+        self._keep_if_better(self._form.point_of(whole))
         corrected = correct_point(nlp, whole, at.active())
-        self._keep_if_better(np.clip(corrected.x, nlp.lower, nlp.upper)[: self._form.n])
+        self._keep_if_better(self._form.point_of(np.clip(corrected.x, nlp.lower, nlp.upper)))
 
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:
         """Return the point with the program's epigraph variable, where it has one."""
+        variables = self._form.program_variables(point)
         if not self._form.has_epigraph:
-            return np.array(point)
+            return variables
         nlp = self._form.nlp
-        return np.append(point, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
+        return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
 
     def _violation(self, point: FloatArray, value: float) -> float:
         """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
@@ -124,7 +125,7 @@ class Incumbent:
         The program has independent loop equations only, which other ways to assemble the joints fulfil too.
         """
         nlp, whole = self._form.nlp, self._with_level(point, value)
-        if not self._form.keeps_signs(point):
+        if not self._form.keeps_signs(whole):
             return math.inf
         violation = linearise(nlp, whole).violation
         return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf

@@ -106,7 +106,7 @@ def _part(
         signs=tuple(each for each in conditions if any(each is sign for sign in form.signs)),
         sign=form.sign,
         has_epigraph=False,
-        places=tuple(places),
+        places=tuple(places) if form.places is None else tuple(form.places[i] for i in places),
     )
 
 

@@ -10,8 +10,7 @@ variable. The program's arguments are put in as doubles, and a proof is about th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import NamedTuple
 
 import casadi as ca
@@ -23,92 +22,11 @@ from ..evidence.state import CLOSED
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from ..program.program import Program
-from .kinks import without_ties
+from .form import Condition, StandardForm
+from .reduction import without_unknowns
+from .spectral import spectral_conditions
 
-
-@dataclass(frozen=True, eq=False)
-class Condition:
-    """A condition ``expression <= 0``, or ``expression = 0``."""
-
-    name: str
-    expression: SX
-    is_equation: bool
-
-
-@dataclass(frozen=True, eq=False)
-class StandardForm:
-    """A maximisation over a box.
-
-    Attributes:
-        nlp: the program that it states.
-        x: (n,) symbols.
-        lower, upper: (n,) ends of the box.
-        functions: ``phi_j``, the least of which is maximised.
-        conditions: ``h_k``, with ``signs`` at the end; numbered after the functions where both are counted.
-        sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
-        signs: conditions of a robot's assembly, which are no constraints of the program.
-        has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
-        places: places of its variables in the program, where it is a part of another form; else they are the first.
-    """
-
-    nlp: Nlp
-    x: SX
-    lower: FloatArray
-    upper: FloatArray
-    functions: tuple[SX, ...]
-    conditions: tuple[Condition, ...]
-    signs: tuple[Condition, ...]
-    sign: float
-    has_epigraph: bool
-    places: tuple[int, ...] | None = None
-
-    @property
-    def n(self) -> int:
-        """Number of variables."""
-        return int(self.x.numel())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the variables."""
-        variables = self.nlp.program.variables
-        return tuple(variables[i].name for i in (range(self.n) if self.places is None else self.places))
-
-    @property
-    def is_equation(self) -> tuple[bool, ...]:
-        """Whether each of the R expressions must be 0; false for functions."""
-        return (*(False for _ in self.functions), *(condition.is_equation for condition in self.conditions))
-
-    @cached_property
-    def expressions(self) -> SX:
-        """(R, 1) functions, then conditions."""
-        return ca.densify(ca.vertcat(*self.functions, *[condition.expression for condition in self.conditions]))
-
-    @cached_property
-    def jacobian(self) -> SX:
-        """(R, n) derivatives, dense: structural zeros are written out."""
-        return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
-
-    @cached_property
-    def dependence(self) -> list[list[bool]]:
-        """(R, n) whether an expression depends on a variable."""
-        pattern = ca.jacobian(self.expressions, self.x).sparsity()
-        return [[bool(pattern.has_nz(r, i)) for i in range(self.n)] for r in range(self.expressions.numel())]
-
-    def value_at(self, x: FloatArray) -> float:
-        """Return the value that is maximised at a point (n,), as computed in doubles."""
-        return float(np.min(np.array(self._functions_at(x))))
-
-    def keeps_signs(self, x: FloatArray) -> bool:
-        """Return whether the conditions of the assembly hold at a point (n,), as computed in doubles."""
-        return not self.signs or bool(np.all(np.array(self._signs_at(x)) <= 0))
-
-    @cached_property
-    def _signs_at(self) -> ca.Function:
-        return ca.Function("signs", [self.x], [ca.densify(ca.vertcat(*[each.expression for each in self.signs]))])
-
-    @cached_property
-    def _functions_at(self) -> ca.Function:
-        return ca.Function("functions", [self.x], [ca.densify(ca.vertcat(*self.functions))])
+__all__ = ["Condition", "StandardForm", "is_in_home_mode", "standard_form"]
 
 
 class _BoundedExpression(NamedTuple):
@@ -143,19 +61,47 @@ def standard_form(nlp: Nlp) -> StandardForm:
             if constraint in epigraph.constraints
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
-    constraints += _further_loop_equations(program, x, nlp.arguments)
-    signs = _signs(nlp, x)
-    return StandardForm(
+    further = _further_loop_equations(program, x, nlp.arguments)
+    stated, implied, signs = _conditions(constraints), _conditions(further), _signs(nlp, x)
+    stated += _of_singular_values(nlp, x)
+    form = StandardForm(
         nlp=nlp,
         x=x[:count],
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        conditions=(*_conditions(constraints), *signs),
+        conditions=(*stated, *implied, *signs),
         signs=tuple(signs),
         sign=-nlp.sign,
         has_epigraph=epigraph is not None,
     )
+    if not nlp.in_home_mode:
+        return form
+    loops = _loop_names(program)
+    return without_unknowns(form, [*(each for each in stated if each.name in loops), *implied, *signs])
+
+
+def _of_singular_values(nlp: Nlp, x: SX) -> list[Condition]:
+    """Return the conditions that follow from limits on singular values."""
+    program = nlp.program
+    found = [
+        condition
+        for k, each in enumerate(program.constraints)
+        if each.spectral is not None
+        for condition in spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]), float(nlp.g_upper[k]))
+    ]
+    if not found:
+        return []
+    function = ca.Function("minors", [program.x, program.p], [each.expression for each in found])
+    values = function.call([x, SX(ca.DM(nlp.arguments))])
+    return [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
+
+
+def _loop_names(program: Program) -> set[str]:
+    """Return the names of all loop equations that a program may have as constraints."""
+    count = len(program.robots)
+    where = [f" pose {k + 1}" for k in range(count)] if count > 1 else [""]
+    return {f"{each.name}{own}" for each in program.model.closure for own in where}
 
 
 def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
@@ -193,7 +139,7 @@ def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
     form = standard_form(replace(nlp, in_home_mode=True))
-    return form.keeps_signs(x[: form.n])
+    return form.keeps_signs(x)
 
 
 def _signs(nlp: Nlp, x: SX) -> list[Condition]:

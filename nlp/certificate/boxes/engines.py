@@ -77,7 +77,7 @@ class KernelEngine:
         squares = tangent_rows(form) if tangents and shared is None else None
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form, squares)
         objective = objective_tape(form, len(tape))
-        equation = np.array(form.is_equation, dtype=np.int32)
+        equation = np.where(form.follows, 2, form.is_equation).astype(np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
             form.n,

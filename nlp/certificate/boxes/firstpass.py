@@ -97,7 +97,7 @@ class FirstPass(NamedTuple):
 
 def first_pass(
     tape: Tape,
-    equation: NDArray[np.bool_],
+    kinds: tuple[NDArray[np.bool_], NDArray[np.bool_]],
     functions: int,
     lower: FloatArray,
     upper: FloatArray,
@@ -108,15 +108,15 @@ def first_pass(
 
     Args:
         tape: of the R expressions.
-        equation: (R,) whether each must be 0.
+        kinds: (R,) whether each must be 0, and whether it follows from others and has no weight.
         functions: number J of the first expressions, which are functions.
         lower: (n, B) lower ends.
         upper: (n, B) upper ends.
         threshold: boxes whose bound is at most this are closed.
         squared: functions of the squares that tangents may replace, whose rows the tape has behind the expressions.
     """
-    R, every = len(equation), enclose_second(tape, lower, upper)
-    found = _pass(_some(every, slice(0, R)), equation, functions, threshold, Cuts.none(lower.shape))
+    R, every = len(kinds[0]), enclose_second(tape, lower, upper)
+    found = _pass(_some(every, slice(0, R)), kinds, functions, threshold, Cuts.none(lower.shape))
     if not squared:
         return found.result
     tangents = tangent_forms(_some(every, slice(R, None)), squared, functions)
@@ -126,7 +126,7 @@ def first_pass(
         *(np.concatenate([getattr(part, name)[..., rest] for part in (steep, expressions)]) for name in vars(every))
     )
     first = found.result
-    again = _pass(forms, equation, functions, threshold, first.cuts.select(rest)).result
+    again = _pass(forms, kinds, functions, threshold, first.cuts.select(rest)).result
     first.bound[rest] = np.fmin(first.bound[rest], again.bound)
     first.verdict[rest], first.reason[rest] = again.verdict, again.reason
     first.cuts.put(rest, again.cuts)
@@ -147,14 +147,17 @@ def _some(forms: Forms, rows: slice) -> Forms:
     return Forms(*(values[rows] for values in vars(forms).values()))
 
 
-def _pass(forms: Forms, equation: NDArray[np.bool_], functions: int, threshold: float, cuts: Cuts) -> _Passed:
+def _pass(
+    forms: Forms, kinds: tuple[NDArray[np.bool_], NDArray[np.bool_]], functions: int, threshold: float, cuts: Cuts
+) -> _Passed:
     """Return a pass over boxes with the forms of all expressions, and cuts that move further, in place."""
-    J, n = functions, forms.a.shape[1]
+    J, n, (equation, follows) = functions, forms.a.shape[1], kinds
     matrices = _matrices(forms, n)
     size = np.abs(forms.c) + (forms.q - forms.p) + forms.s
     size = size + np.abs(forms.a).sum(axis=1) + np.abs(matrices).sum(axis=(1, 2))
     defined = np.asarray((forms.s[:J] < np.inf).all(axis=0))
-    L = _sum_model(forms, matrices, size, multipliers(forms.a, forms.hi, equation, J))
+    weighed = np.where(follows[:, None], -np.inf, forms.hi)
+    L = _sum_model(forms, matrices, size, multipliers(forms.a, weighed, equation, J))
     bound = np.where(defined, np.fmin(forms.hi[:J].min(axis=0), L.bound()), np.inf)
     impossible = (forms.lo > 0) | (equation[:, None] & (forms.hi < 0))
     impossible[:J] = False

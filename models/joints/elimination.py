@@ -1,0 +1,316 @@
+"""Elimination of a robot's unknowns: those that its loop equations give in closed form, one after the other.
+
+The equations of a limb are those of its loop, its distances, and its loop's gap along the axis of each of its joints.
+A joint's own rotation changes neither a distance from its axis nor a gap along it, so that many of these equations
+have one unknown less than the gap itself. An unknown follows from one equation, or from the three of the gap:
+
+* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: one of two solutions, that of home,
+  at which the derivative of the equation has the same sign; in limbs alone that have a sign of their working mode;
+* an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
+  and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
+
+What replaces an unknown depends on dimensions and pose, and on no other unknown. Each form is read off an equation at
+a few values of the unknown, and tested at random dimensions and poses near home; of these expressions, which are
+analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v, 0))``, so that it has a value beyond
+the edge of reach too; a search excludes what is beyond by ``v >= 0``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .. import Dimension, FloatArray, Model, Substitution, Unknown
+from .limbequations import Equation, axes_of, gaps_of, limb_of
+from .replacing import Solved, at_turn, with_replaced
+
+#: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
+_SAME = 1e-9
+#: Points at which identities are tested, and how far they are from home, in parts of the dimensions, of the robot's
+#: size and in radians: far enough for other expressions to differ, near enough for limbs to reach them.
+_TESTS, _SPREAD = 4, 0.02
+#: Part of its size below which a coefficient or a slope is 0 at home: home is on the edge of reach there.
+_EDGE = 1e-6
+_SEED = 0
+#: Number of results that are kept: a certificate needs those of one robot several times.
+_CACHED = 16
+
+
+class Root(NamedTuple):
+    """The choice of one of two solutions of an equation.
+
+    Attributes:
+        equation: name of the equation in the model; empty for one that follows from several.
+        value: (1, 1) its left side, of order 1.
+        slope: (1, 1) the derivative by the unknown with the sign that makes it positive at home.
+        reach: (1, 1) not negative where there are solutions, and 1 at home.
+    """
+
+    equation: str
+    value: SX
+    slope: SX
+    reach: SX
+
+
+class Eliminated(NamedTuple):
+    """An unknown that follows from dimensions, pose, and the unknowns that are held as variables.
+
+    Attributes:
+        place: index of the unknown in the model.
+        solved: what replaces it; None for one that is held as a variable.
+        root: of the equation that determines it; None where there is one solution.
+    """
+
+    place: int
+    solved: Solved | None
+    root: Root | None
+
+
+@dataclass(eq=False)
+class _Elimination:
+    """The state of an elimination.
+
+    Attributes:
+        model: the robot.
+        symbols: its symbols: parameters, unknowns, rotation, position.
+        solved: what replaces the unknowns found by now.
+        found: these unknowns, in the order in which they were found.
+        points: arguments of functions of the symbols: home, then those of the tests.
+        held: indices of unknowns that stay variables where they have two solutions.
+        failed: attempts without success: number of the attempt, and the unknowns that were open.
+    """
+
+    model: Model
+    symbols: list[SX]
+    points: list[list[FloatArray]]
+    held: frozenset[int]
+    solved: dict[int, Solved] = field(default_factory=dict)
+    found: list[Eliminated] = field(default_factory=list)
+    failed: set[tuple[int, ...]] = field(default_factory=set)
+
+    def turned(self, equation: Equation, rotation: FloatArray | None) -> Equation:
+        """Return an equation with numbers in the place of the platform's rotation, where it is given."""
+        if rotation is None:
+            return equation
+        expression = ca.substitute(equation.expression, self.symbols[2], SX(rotation.tolist()))
+        return equation._replace(expression=expression)
+
+    def open_unknowns(self, expression: SX) -> list[int]:
+        """Return the indices of the unknowns that an expression depends on, and that are not determined by now."""
+        known = {each.place for each in self.found}
+        every = enumerate(ca.vertsplit(self.symbols[1]))
+        names = {each.element_hash(): k for k, each in every if k not in known}
+        return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)
+
+    def replaced(self, expression: SX) -> SX:
+        """Return an expression without the unknowns found by now."""
+        return with_replaced(self.symbols, [expression], 1, self.solved)[0] if self.solved else expression
+
+    def values(self, expression: SX) -> FloatArray:
+        """Return the values (t, k) of an expression (k, 1) at home and at the points of the tests."""
+        function = ca.Function("values", self.symbols, [ca.densify(expression)])
+        return np.array([function(*each).full().ravel() for each in self.points])
+
+    def is_zero(self, expression: SX, size: SX | float = 1.0) -> bool:
+        """Return whether an expression is 0 at all points of the tests, in parts of a size and of 1."""
+        found = self.values(ca.vertcat(ca.vec(expression), SX(size)))
+        return bool(np.all(np.abs(found[:, :-1]) <= _SAME * (1 + np.abs(found[:, -1:]))))
+
+    def without_absent(self, equation: Equation) -> Equation:
+        """Return an equation with zeros in the place of unknowns on which its value does not depend."""
+        expression = equation.expression
+        for k in self.open_unknowns(expression):
+            q, size = self.model.unknowns[k].symbol, equation.size / self.model.unknowns[k].size
+            if self.is_zero(ca.jacobian(expression, q) / size):
+                expression = ca.substitute(expression, q, SX(0))
+        return equation._replace(expression=expression)
+
+    def add(self, index: int, solved: Solved, root: Root | None = None) -> None:
+        """Add an unknown in closed form."""
+        if root is not None and index in self.held:
+            self.found.append(Eliminated(index, None, root))
+            return
+        self.solved[index] = solved
+        self.found.append(Eliminated(index, solved, root))
+
+
+@lru_cache(maxsize=_CACHED)
+def eliminated(
+    model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
+) -> tuple[Eliminated, ...]:
+    """Return the unknowns of a robot that follow from dimensions and pose in closed form, each in home's solution.
+
+    Args:
+        model: the robot.
+        rotation: nine numbers, column by column, of a rotation that is fixed: more unknowns may follow then.
+        held: indices of unknowns that stay variables where they have two solutions; others follow from them.
+    """
+    if not model.unknowns:
+        return ()
+    own = Substitution.identity(model)
+    turn = None if rotation is None else np.array(rotation).reshape(3, 3, order="F")
+    work = _Elimination(model, own.all, _points(model, turn), held)
+    gaps = {name: work.turned(gap, turn) for name, gap in gaps_of(model).items()}
+    single = [Equation(each.expression, each.size, limb_of(each.name), each.name) for each in model.distances]
+    single += [
+        Equation(ca.dot(axis, gap.expression), gap.size, gap.limb)
+        for name, gap in gaps.items()
+        for axis in axes_of(model, name)
+    ]
+    single += [Equation(each.expression, each.size, limb_of(each.name), each.name) for each in model.closure]
+    single = [work.without_absent(work.turned(each, turn)) for each in single]
+    while _eliminate_one(work, list(gaps.values()), single):
+        pass
+    return tuple(work.found)
+
+
+def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequence[Equation]) -> bool:
+    """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
+    attempts = [
+        (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
+    ]
+    for attempt, (solve, given) in enumerate(attempts):
+        left = work.open_unknowns(given.expression)
+        if not left or (attempt, *left) in work.failed:
+            continue
+        # Repeated only where another unknown is determined by then.
+        work.failed.add((attempt, *left))
+        equation = given._replace(expression=work.replaced(given.expression))
+        if len(left) > 1:
+            equation = work.without_absent(equation)
+            left = work.open_unknowns(equation.expression)
+        if len(left) == 1 and solve(work, left[0], equation):
+            return True
+    return False
+
+
+def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
+    """Eliminate an unknown on which a gap (3, 1) depends linearly, by its sine and cosine or by itself."""
+    q, e = work.model.unknowns[k].symbol, gap.expression / gap.size
+    slope = ca.jacobian(e, q)
+    if work.model.unknowns[k].dimension is not Dimension.ANGLE:
+        a = ca.substitute(slope, q, SX(0))
+        c = ca.substitute(e, q, SX(0))
+        if not work.is_zero(a * q + c - e) or not _is_positive(work, ca.sumsqr(a * work.model.unknowns[k].size)):
+            return False
+        work.add(k, Solved(-ca.dot(a, c) / ca.sumsqr(a), None, None, SX(0)))
+        return True
+    a, b, c = _harmonics(work, e, q)
+    same = ca.vertcat(ca.dot(a, b), ca.sumsqr(a) - ca.sumsqr(b), a * ca.cos(q) + b * ca.sin(q) + c - e)
+    if not work.is_zero(same) or not _is_positive(work, ca.sumsqr(a)):
+        return False
+    cosine, sine = -ca.dot(a, c) / ca.sumsqr(a), -ca.dot(b, c) / ca.sumsqr(b)
+    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)))
+    return True
+
+
+def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
+    """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
+    unknown = work.model.unknowns[k]
+    if all(each.limb != equation.limb for each in work.model.signs if each.is_mode):
+        # A limb without a sign of its mode is covered in every mode.
+        return False
+    q, e = unknown.symbol, equation.expression / equation.size
+    slope = ca.jacobian(e, q) * unknown.size
+    at_home = float(work.values(slope)[0, 0])
+    if not abs(at_home) > _EDGE:
+        return False
+    solve = _angle_of if unknown.dimension is Dimension.ANGLE else _slide_of
+    solved, reach = solve(work, unknown, e, 1.0 if at_home > 0 else -1.0)
+    if solved is None:
+        return False
+    root = Root(equation.name, e, slope / at_home, reach / float(work.values(reach)[0, 0]))
+    work.add(k, solved, root)
+    return True
+
+
+def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
+    """Return the angle with ``A cos q + B sin q + C = 0`` and a slope of a sign, and its reach; None without one."""
+    q = unknown.symbol
+    A, B, C = _harmonics(work, e, q)
+    if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
+        return None, SX(0)
+    square = A * A + B * B
+    reach = square - C * C
+    root = sign * ca.sqrt(ca.fmax(reach, 0))
+    cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
+    return Solved(_angle(sine, cosine), sine, cosine, SX(0)), reach
+
+
+def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
+    """Return the slide with ``c0 + c1 q + c2 q^2 = 0`` and a slope of a sign, and its reach; None without one."""
+    q = unknown.symbol
+    c0, c1, c2 = _coefficients(e, q)
+    if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
+        return None, SX(0)
+    if not abs(float(work.values(c2 * unknown.size**2)[0, 0])) > _EDGE:
+        return None, SX(0)
+    reach = c1 * c1 - 4 * c0 * c2
+    return Solved((sign * ca.sqrt(ca.fmax(reach, 0)) - c1) / (2 * c2), None, None, SX(0)), reach
+
+
+def _from_linear(work: _Elimination, k: int, equation: Equation) -> bool:
+    """Eliminate a slide on which one equation (1, 1) depends linearly."""
+    unknown = work.model.unknowns[k]
+    if unknown.dimension is Dimension.ANGLE:
+        return False
+    q, e = unknown.symbol, equation.expression / equation.size
+    c0, c1, _ = _coefficients(e, q)
+    if not work.is_zero(c0 + c1 * q - e) or not abs(float(work.values(c1 * unknown.size)[0, 0])) > _EDGE:
+        return False
+    work.add(k, Solved(-c0 / c1, None, None, SX(0)))
+    return True
+
+
+def _coefficients(e: SX, q: SX) -> tuple[SX, SX, SX]:
+    """Return c0, c1 and c2 of ``e = c0 + c1 q + c2 q^2``, whatever the form of e is."""
+    slope = ca.jacobian(e, q)
+    at_zero = ca.substitute(ca.vertcat(e, slope, ca.jacobian(slope, q) / 2), q, SX(0))
+    return at_zero[0], at_zero[1], at_zero[2]
+
+
+def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
+    """Return a, b and c of ``e = a cos q + b sin q + c``, whatever the form of e is.
+
+    a and b are those of the derivative, in which terms that do not depend on q cancel.
+    """
+    slope = ca.jacobian(e, q)
+    a, b = at_turn(slope, q, -1.0, 0.0), at_turn(slope, q, 0.0, 1.0)
+    c = at_turn(e, q, 0.0, 0.0)
+    if not work.is_zero(a * ca.cos(q) + b * ca.sin(q) + c - e):
+        c = at_turn(e, q, 0.0, 1.0) - a
+    return a, b, c
+
+
+def _angle(sine: SX, cosine: SX) -> SX:
+    """Return the angle (1, 1) of a sine and cosine, without a value at half a turn."""
+    return 2 * ca.atan(sine / (1 + cosine))
+
+
+def _is_positive(work: _Elimination, value: SX) -> bool:
+    """Return whether a coefficient (1, 1) of order 1 is positive at home."""
+    return bool(float(work.values(value)[0, 0]) > _EDGE)
+
+
+def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]:
+    """Return home and points near it: values of parameters, unknowns, rotation and position."""
+    rng = np.random.default_rng(_SEED)
+    typical = np.array([value for item in model.parameters for value in item.typical])
+    home = np.array(model.home)
+    size = float(np.linalg.norm(home)) or 1.0
+    points = [[typical, np.zeros(len(model.unknowns)), np.eye(3) if rotation is None else rotation, home]]
+    lengths = np.array([item.dimension is not Dimension.ANGLE for item in model.unknowns])
+    for _ in range(_TESTS):
+        x, y, z = _SPREAD * rng.uniform(-1, 1, 3)
+        turn = np.linalg.qr(np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))[0]
+        turn = turn * np.sign(np.diag(turn)) if rotation is None else rotation
+        unknowns = rng.uniform(-1.5, 1.5, len(model.unknowns)) * np.where(lengths, size, 1.0)
+        values = typical * (1 + _SPREAD * rng.uniform(-1, 1, typical.shape))
+        points.append([values, unknowns, turn, home + _SPREAD * size * rng.uniform(-1, 1, 3)])
+    return points
