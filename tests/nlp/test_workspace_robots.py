@@ -205,6 +205,7 @@ def test_a_design_of_a_delta_is_exchanged_until_it_is_proved() -> None:
     assert proof.history[0][0] > solution.F
 
 
+@pytest.mark.slow
 def test_a_design_of_a_robot_with_loops_is_exchanged_until_it_is_proved() -> None:
     text = {"rb": "{ min = 0.7, max = 1.5 }", "rp": "{ min = 0.4, max = 1.0 }"}
     solution = solve(case_of(TRIPOD, over=OVER, height="{ min = 1.0, max = 1.2 }", **text))
@@ -247,6 +248,7 @@ def test_slices_of_a_delta_hold_at_every_point() -> None:
     assert is_unreached.any()
 
 
+@pytest.mark.slow
 def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
     case = case_of(TRIPOD, over="", rb="1.0", rp="0.6", height="1.1")
     (found,) = slices_of(case)
