@@ -73,7 +73,7 @@ class _Boxes(Composed[Polynomial]):
     radius: FloatArray
 
     def variable(self, i: int) -> Polynomial:
-        P = np.zeros((4 - 1, self.lower.shape[1]))
+        P = np.zeros((places(1).total, self.lower.shape[1]))
         P[0], P[1] = self.centre[i], self.radius[i]
         none = np.zeros(self.lower.shape[1])
         size = np.abs(P[0]) + P[1]

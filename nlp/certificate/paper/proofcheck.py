@@ -30,6 +30,8 @@ from .wrongclaims import Centres
 _CLAIMS = 4096
 #: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
 _MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
+#: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
+_WIDEST = 5
 #: Callback with the number of claims checked, and of those to be checked.
 CheckProgress = Callable[[int, int], None]
 
@@ -131,7 +133,7 @@ class _Checker:
             with np.errstate(all="ignore"):
                 shown = claimed.show(a, b)
             left = np.flatnonzero(~(shown.holds | (shown.lower > shown.upper).any(axis=0)))
-            along = self._variables_to_bisect(shown, a, b)[left]
+            along = self._variables_to_bisect(shown, a, b, deep)[left]
             a, b, of, deep = shown.lower[:, left], shown.upper[:, left], of[left], deep[left] + 1
             failed = (used[of] > _MOST_PIECES) | (deep > _MOST_BISECTIONS) | centres.are_wrong(a, b)
             if failed.any():
@@ -162,11 +164,14 @@ class _Checker:
             if end[i] != whole[i]:
                 raise ProofError(f"a box is collapsed on a face of {self._form.names[i]} that is not the case's")
 
-    def _variables_to_bisect(self, shown: Shown, lower: FloatArray, upper: FloatArray) -> NDArray[np.intp]:
-        """Return the variable (N,) along which to bisect what is left of each box with ends (n, N)."""
+    def _variables_to_bisect(
+        self, shown: Shown, lower: FloatArray, upper: FloatArray, depth: NDArray[np.intp]
+    ) -> NDArray[np.intp]:
+        """Return the variable (N,) along which to bisect what is left of each box with ends (n, N) and a depth (N,)."""
         with np.errstate(all="ignore"):
             radius = 0.5 * (shown.upper - shown.lower)
             score = shown.change * (radius / np.where(upper > lower, 0.5 * (upper - lower), 1.0))
             relative = radius / (self._form.upper - self._form.lower)[:, None]
-            score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
+            known = np.isfinite(score).all(axis=0) & (score > 0).any(axis=0)
+            score = np.where(known & (depth % _WIDEST != _WIDEST - 1), score, relative)
         return np.asarray(score.argmax(axis=0))
