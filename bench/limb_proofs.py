@@ -12,8 +12,6 @@ import sys
 import time
 from pathlib import Path
 
-from limbs import ANGLE, machine
-
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, load_case, solve
 from screwsynth.nlp.certificate import branchandbound
@@ -21,6 +19,10 @@ from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "models")]
+from limb_cases import poses  # noqa: E402 - the tests' cases
+from limbs import ANGLE, machine  # noqa: E402
 
 ROWS = [
     ("pose", "0.1", "1e-2"), ("pose", "0.1", "1e-3"), ("pose", "0.1", "1e-4"),
@@ -64,9 +66,6 @@ def measure(name: str, case: Case, gap: float, limit: float = 120.0) -> None:
 
 def several_poses(gap: float) -> None:
     """Print rows for robots at several poses, searched by limbs although they have few variables."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "models"))
-    from limb_cases import poses  # noqa: PLC0415 - the tests' cases, needed here alone
-
     usual, branchandbound._WHOLE_BOX = branchandbound._WHOLE_BOX, 0
     for seed in range(12):
         measure(f"poses {seed}", poses(seed), gap, 20.0)

@@ -205,6 +205,10 @@ def test_models_of_limbs_without_tilts_bound_every_point(sign: float) -> None:
     excess = (value - t).max(axis=1) - bound
     slack = 1e-14 * (np.abs(value).max(axis=1) + tilts.total())
     assert (excess <= slack).all()
+    # Ranges of the parts, without tilts: they show no bound that a point exceeds.
+    largest = value.max(axis=1)
+    assert not slopes.is_below(largest - slack).any()
+    assert slopes.is_below(2 * np.abs(largest) + 1e6).all()
     # The bound is no wider than it must be: at small boxes it is reached.
     assert np.median(excess / (np.abs(value).max(axis=1) + tilts.total())) > -0.5
     gradient = ca.Function("g", [limb.x], [ca.jacobian(limb.functions[0], limb.x).T]).map(flat.shape[1])(flat).full()
