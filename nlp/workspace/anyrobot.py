@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
@@ -20,6 +21,7 @@ from ..case.workspace import Workspace
 from ..errors import UncoveredError
 from ..program.layout import Layout
 from .claims import Claim
+from .general.family import Family
 from .general.matrices import RankMatrix
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
@@ -48,6 +50,7 @@ def prove_ranks(
     model: Model,
     box: PoseBox,
     *,
+    family: Family | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     progress: RankProgress | None = None,
@@ -58,21 +61,23 @@ def prove_ranks(
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
         box: the poses.
+        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds for each of the two searches.
         progress: called during them.
     """
     try:
-        problem = build_problem(case, model, box)
-        regular = prove_rank(problem, problem.locked, engine=engine, time_limit=time_limit, progress=progress)
+        problem = build_problem(case, model, box) if family is None else family.problem
+        prove = partial(
+            prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress
+        )
+        regular = prove(problem.locked)
         constraints = None
         if problem.unactuated is not None:
-            constraints = prove_rank(
-                problem, problem.unactuated, engine=engine, time_limit=time_limit, progress=progress
-            )
+            constraints = prove(problem.unactuated)
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(box, str(error)), None)
-    return Ranks(_after_newton(regular, problem, problem.locked), constraints)
+    return Ranks(_after_newton(regular, problem, problem.locked, family), constraints)
 
 
 def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
@@ -135,18 +140,28 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[
     return layout, claims
 
 
-def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix) -> Regularity:
+def _after_newton(
+    found: Regularity, problem: Problem, matrix: RankMatrix, family: Family | None = None
+) -> Regularity:
     """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
     newton, free = SingularPose(problem, matrix), list(problem.free)
     points = problem.box.random(_POSES, np.random.default_rng(_SEED))[:, free]
     values = np.array([newton.smallest(each) for each in points])
-    for k in np.argsort(values)[:_WORST]:
-        z = newton.search(points[k]) if np.isfinite(values[k]) else None
-        if z is not None:
-            y = frozen_array(problem.pose_of(z), (6,))
-            return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON)
+    searches = [(newton.search, points)]
+    if family is not None:
+        exact = np.array([family.exact(each) for each in points])
+        searches.append((SingularPose(problem, family.matrix(matrix), family).search, exact))
+    for search, begins in searches:
+        for k in np.argsort(values)[:_WORST]:
+            z = search(begins[k]) if np.isfinite(values[k]) else None
+            if z is not None:
+                y = frozen_array(problem.pose_of(z), (6,))
+                centres = family.errors_of(z) if family is not None and len(z) > len(free) else None
+                return replace(
+                    found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres
+                )
     return found
 
 

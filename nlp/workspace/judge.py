@@ -16,9 +16,11 @@ from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
 from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
-from .built.builtclaims import NO_LEGS, built_claims
+from .built.builtclaims import built_claims
+from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of
+from .general.problem import NotJudgedError
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
@@ -122,11 +124,16 @@ def judge_workspace(
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
-    ranks = _ranks(case, closed, box, legs, engine=engine, time_limit=time_limit, progress=rank_progress, paper=paper)
+    machines, unknown = _machines(case, closed, box, legs)
+    ranks = (
+        Ranks(not_judged(box, unknown), None)
+        if unknown
+        else _ranks(case, closed, box, legs, machines, engine, time_limit, rank_progress, paper)
+    )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
         return judged
-    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper)
+    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
     found: list[Extreme] = []
     for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
         if until_fault and outcome is not Outcome.PROVED:
@@ -134,12 +141,22 @@ def judge_workspace(
     return replace(judged, extremes=tuple(found))
 
 
+def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
+    """Return the machines that are meant, or why they are not judged: None and no reason for the design or legs."""
+    if legs is not None or not case.joint_centre_tolerance:
+        return None, ""
+    try:
+        return machines_of(case, closed.model, box), ""
+    except NotJudgedError as error:
+        return None, str(error)
+
+
 def _ranks(
     case: Case,
     closed: ClosedForm,
     box: PoseBox,
     legs: Legs | None,
-    *,
+    machines: Machines | None,
     engine: str | None,
     time_limit: float | None,
     progress: RankProgress | None,
@@ -150,9 +167,10 @@ def _ranks(
         recorder = None if paper is None else paper.rank
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
-    if case.joint_centre_tolerance:
-        return Ranks(not_judged(box, NO_LEGS), None)
-    return prove_ranks(case, closed.model, box, engine=engine, time_limit=time_limit, progress=progress)
+    family = None if machines is None else machines.family
+    return prove_ranks(
+        case, closed.model, box, family=family, engine=engine, time_limit=time_limit, progress=progress
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +183,8 @@ class _Numbers:
         closed: its robot without unknowns in closed form.
         legs: joint centres; None for a robot that is not six straight legs.
         gap, time_limit, jobs, progress, paper: as in :func:`judge_workspace`.
+        machines: every machine within the tolerance, of a robot without legs; None where none are judged.
+        unknown: reason why the machines that are meant are not judged; else empty.
     """
 
     case: Case
@@ -176,6 +196,8 @@ class _Numbers:
     jobs: int | None
     progress: Callable[[str, int, int], None] | None
     paper: PaperRecord | None
+    machines: Machines | None
+    unknown: str
 
     def add(
         self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
@@ -194,11 +216,17 @@ class _Numbers:
         case, box, legs = self.case, pose_box(self.workspace), self.legs
         names = [name for name in quantities if name not in SPECTRAL]
         asked = [name for name in quantities if name in SPECTRAL]
+        spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+        if self.machines is not None:
+            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
+            yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
+            yield from _add(found, spectral(case, self.closed.model, box, asked))
+            return
         layout = posed_layout(case, self.workspace)
         claims = claims_of(layout, names, with_objective=with_objective)
         if self.closed.reaches:
             place, reaches = reach_claims(case, self.closed, self.workspace)
-            reaches = _as_built(place, self.workspace, legs, reaches, self._prove(place)).claims
+            reaches = [replace(each, uncovered=self.unknown) for each in reaches]
             yield from self._add_proved(found, place, reaches)
             if all(each.outcome is Outcome.PROVED for each in found):
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
@@ -206,6 +234,7 @@ class _Numbers:
                 layout = posed_layout(replace(case, model=model), self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
+        claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = _as_built(layout, self.workspace, legs, claims, prove)
         yield from self._add_proved(found, layout, claims)
         if legs is not None:
@@ -215,7 +244,6 @@ class _Numbers:
             yield from (each.outcome for each in found[before:])
             own = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, own(case, legs, box, shortest=shortest, paper=self.paper))
-        spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
         yield from _add(found, spectral(case, self.closed.model, box, asked))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
@@ -262,8 +290,6 @@ def _as_built(
     layout: Layout, workspace: Workspace, legs: Legs | None, claims: list[Claim], prove: Callable[..., Extreme]
 ) -> _AsBuilt:
     """Return claims about every machine within the case's tolerance from those about the exact one."""
-    if legs is None and layout.case.joint_centre_tolerance:
-        return _AsBuilt(0.0, [replace(each, uncovered=NO_LEGS) for each in claims])
     if legs is None or not legs.tolerance or not claims:
         return _AsBuilt(0.0, claims)
     lengths = [replace(each, limit=None) for each in claims if each.leg is not None and each.sense is Sense.MIN]

@@ -144,14 +144,14 @@ class Examiner:
     Args:
         problem: the robot.
         test: its entries are in the coordinates of the problem, or of all machines.
-        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None.
+        family: all machines that are meant; None for the design alone.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: Test, family: Family | None, engine: str | None) -> None:
+    def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)

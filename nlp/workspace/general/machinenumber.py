@@ -123,7 +123,7 @@ class _Search:
 
     def __init__(self, family: Family, expression: SX, engine: str | None) -> None:
         self._began, self._family, problem = time.perf_counter(), family, family.problem
-        self._examiner = Examiner(problem, _Bound(expression), family, engine)
+        self._examiner = Examiner(problem, _Bound(expression), engine, family)
         self._points = MachinePoints(family, expression)
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         whole = whole_workspace(problem)

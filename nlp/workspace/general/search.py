@@ -76,7 +76,7 @@ class _Search:
             built = family.matrix(matrix)
             self._newtons.append(SingularPose(problem, built, family))
             test = RankTest(built, family.coordinates, family.start)
-        self._examiner = Examiner(problem, test, family, engine)
+        self._examiner = Examiner(problem, test, engine, family)
         self._independent = list(problem.independent)
         whole = whole_workspace(problem)
         self._whole = (whole.upper - whole.lower)[0, self._independent]
