@@ -22,7 +22,7 @@ from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of
 from .general.problem import NotJudgedError
 from .machine import Legs, legs_of, workspace_of_case
-from .numbers.askedvalues import SPECTRAL, spectral_extremes
+from .numbers.askedvalues import SPECTRAL, limited_spectrum, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.ownsearches import own_searches, pose_errors
 from .numbers.strokes import with_strokes
@@ -220,7 +220,7 @@ class _Numbers:
         if self.machines is not None:
             effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
             yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
-            yield from _add(found, spectral(case, self.closed.model, box, asked))
+            yield from self._add_others(found, spectral(case, self.closed.model, box, asked))
             return
         layout = posed_layout(case, self.workspace)
         claims = claims_of(layout, names, with_objective=with_objective)
@@ -244,13 +244,22 @@ class _Numbers:
             yield from (each.outcome for each in found[before:])
             own = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, own(case, legs, box, shortest=shortest, paper=self.paper))
-        yield from _add(found, spectral(case, self.closed.model, box, asked))
+        yield from self._add_others(found, spectral(case, self.closed.model, box, asked))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
             shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
             errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
             yield from _add(found, errors(legs, box, eps, shortest))
+
+    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Outcome]:
+        """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
+        if self.legs is None:
+            family = None if self.machines is None else self.machines.family
+            own = partial(limited_spectrum, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            box = pose_box(self.workspace)
+            yield from _add(found, own(self.case, self.closed.model, box, family, self.unknown))
+        yield from _add(found, asked)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
