@@ -40,9 +40,7 @@ class DisplacedRobot:
 
 def error_parameter(centre: Centre) -> Parameter:
     """Return the error of a joint centre as a parameter of a model."""
-    return Parameter(
-        f"error {centre.name}", centre.error, Dimension.LENGTH, "error of a joint centre", (0.0, 0.0, 0.0)
-    )
+    return Parameter(f"error {centre.name}", centre.error, Dimension.LENGTH, "error of a joint centre", (0.0, 0.0, 0.0))
 
 
 def displaced_legs(model: Model) -> DisplacedRobot:

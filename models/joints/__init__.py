@@ -10,8 +10,8 @@ that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and mem
 ``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``network``
 (nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their unknowns, rows and actuators), ``outline``
 (corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and ``pictures`` (the drawing), ``structure``
-(its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres`` (the model with
-errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed form).
+(its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres`` (the model
+with errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed form).
 """
 
 from .expression import ExpressionError

@@ -13,7 +13,17 @@ from ..arrays import FloatArray
 from ..limbjoints import LimbJoint, LimbLink
 from ..member import Member
 from ..model import Model
-from ..parts import Actuator, AssemblySign, Closure, Dimension, JointScrews, Parameter, PathStructure, PoseSymbols, Unknown
+from ..parts import (
+    Actuator,
+    AssemblySign,
+    Closure,
+    Dimension,
+    JointScrews,
+    Parameter,
+    PathStructure,
+    PoseSymbols,
+    Unknown,
+)
 from ..wrench import Wrench
 from .chain import HomeRobot, Joint, Limb
 from .cut import choose_cut, simplified

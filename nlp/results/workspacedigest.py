@@ -82,7 +82,9 @@ def refuting_machine(case: Case, name: str, machine: MachineData) -> TextTable:
     unit = case.units.length
     if machine.centres is not None:
         off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
-        return TextTable(("joint", f"off by\n{unit}"), tuple(off), name="machine", title=f"the machine that refutes: {name}")
+        return TextTable(
+            ("joint", f"off by\n{unit}"), tuple(off), name="machine", title=f"the machine that refutes: {name}"
+        )
     rows = [
         (leg.name, *(", ".join(f"{part:.6g}" for part in each) for each in (base, platform)))
         for leg, base, platform in zip(case.model.legs, machine.base or (), machine.platform or (), strict=True)

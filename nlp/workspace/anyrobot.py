@@ -68,9 +68,7 @@ def prove_ranks(
     """
     try:
         problem = build_problem(case, model, box) if family is None else family.problem
-        prove = partial(
-            prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress
-        )
+        prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
         regular = prove(problem.locked)
         constraints = None
         if problem.unactuated is not None:
@@ -140,9 +138,7 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[
     return layout, claims
 
 
-def _after_newton(
-    found: Regularity, problem: Problem, matrix: RankMatrix, family: Family | None = None
-) -> Regularity:
+def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix, family: Family | None = None) -> Regularity:
     """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
@@ -159,9 +155,7 @@ def _after_newton(
             if z is not None:
                 y = frozen_array(problem.pose_of(z), (6,))
                 centres = family.errors_of(z) if family is not None and len(z) > len(free) else None
-                return replace(
-                    found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres
-                )
+                return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres)
     return found
 
 

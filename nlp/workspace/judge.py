@@ -15,9 +15,9 @@ from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
+from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .anyrobot import Ranks, not_judged, prove_ranks, reach_claims, touched, without_identities
 from .built.builtclaims import built_claims
-from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of
 from .general.problem import NotJudgedError
@@ -168,9 +168,7 @@ def _ranks(
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
     family = None if machines is None else machines.family
-    return prove_ranks(
-        case, closed.model, box, family=family, engine=engine, time_limit=time_limit, progress=progress
-    )
+    return prove_ranks(case, closed.model, box, family=family, engine=engine, time_limit=time_limit, progress=progress)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,12 +23,12 @@ class Worst:
             exact machine.
         allowance: further change of the number as people read it, not negative.
         least, most: ends of what the number can be.
-        machine: returns the errors and the number of the worst machine at a pose, in the place of the first two, for a
-            robot that is not six straight legs; None for one that is.
+        machine: returns the errors and the number of the worst machine at a pose, in the place of the first two, which
+            are None for a robot that is not six straight legs.
     """
 
-    errors: Callable[..., JointErrors]
-    value: Callable[..., float]
+    errors: Callable[..., JointErrors] | None = None
+    value: Callable[..., float] | None = None
     expression: SX | None = None
     allowance: float = 0.0
     least: float = -math.inf

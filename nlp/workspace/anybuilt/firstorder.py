@@ -20,7 +20,7 @@ from ....models import FloatArray
 from ...case.limits.constraint import Reading
 from ...case.workspace import TurnKind
 from ..general.family import Family
-from ..machine import INSIDE, CentreErrors, JointErrors, Legs
+from ..machine import INSIDE, CentreErrors
 from ..posebox import PoseBox, PoseNumbers
 from ..worstnumber import Worst
 from .secondorder import second_order_change
@@ -65,7 +65,7 @@ def worst_number(place: Place, number: SX, reading: Reading, sign: float, engine
     whole = number + sign * (family.tolerance * change + rest) * _OUTWARDS
     function = ca.Function("worst", [family.problem.z, e], [whole])
     expression = function.call([place.z, SX.zeros(e.numel())])[0]
-    return Worst(_no_legs, _no_value, expression, machine=machine.worst)
+    return Worst(expression=expression, machine=machine.worst)
 
 
 class _Machine:
@@ -81,7 +81,7 @@ class _Machine:
         self._function = ca.Function("number", [family.coordinates], [number, slopes])
 
     def first_order_change(self, z: FloatArray) -> float:
-        """Return the first-order change (t times the sum of the sizes of derivatives) at a pose (n,); 0 if undefined."""
+        """Return the first-order change at a pose (n,), of derivatives that are defined."""
         slopes = self._slopes(z)
         return self._family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=1)).sum())
 
@@ -112,13 +112,3 @@ def coordinates_of(box: PoseBox, pose: PoseNumbers) -> FloatArray:
     if box.kind is TurnKind.AXIS:
         vector = np.array([float(vector @ box.axis), 0.0, 0.0])
     return np.concatenate([pose.position, vector])
-
-
-def _no_legs(pose: PoseNumbers) -> JointErrors:
-    """Refuse errors of legs: the machine has others."""
-    raise TypeError("a machine without six straight legs has errors of its own")
-
-
-def _no_value(machine: Legs, pose: PoseNumbers) -> float:
-    """Refuse a value of legs: the machine has others."""
-    raise TypeError("a machine without six straight legs has errors of its own")

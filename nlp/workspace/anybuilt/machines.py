@@ -119,7 +119,9 @@ def _reach_claims(machines: Machines, layout: Layout) -> list[Claim]:
     """Return the claims that the limbs of every machine reach every pose."""
     built = machines.built.model
     robot, own = layout.robots[0], Substitution.identity(built)
-    unknowns = ca.vertcat(SX(0, 1), *[layout.table.variables_vector[k] for each in layout.places.unknowns for k in each])
+    unknowns = ca.vertcat(
+        SX(0, 1), *[layout.table.variables_vector[k] for each in layout.places.unknowns for k in each]
+    )
     given = Substitution(robot.parameters, unknowns, robot.rotation, robot.position)
     reaches = machines.built.reaches
     values = ca.Function("reach", own.all, [each.value for each in reaches]).call(given.all)
@@ -152,9 +154,7 @@ def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX,
         return not_bounded(claim, str(error))
 
 
-def _by_first_order(
-    machines: Machines, exact: Layout, claim: Claim, number: SX, effort: Effort
-) -> Extreme | None:
+def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX, effort: Effort) -> Extreme | None:
     """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
 
     Raises:

@@ -75,7 +75,9 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine:
     places = [3 * j + k for j in centres for k in range(3)]
     own = ca.tril(H[places, places])
     blocks = _Blocks(own, len(centres))
-    encloser = Encloser(ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*own.nonzeros()), engine)
+    encloser = Encloser(
+        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())]), engine
+    )
     factor = 0.5 * family.tolerance**2 * _OUTWARDS
     cells, bounds, middles = whole_workspace(problem), np.array([math.inf]), np.array([0.0])
     widths = cells.upper - cells.lower
@@ -87,7 +89,11 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine:
         order = np.argsort(-bounds)
         now, later = cells.some(order[:_BLOCK]), order[_BLOCK:]
         if done:
-            split, every, middle = np.argmax((now.upper - now.lower) / whole, axis=1), np.arange(len(now.near)), now.centre
+            split, every, middle = (
+                np.argmax((now.upper - now.lower) / whole, axis=1),
+                np.arange(len(now.near)),
+                now.centre,
+            )
             low, high = now.lower.copy(), now.upper.copy()
             high[every, split] = low[every, split] = middle[every, split]
             now = in_workspace(problem, joined([now._replace(upper=high), now._replace(lower=low)]))

@@ -113,14 +113,19 @@ class Examined(NamedTuple):
     def some(self, which: NDArray[np.int64]) -> Examined:
         """Return the results for some of the boxes."""
         relation = Relation(*(each[which] for each in self.relation))
-        regular, shares, smallest = (each[which] for each in self[2:])
+        regular, shares, smallest = self.is_regular[which], self.shares[which], self.smallest[which]
         return Examined(self.cells.some(which), relation, regular, shares, smallest)
 
     def followed_by(self, other: Examined) -> Examined:
         """Return these results, then those of other boxes."""
         relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
-        regular, shares, smallest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
-        return Examined(joined([self.cells, other.cells]), relation, regular, shares, smallest)
+        return Examined(
+            joined([self.cells, other.cells]),
+            relation,
+            np.concatenate([self.is_regular, other.is_regular]),
+            np.concatenate([self.shares, other.shares]),
+            np.concatenate([self.smallest, other.smallest]),
+        )
 
 
 class Test(Protocol):

@@ -198,8 +198,10 @@ class _Search:
         """Return the result at this state of the search."""
         open_bounds = self._bounds
         bound = min(closed, float(open_bounds.min(initial=math.inf)), self._best.value)
-        if self._dependent and math.isfinite(bound) and not is_connected(
-            self._examiner, joined(self._roots), self._independent
+        if (
+            self._dependent
+            and math.isfinite(bound)
+            and not is_connected(self._examiner, joined(self._roots), self._independent)
         ):
             bound, reason = -math.inf, "the assemblies in two neighbouring boxes are not proved to be the same"
         has_point = math.isfinite(self._best.value)

@@ -114,7 +114,8 @@ class MachinePoints:
         """Return whether points are in the workspace, with closed loops in the assembly of their boxes."""
         D, problem = self._dependent, self._family.problem
         room = _CLOSE * (cells.upper - cells.lower)[:, D]
-        own = ((z[:, D] >= cells.lower[:, D] - room) & (z[:, D] <= cells.upper[:, D] + room)).all(axis=1)
+        within = (z[:, D] >= cells.lower[:, D] - room) & (z[:, D] <= cells.upper[:, D] + room)
+        own = np.asarray(within.all(axis=1))
         return np.array(
             [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
         )

@@ -168,9 +168,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     )
 
 
-def posed_model(
-    case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None
-) -> PosedModel:
+def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None) -> PosedModel:
     """Return a model as expressions of the coordinates.
 
     Args:
@@ -207,7 +205,9 @@ def posed_model(
     members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
     actuators = [(each.limb, next(following)) for each in model.actuators]
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
-    sizes = sizes_at(model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns)))
+    sizes = sizes_at(
+        model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
+    )
     scaled = [next(following) / sizes[k] for k in range(len(every))]
     ranges = (0.5 * (box.upper - box.lower))[list(free)]
     own_sizes = np.array(ca.DM(sizes[len(every) :, :])).ravel()

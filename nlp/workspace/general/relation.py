@@ -56,9 +56,7 @@ class Relation(NamedTuple):
     @property
     def reach(self) -> FloatArray:
         """Largest sizes (B, k) over the box."""
-        return np.asarray(
-            (np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING)
-        )
+        return np.asarray((np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING))
 
 
 def by_centres(slopes: FloatArray) -> FloatArray:
@@ -72,7 +70,9 @@ def relation_of(equations: Forms, independent: list[int], dependent: list[int], 
 
     Args:
         equations: their forms.
-        independent, dependent, errors: indices of the coordinates of each kind.
+        independent: indices of the coordinates that are free.
+        dependent: indices of those that follow.
+        errors: indices of errors of joint centres.
     """
     A = equations.a[:, :, dependent]
     other, own = equations.a[:, :, independent], equations.a[:, :, errors]

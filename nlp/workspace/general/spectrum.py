@@ -57,7 +57,9 @@ class Spectrum:
         self._function = ca.Function("J", [problem.z], [ca.vec(J)])
         own, coordinates = (J, problem.z) if family is None else (family.jacobian @ scale, family.coordinates)
         self._encloser = Encloser(coordinates, ca.vec(ca.densify(own)), engine)
-        self._errors = np.full(int(coordinates.numel() - problem.z.numel()), 0.0 if family is None else family.tolerance)
+        self._errors = np.full(
+            int(coordinates.numel() - problem.z.numel()), 0.0 if family is None else family.tolerance
+        )
         self._corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(problem.free))))
 
     def values(self, points: FloatArray) -> FloatArray:

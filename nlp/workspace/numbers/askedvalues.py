@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from ....models import Dimension, Model
 from ...case.case import Case
@@ -89,12 +90,16 @@ def limited_spectrum(
         box: the poses.
         family: all machines that are meant; None for the design alone.
         unknown: reason why the machines that are meant are not judged; else empty.
-        gap, time_limit, interrupted: as in :func:`spectral_extremes`.
+        gap: allowed distance of a bound from the best value known, as a part of it.
+        time_limit: seconds for each search.
+        interrupted: whether the work is requested to stop.
     """
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue | ConditionNumber):
             is_condition = isinstance(limit, ConditionNumber)
-            end, value, sign = ("max", limit.max, -1.0) if isinstance(limit, ConditionNumber) else ("min", limit.min, 1.0)
+            end, value, sign = (
+                ("max", limit.max, -1.0) if isinstance(limit, ConditionNumber) else ("min", limit.min, 1.0)
+            )
             sense = Sense.MAX if is_condition else Sense.MIN
             try:
                 if unknown:
@@ -110,7 +115,7 @@ def limited_spectrum(
             yield from _not_judged(limit)
 
 
-def _not_judged(limit: Limit) -> Iterator[Extreme]:
+def _not_judged(limit: Limit[Any]) -> Iterator[Extreme]:
     """Yield open extremes of limits that are judged for six straight legs alone."""
     fault = "this limit is judged over a workspace for six straight legs alone"
     ends: list[tuple[str, Sense, float | None]] = []

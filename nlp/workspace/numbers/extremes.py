@@ -243,7 +243,7 @@ def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
         if pose is not None:
             if worst.machine is not None:
                 centres, shown_reached = worst.machine(pose)
-            elif legs is not None:
+            elif legs is not None and worst.errors is not None and worst.value is not None:
                 errors = worst.errors(pose)
                 shown_reached = worst.value(errors.applied(legs), pose)
             reached = _program_value(claim, shown_reached)
