@@ -74,7 +74,12 @@ def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
 
 
 def machine_extremes(
-    machines: Machines, quantities: Sequence[str], effort: Effort, *, with_objective: bool
+    machines: Machines,
+    quantities: Sequence[str],
+    effort: Effort,
+    *,
+    with_objective: bool,
+    only: Sequence[str] | None = None,
 ) -> Iterator[Extreme]:
     """Yield the extremes over all machines: of the reach of limbs, limits, lengths of legs, measures and tasks.
 
@@ -83,6 +88,7 @@ def machine_extremes(
         quantities: names of measures.
         effort: how they are proved.
         with_objective: whether F of each task is bounded.
+        only: names of the numbers that are meant; None for all.
 
     Raises:
         InputError: the robot has no measure of a name.
@@ -91,6 +97,8 @@ def machine_extremes(
     layout = machine_layout(case, machines.built, family)
     claims = claims_of(layout, quantities, with_objective=with_objective)
     reaches = _reach_claims(machines, layout)
+    if only is not None:
+        claims, reaches = ([each for each in some if each.name in only] for some in (claims, reaches))
     exact = None
     if not family.problem.dependent:
         exact = box_layout(replace(case, model=machines.model), family.problem.box)
