@@ -25,6 +25,7 @@ from .general.family import Family
 from .general.matrices import RankMatrix
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
+from .general.singularmachine import SingularMachine
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
 from .posed import posed_layout
@@ -145,13 +146,12 @@ def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix, famil
     newton, free = SingularPose(problem, matrix), list(problem.free)
     points = problem.box.random(_POSES, np.random.default_rng(_SEED))[:, free]
     values = np.array([newton.smallest(each) for each in points])
-    searches = [(newton.search, points)]
+    searches = [newton.search]
     if family is not None:
-        exact = np.array([family.exact(each) for each in points])
-        searches.append((SingularPose(problem, family.matrix(matrix), family).search, exact))
-    for search, begins in searches:
+        searches.append(SingularMachine(family, family.matrix(matrix)).search)
+    for search in searches:
         for k in np.argsort(values)[:_WORST]:
-            z = search(begins[k]) if np.isfinite(values[k]) else None
+            z = search(points[k]) if np.isfinite(values[k]) else None
             if z is not None:
                 y = frozen_array(problem.pose_of(z), (6,))
                 centres = family.errors_of(z) if family is not None and len(z) > len(free) else None

@@ -4,11 +4,14 @@ Sampled machines are computed from geometry alone: from joint centres, cranks, r
 project's models.
 """
 
+import json
 import math
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
+import jsonschema
 import numpy as np
 import pytest
 
@@ -16,14 +19,16 @@ from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case
 from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
 from screwsynth.nlp.workspace.anybuilt import firstorder
-from screwsynth.nlp.workspace.anybuilt.layouts import in_family, machine_layout
 from screwsynth.nlp.workspace.anybuilt.machines import Effort, Machines, machine_extremes, machines_of
-from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.general import machinenumber, rank
+from screwsynth.nlp.workspace.general import machinenumber, rank, relation
 from screwsynth.nlp.workspace.general.cells import Cells, Examiner
-from screwsynth.nlp.workspace.general.machinenumber import smallest_of_machines
+from screwsynth.nlp.workspace.general.singularpose import SingularPose
 from screwsynth.nlp.workspace.judge import judge_workspace
 from screwsynth.nlp.workspace.machine import workspace_of_case
 from screwsynth.nlp.workspace.numbers.extremes import Extreme
@@ -191,7 +196,9 @@ class ThreeRps(Sampled):
             arm = np.einsum("kij,klj->kli", R, A - home)
             residual = ((y[:, None, :3] + arm - B) * axis).sum(axis=2) - offset
             spun = np.cross(np.array([0.0, 0.0, 1.0]), arm)
-            slopes = np.stack([np.tile(axis[:, 0], (len(y), 1)), np.tile(axis[:, 1], (len(y), 1)), (spun * axis).sum(axis=2)], axis=2)
+            slopes = np.stack(
+                [np.tile(axis[:, 0], (len(y), 1)), np.tile(axis[:, 1], (len(y), 1)), (spun * axis).sum(axis=2)], axis=2
+            )
             y[:, [0, 1, 5]] -= np.linalg.solve(slopes, residual[:, :, None])[:, :, 0]
         assert np.abs(residual).max() < 1e-12
         ball = y[:, None, :3] + arm
@@ -264,3 +271,145 @@ def ratios(name: str, gap: float = 1e-4, only: tuple[str, ...] | None = None) ->
         design = (sign * exact[:, k]).max()
         result[each.name, each.sense] = (sign * each.bound - design) / ((sign * built[:, k]).max() - design)
     return result
+
+
+def test_no_sampled_machine_is_outside_of_the_bounds_which_are_near_to_the_worst() -> None:
+    for name, gap in (("three-upu", 1e-4), ("3-rps", 5e-4)):
+        found = ratios(name, gap)
+        assert len(found) >= 6
+        assert min(found.values()) >= 1.0 and max(found.values()) <= 1.5, found
+
+
+@pytest.mark.slow
+def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
+    found = ratios("6-rus")
+    assert len(found) == 6
+    assert min(found.values()) >= 1.0 and max(found.values()) <= 1.5, found
+
+
+def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    spread = machinenumber.by_centres
+    monkeypatch.setattr(firstorder, "_OUTWARDS", 0.9)
+    monkeypatch.setattr(machinenumber, "by_centres", lambda slopes: 0.9 * spread(slopes))
+    for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
+        assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
+
+
+def wrong_boxes(tolerance: float) -> tuple[int, int]:
+    """Count boxes that are said to be regular for all machines, and those of them in which a machine says otherwise.
+
+    With C a pseudo-inverse of the matrix of the design at the middle of a box, the determinant of C M is positive for
+    every machine in a box that is regular for the reason of the search.
+    """
+    family = machines(replace(case_of("3-rps"), joint_centre_tolerance=tolerance)).family
+    problem, rng = family.problem, np.random.default_rng(0)
+    test = rank.RankTest(family.locked, family.coordinates, family.start)
+    examiner = Examiner(problem, test, None, family)
+    own, n, count = list(problem.independent), len(problem.start), 64
+    middle = problem.box.random(count, rng)[:, list(problem.free)][:, own]
+    lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
+    half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
+    lower[:, own], upper[:, own] = middle - half, middle + half
+    cells = Cells(lower, upper, np.tile(problem.start, (count, 1)), np.zeros(count, dtype=bool))
+    found = examiner.examine(cells)
+    loops, newton = family.loops, SingularPose(problem, family.locked, family)
+    M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
+    wrong = 0
+    for k in np.flatnonzero(found.is_regular):
+        z = family.exact(found.cells.centre[k])
+        design = loops.closed(z, list(problem.dependent))
+        assert design is not None
+        C = np.linalg.pinv(M(design).full())
+        slopes = newton.slopes(design)
+        assert slopes is not None
+        steep = -slopes[n:].reshape(-1, 3)
+        for errors in (steep, *rng.normal(size=(3, *steep.shape))):
+            z[n:] = (tolerance * errors / np.maximum(np.linalg.norm(errors, axis=1, keepdims=True), 1e-12)).ravel()
+            machine = loops.closed(z, list(problem.dependent))
+            wrong += machine is not None and not float(np.linalg.det(C @ M(machine).full())) > 0
+    return int(found.is_regular.sum()), wrong
+
+
+def test_no_box_is_regular_for_all_machines_in_which_one_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes, wrong = wrong_boxes(0.02)
+    assert boxes >= 32 and not wrong
+    # Without the part of the errors a machine far off is said to be regular.
+    monkeypatch.setattr(rank, "by_centres", lambda slopes: np.zeros(slopes.shape[:-1]))
+    monkeypatch.setattr(relation, "by_centres", lambda slopes: np.zeros(slopes.shape[:-1]))
+    assert wrong_boxes(0.3)[1]
+
+
+def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
+    robot = ThreeRps()
+    text = ROBOTS["3-rps"] + HEAD + TURN
+    largest = 0.0696
+    limits = f'[limits.joint]\n"1:2" = {{ max = {largest} }}\n'
+    case = case_from_tables(tomllib.loads(text + limits), name="3-rps", source="3-rps.toml")
+    exact = judge_workspace(replace(case, joint_centre_tolerance=None))
+    assert all(each.outcome is Outcome.PROVED for each in exact.extremes if each.key)
+    judged = judge_workspace(case, quantities=["smallest_singular_value"], with_objective=False)
+    (found,) = (each for each in judged.extremes if each.key)
+    assert judged.is_regular and found.outcome is Outcome.REFUTED
+    assert found.centres is not None and found.pose is not None
+    errors = found.centres.vectors
+    assert np.linalg.norm(errors, axis=1).max() <= 1e-3
+    assert found.centres.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
+    y = firstorder.coordinates_of(pose_box(workspace_of_case(case)), found.pose)
+    y[3:] = 2 * np.arctan(y[3:])
+    value = robot.values(y[None], errors[None])[0, 0]
+    assert value > largest and value == pytest.approx(found.reached, abs=1e-9)
+    result = workspace_of(judged)
+    assert json.loads(result.to_json())["extremes"][0]["machine"]["centres"][0]["joint"] == "1:1"
+    jsonschema.validate(json.loads(result.to_json()), result_schema(WorkspaceResult))
+
+
+def test_a_machine_far_off_is_singular() -> None:
+    text = (
+        '[robot]\nmodel = "6-ups"\nparameters = { rb = 1.0, rp = 0.45, base_half = 60, platform_half = 5, h = 0.8 }\n'
+    )
+    place = HEAD.replace("1.08", "0.78").replace("1.12", "0.82").replace("1e-3", "0.2")
+    case = case_from_tables(tomllib.loads(text + place + TURN), name="6-ups", source="6-ups.toml")
+    found = judge_workspace(case, with_limits=False).regularity
+    assert found.outcome is Outcome.REFUTED and found.centres is not None and found.y is not None
+    assert np.linalg.norm(found.centres.vectors, axis=1).max() <= 0.2
+    # Six straight legs with these errors: the determinant of their unit rows vanishes.
+    pose, e = found.box.pose(found.y), found.centres.vectors
+    rows = []
+    for i in range(6):
+        side, turn = (-1.0 if i < 3 else 1.0), np.array([(i % 3) * 2 * math.pi / 3])
+        base, ball = (
+            turned(np.array([r * math.cos(h), side * r * math.sin(h), z]), turn)[0]
+            for r, h, z in ((1.0, math.radians(60), 0.0), (0.45, math.radians(5), 0.0))
+        )
+        arm = pose.rotation @ (ball + e[2 * i + 1])
+        n = pose.position + arm - base - e[2 * i]
+        n /= np.linalg.norm(n)
+        rows.append(np.concatenate([n, np.cross(arm, n)]))
+    values = np.linalg.svd(np.array(rows), compute_uv=False)
+    assert values[-1] < 1e-8 * values[0]
+
+
+def test_what_is_not_covered_is_open_with_the_reason() -> None:
+    text = '[robot]\nmodel = "spherical-3-rrr"\n'
+    model = build_model("spherical-3-rrr")
+    own = ", ".join(f"{item.name} = {math.degrees(item.typical[0])}" for item in model.parameters)
+    place = (
+        HEAD.replace("{ min = -0.05, max = 0.05 }", "0")
+        .replace("{ min = 1.08, max = 1.12 }", "0")
+        .replace("1.1]", "0]")
+    )
+    tables = tomllib.loads(text + f"parameters = {{ {own} }}\n" + place + TURN)
+    judged = judge_workspace(case_from_tables(tables, name="spherical", source="spherical.toml"))
+    assert judged.regularity.outcome is Outcome.OPEN and "take freedoms" in judged.regularity.reason
+    assert judged.extremes and all(each.outcome is Outcome.OPEN for each in judged.extremes)
+    assert all("take freedoms" in each.reason for each in judged.extremes)
+    del tables["workspace"]
+    with pytest.raises(CaseError, match=r"tolerance.joint_centre = 0.001: is not computed"):
+        case_from_tables(tables, name="spherical", source="spherical.toml")
+    # Limits without a search over a workspace are open too, with and without a tolerance.
+    limits = "leg_clearance = { min = 0.01 }\nactuator = { stroke_max = 0.5 }\n"
+    tables = tomllib.loads(ROBOTS["three-upu"] + limits + HEAD + TURN)
+    case = case_from_tables(tables, name="upu", source="upu.toml")
+    for each in (case, replace(case, joint_centre_tolerance=None)):
+        found = {one.key: one.outcome for one in judge_workspace(each, with_objective=False).extremes}
+        assert found["leg_clearance.min"] is found["actuator.stroke_max"] is Outcome.OPEN
