@@ -335,6 +335,9 @@ def _check_tolerance(case: Case) -> None:
         return
     if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
+    if case.model.structure and case.workspace is not None:
+        # The workspace is judged for every machine within it.
+        return
     if not case.model.built or case.model.unknowns:
         reason = "which is given joint by joint" if case.model.structure else "whose joints are not known"
         raise CaseError("tolerance.joint_centre", f"is not computed for {case.model.name!r}, {reason}")

@@ -15,7 +15,7 @@ from .point import head_data, versions
 if TYPE_CHECKING:
     from ..solver.exchange import WorkspaceProof
     from ..workspace.judge import Judgement
-    from ..workspace.machine import JointErrors
+    from ..workspace.machine import CentreErrors, JointErrors
     from ..workspace.numbers.extremes import Extreme
     from ..workspace.posebox import PoseNumbers
     from ..workspace.verdict import Regularity
@@ -35,16 +35,30 @@ class WorkspacePose(JsonObject):
     angle: float
 
 
-class MachineData(JsonObject):
-    """Errors of the joint centres of a machine, one for each leg.
+class CentreData(JsonObject):
+    """Error of a joint centre.
 
     Attributes:
-        base: of the base joints, in the world frame, length.
-        platform: of the platform joints, in the platform frame, length.
+        joint: label of the joint, limb and place, or leg and plate.
+        error: in the world frame at home, or in that of the leg's plate, length.
     """
 
-    base: tuple[Vector3, ...]
-    platform: tuple[Vector3, ...]
+    joint: str
+    error: Vector3
+
+
+class MachineData(JsonObject):
+    """Errors of the joint centres of a machine.
+
+    Attributes:
+        base: of the base joints of six straight legs, in the world frame, length; absent for another robot.
+        platform: of their platform joints, in the platform frame, length; absent for another robot.
+        centres: of another robot; absent for six straight legs.
+    """
+
+    base: Absent[tuple[Vector3, ...]]
+    platform: Absent[tuple[Vector3, ...]]
+    centres: Absent[tuple[CentreData, ...]]
 
 
 class RegularData(JsonObject):
@@ -268,14 +282,20 @@ def _regular_data(found: "Regularity", units: Units) -> RegularData:
         seconds=found.seconds,
         engine=found.engine,
         reason=found.reason or None,
-        machine=None if found.errors is None else _machine_data(found.errors),
+        machine=_machine_data(found.errors, found.centres),
     )
 
 
-def _machine_data(errors: "JointErrors") -> MachineData:
-    """Return the errors of a machine; lengths are in the case's unit already."""
+def _machine_data(errors: "JointErrors | None", centres: "CentreErrors | None") -> MachineData | None:
+    """Return the errors of a machine; None for the exact one. Lengths are in the case's unit already."""
+    if centres is not None:
+        joints = zip(centres.names, centres.vectors, strict=True)
+        data = tuple(CentreData(joint=name, error=vector(error)) for name, error in joints)
+        return MachineData(base=None, platform=None, centres=data)
+    if errors is None:
+        return None
     base, platform = (tuple(vector(part) for part in each) for each in errors)
-    return MachineData(base=base, platform=platform)
+    return MachineData(base=base, platform=platform, centres=None)
 
 
 def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
@@ -297,5 +317,5 @@ def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
         boxes=each.boxes,
         seconds=each.seconds,
         reason=each.reason or None,
-        machine=None if each.errors is None else _machine_data(each.errors),
+        machine=_machine_data(each.errors, each.centres),
     )

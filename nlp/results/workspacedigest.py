@@ -79,11 +79,16 @@ def _room(each: ExtremeData) -> float:
 
 def refuting_machine(case: Case, name: str, machine: MachineData) -> TextTable:
     """Return the errors of the joint centres of the machine that refutes a claim."""
+    unit = case.units.length
+    if machine.centres is not None:
+        off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
+        return TextTable(
+            ("joint", f"off by\n{unit}"), tuple(off), name="machine", title=f"the machine that refutes: {name}"
+        )
     rows = [
         (leg.name, *(", ".join(f"{part:.6g}" for part in each) for each in (base, platform)))
-        for leg, base, platform in zip(case.model.legs, machine.base, machine.platform, strict=True)
+        for leg, base, platform in zip(case.model.legs, machine.base or (), machine.platform or (), strict=True)
     ]
-    unit = case.units.length
     headers = ("leg", f"base joint off by\n{unit}", f"platform joint off by\n{unit}")
     return TextTable(headers, tuple(rows), name="machine", title=f"the machine that refutes: {name}")
 

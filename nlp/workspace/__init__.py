@@ -7,7 +7,7 @@ The rooms and modules import each other in this order:
   ``claims`` and ``closedlayout`` (the case without unknowns in closed form);
 * ``built`` (machines within a tolerance), ``regular`` (regular poses of six straight legs), ``general`` (of any
   robot);
-* ``numbers`` (their extremes over the box);
+* ``numbers`` (their extremes over the box), ``anybuilt`` (those of every machine within a tolerance, for any robot);
 * ``anyrobot`` (ranks of any robot), ``looplimits`` (limits of robots with loops);
 * ``judge`` (all claims about a machine), ``scale`` (the largest box), ``slices`` (for pictures), and ``paper``
   (proofs as files and their checker).

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...models import Model, frozen_array
+from ...models import FloatArray, Model, frozen_array
 from ..case.case import Case
 from ..errors import UncoveredError
 from .claims import CONSTRAINTS, REGULAR
+from .general.family import Family
 from .general.matrices import RankMatrix
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
+from .general.singularmachine import SingularMachine
 from .general.singularpose import SingularPose
 from .posebox import PoseBox
 from .regular.search import RankProgress
@@ -39,6 +43,7 @@ def prove_ranks(
     model: Model,
     box: PoseBox,
     *,
+    family: Family | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     progress: RankProgress | None = None,
@@ -50,26 +55,24 @@ def prove_ranks(
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
         box: the poses.
+        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds for each of the two searches.
         progress: called during them.
         paper: records the searches for a proof.
     """
     try:
-        problem = build_problem(case, model, box)
+        problem = build_problem(case, model, box) if family is None else family.problem
+        prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is not None:
-                recorder = None if paper is None or problem.dependent else paper.own(name)
-                found.append(
-                    prove_rank(
-                        problem, matrix, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder
-                    )
-                )
+                recorder = None if paper is None or family is not None else paper.own(name)
+                found.append(prove(matrix, recorder=recorder))
         regular, constraints = found[0], found[1] if len(found) > 1 else None
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(box, str(error)), None)
-    return Ranks(_after_newton(regular, problem, problem.locked), constraints)
+    return Ranks(_after_newton(regular, problem, problem.locked, family), constraints)
 
 
 def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
@@ -80,18 +83,23 @@ def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
     return _after_newton(found, problem, problem.locked)
 
 
-def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix) -> Regularity:
+def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix, family: Family | None = None) -> Regularity:
     """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
     newton, free = SingularPose(problem, matrix), list(problem.free)
     points = problem.box.random(_POSES, np.random.default_rng(_SEED))[:, free]
     values = np.array([newton.smallest(each) for each in points])
-    for k in np.argsort(values)[:_WORST]:
-        z = newton.search(points[k]) if np.isfinite(values[k]) else None
-        if z is not None:
-            y = frozen_array(problem.pose_of(z), (6,))
-            return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON)
+    searches: list[Callable[[FloatArray], FloatArray | None]] = [newton.search]
+    if family is not None:
+        searches.append(SingularMachine(family, family.matrix(matrix)).search)
+    for search in searches:
+        for k in np.argsort(values)[:_WORST]:
+            z = search(points[k]) if np.isfinite(values[k]) else None
+            if z is not None:
+                y = frozen_array(problem.pose_of(z), (6,))
+                centres = family.errors_of(z) if family is not None and len(z) > len(free) else None
+                return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres)
     return found
 
 

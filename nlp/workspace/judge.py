@@ -15,16 +15,19 @@ from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
+from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .anyrobot import Ranks, not_judged, prove_ranks, touched
-from .built.builtclaims import NO_LEGS, built_claims
+from .built.builtclaims import built_claims
 from .built.worst import Directions, length_beside
 from .claims import Claim, claims_of, exact_length_name, one_machine_name
 from .closedlayout import closed_layout, reach_claims
+from .general.problem import NotJudgedError
 from .looplimits import loop_extremes
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.ownsearches import own_searches, pose_errors
+from .numbers.robotlimits import limited_spectrum
 from .numbers.strokes import with_strokes
 from .posebox import PoseBox, pose_box
 from .posed import posed_layout
@@ -124,11 +127,16 @@ def judge_workspace(
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
-    ranks = _ranks(case, closed, box, legs, engine=engine, time_limit=time_limit, progress=rank_progress, paper=paper)
+    machines, unknown = _machines(case, closed, box, legs)
+    ranks = (
+        Ranks(not_judged(box, unknown), None)
+        if unknown
+        else _ranks(case, closed, box, legs, machines, engine, time_limit, rank_progress, paper)
+    )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
         return judged
-    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper)
+    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
     found: list[Extreme] = []
     for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
         if until_fault and outcome is not Outcome.PROVED:
@@ -136,12 +144,22 @@ def judge_workspace(
     return replace(judged, extremes=tuple(found))
 
 
+def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
+    """Return the machines that are meant, or why they are not judged: None and no reason for the design or legs."""
+    if legs is not None or not case.joint_centre_tolerance:
+        return None, ""
+    try:
+        return machines_of(case, closed.model, box), ""
+    except NotJudgedError as error:
+        return None, str(error)
+
+
 def _ranks(
     case: Case,
     closed: ClosedForm,
     box: PoseBox,
     legs: Legs | None,
-    *,
+    machines: Machines | None,
     engine: str | None,
     time_limit: float | None,
     progress: RankProgress | None,
@@ -152,9 +170,9 @@ def _ranks(
         recorder = None if paper is None else paper.rank
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
-    if case.joint_centre_tolerance:
-        return Ranks(not_judged(box, NO_LEGS), None)
-    return prove_ranks(case, closed.model, box, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
+    family = None if machines is None else machines.family
+    searched = partial(prove_ranks, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
+    return searched(case, closed.model, box, family=family)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +185,8 @@ class _Numbers:
         closed: its robot without unknowns in closed form.
         legs: joint centres; None for a robot that is not six straight legs.
         gap, time_limit, jobs, progress, paper: as in :func:`judge_workspace`.
+        machines: every machine within the tolerance, of a robot without legs; None where none are judged.
+        unknown: reason why the machines that are meant are not judged; else empty.
     """
 
     case: Case
@@ -178,6 +198,8 @@ class _Numbers:
     jobs: int | None
     progress: Callable[[str, int, int], None] | None
     paper: PaperRecord | None
+    machines: Machines | None
+    unknown: str
 
     def add(
         self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
@@ -196,18 +218,33 @@ class _Numbers:
         case, box, legs = self.case, pose_box(self.workspace), self.legs
         names = [name for name in quantities if name not in SPECTRAL]
         asked = [name for name in quantities if name in SPECTRAL]
+        family = None if self.machines is None else self.machines.family
+        spectral = partial(
+            spectral_extremes,
+            family=family,
+            unknown=self.unknown,
+            gap=self.gap,
+            time_limit=self.time_limit,
+            interrupted=is_requested,
+            paper=self.paper,
+        )
+        if self.machines is not None:
+            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
+            yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
+            yield from self._add_others(found, spectral(case, self.closed.model, box, asked))
+            return
         layout = posed_layout(case, self.workspace)
         claims = claims_of(layout, names, with_objective=with_objective)
         if self.closed.reaches:
             reach = reach_claims(case, self.closed, self.workspace)
-            place = reach.layout
-            reaches = _as_built(place, self.workspace, legs, list(reach.claims), self._prove(place)).claims
+            place, reaches = reach.layout, [replace(each, uncovered=self.unknown) for each in reach.claims]
             yield from self._add_proved(found, place, reaches)
             if all(each.outcome is Outcome.PROVED for each in found):
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
                 layout = closed_layout(case, self.closed, self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
+        claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = _as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         if legs is None and self.paper is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
@@ -224,14 +261,22 @@ class _Numbers:
             yield from (each.outcome for each in found[before:])
             others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
-        spectral = partial(spectral_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-        yield from _add(found, spectral(case, self.closed.model, box, asked, shortest=shortest, paper=self.paper))
+        yield from self._add_others(found, spectral(case, self.closed.model, box, asked, shortest=shortest))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
             shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
             errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
             yield from _add(found, errors(legs, box, eps, shortest))
+
+    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Outcome]:
+        """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
+        if self.legs is None:
+            family = None if self.machines is None else self.machines.family
+            own = partial(limited_spectrum, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            box = pose_box(self.workspace)
+            yield from _add(found, own(self.case, self.closed.model, box, family, self.unknown))
+        yield from _add(found, asked)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
@@ -271,8 +316,6 @@ def _as_built(
     layout: Layout, workspace: Workspace, legs: Legs | None, claims: list[Claim], prove: Callable[..., Extreme]
 ) -> _AsBuilt:
     """Return claims about every machine within the case's tolerance from those about the exact one."""
-    if legs is None and layout.case.joint_centre_tolerance:
-        return _AsBuilt(0.0, [replace(each, uncovered=NO_LEGS) for each in claims])
     if legs is None or not legs.tolerance or not claims:
         return _AsBuilt(0.0, claims)
     # A proof on paper has these searches beside those of the same lengths that are claims, which have other gaps.

@@ -38,7 +38,13 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
     if turns.kind is TurnKind.AXIS:
         rotation = Rotation(turns.axis, turns.angles[0])
     one = replace(
-        case, position=workspace.position, rotation=rotation, displacements=(HERE,), further=(), workspace=None
+        case,
+        position=workspace.position,
+        rotation=rotation,
+        displacements=(HERE,),
+        further=(),
+        workspace=None,
+        joint_centre_tolerance=None,
     )
 
     def add_turns(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:

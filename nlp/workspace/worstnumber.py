@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from casadi import SX
 
-from .machine import JointErrors
+from .machine import CentreErrors, JointErrors
+from .posebox import PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +23,14 @@ class Worst:
             exact machine.
         allowance: further change of the number as people read it, not negative.
         least, most: ends of what the number can be.
+        machine: returns the errors and the number of the worst machine at a pose, in the place of the first two, which
+            are None for a robot that is not six straight legs.
     """
 
-    errors: Callable[..., JointErrors]
-    value: Callable[..., float]
+    errors: Callable[..., JointErrors] | None = None
+    value: Callable[..., float] | None = None
     expression: SX | None = None
     allowance: float = 0.0
     least: float = -math.inf
     most: float = math.inf
+    machine: Callable[[PoseNumbers], tuple[CentreErrors, float]] | None = None

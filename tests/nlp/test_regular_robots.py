@@ -118,8 +118,8 @@ def test_no_box_is_regular_in_which_a_closed_point_is_not(name: str) -> None:
 def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     judged = rank.RankTest._judged
 
-    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray) -> rank.Tested:
-        return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R))
+    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, *more: int) -> rank.Tested:
+        return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R), *more)
 
     problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]

@@ -34,6 +34,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
         displacements=(HERE,),
         further=(),
         workspace=None,
+        joint_centre_tolerance=None,
     )
     nlp = formulate_each(posed)[0]
     x = closed_start(nlp)

@@ -5,25 +5,29 @@ With g a number of a machine and H its second derivatives by the errors e, on th
     |g(e) - g(0) - g'(0) e| <= 1/2 sum_jk |H_jk| |e_j| |e_k|,
 
 where H_jk is the block (3, 3) of centres j and k, and |H_jk| its Frobenius norm. The blocks are bounded over boxes of
-poses and all errors within the tolerance. The boxes with the largest bounds are bisected.
+poses and all errors within the tolerance; the boxes with the largest bounds are bisected. Centres whose blocks with all
+others are 0, as those of different limbs in F, are bounded apart.
 """
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from ...certificate.kinks import refuse_jumps
 from ..general.cells import in_workspace, joined, whole_workspace
 from ..general.enclosing import Encloser
 from ..general.family import Family
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 #: Number of boxes examined at once, and of all boxes.
-_BLOCK, _MOST = 32, 2048
+_BLOCK, _MOST = 64, 4096
 #: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
 _SHARE, _NEAR = 0.02, 1.2
 #: Part of itself by which a bound moves outwards: its own rounding.
@@ -50,54 +54,72 @@ def second_order_change(family: Family, expression: SX, first: float, engine: st
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    refuse_jumps(expression, family.coordinates)
-    H = ca.tril(ca.hessian(expression, family.errors)[0])
-    if not H.nnz():
-        return 0.0
-    rows, columns = (np.array(each) for each in H.sparsity().get_triplet())
-    blocks = _Blocks(rows, columns, len(family.names))
-    encloser = Encloser(family.coordinates, H.nz[:], engine)
-    factor = 0.5 * family.tolerance**2 * _OUTWARDS
+    H = ca.hessian(expression, family.errors)[0]
+    groups = _groups(H, len(family.names))
+    return sum((_of_centres(family, H, each, first / len(groups), engine) for each in groups), 0.0)
+
+
+def _groups(H: SX, count: int) -> list[list[int]]:
+    """Return the centres in groups of which the second derivatives (3 m, 3 m) have no entries in common."""
+    rows, columns = (np.array(each, dtype=int) // 3 for each in H.sparsity().get_triplet())
+    group = np.arange(count)
+    for i, j in set(zip(rows.tolist(), columns.tolist(), strict=True)):
+        group[group == group[i]] = group[j]
+    own = {int(group[i]) for i in rows}
+    return [np.flatnonzero(group == each).tolist() for each in sorted(own)]
+
+
+def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine: str | None) -> float:
+    """Return the bound for errors of some centres, whose second derivatives depend on no other errors."""
     problem = family.problem
+    places = [3 * j + k for j in centres for k in range(3)]
+    own = ca.tril(H[places, places])
+    blocks = _Blocks(own, len(centres))
+    encloser = Encloser(
+        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())]), engine
+    )
+    factor = 0.5 * family.tolerance**2 * _OUTWARDS
     cells, bounds, middles = whole_workspace(problem), np.array([math.inf]), np.array([0.0])
-    whole = np.where(cells.upper > cells.lower, cells.upper - cells.lower, np.inf)
-    done = 0
+    widths = cells.upper - cells.lower
+    whole, done = np.where(widths > 0, widths, np.inf), 0
     while done < _MOST:
         worst = int(np.argmax(bounds))
         if bounds[worst] <= max(_SHARE * first, _NEAR * middles[worst]):
             break
-        order = np.argsort(-bounds)[:_BLOCK]
-        rest = np.setdiff1d(np.arange(len(bounds)), order)
-        now = cells.some(order)
+        order = np.argsort(-bounds)
+        now, later = cells.some(order[:_BLOCK]), order[_BLOCK:]
         if done:
-            split = np.argmax((now.upper - now.lower) / whole, axis=1)
-            every, middle = np.arange(len(order)), now.centre
+            split, every, middle = (
+                np.argmax((now.upper - now.lower) / whole, axis=1),
+                np.arange(len(now.near)),
+                now.centre,
+            )
             low, high = now.lower.copy(), now.upper.copy()
             high[every, split] = low[every, split] = middle[every, split]
-            now = joined([now._replace(upper=high), now._replace(lower=low)])
-            now = in_workspace(problem, now)
-        errors = np.full((len(now.lower), family.errors.numel()), family.tolerance)
+            now = in_workspace(problem, joined([now._replace(upper=high), now._replace(lower=low)]))
+        errors = np.full((len(now.lower), len(places)), family.tolerance)
         forms = encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         with np.errstate(all="ignore"):
             sizes = np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r
-        found = np.where(np.isfinite(sizes).all(axis=1), factor * blocks.sums(sizes), np.inf)
-        cells = joined([cells.some(rest), now])
-        bounds = np.concatenate([bounds[rest], found])
-        middles = np.concatenate([middles[rest], np.nan_to_num(factor * blocks.sums(np.abs(forms.c)))])
+            found = factor * blocks.sums(sizes)
+        cells = joined([cells.some(later), now])
+        bounds = np.concatenate([bounds[later], np.where(np.isfinite(found), found, np.inf)])
+        middles = np.concatenate([middles[later], np.nan_to_num(factor * blocks.sums(np.abs(forms.c)))])
         done += len(now.lower)
     return float(bounds.max(initial=0.0))
 
 
 class _Blocks:
-    """Blocks of centres of a symmetric matrix whose lower entries are known.
+    """Blocks of centres of a symmetric matrix.
 
     Args:
-        rows, columns: (R,) places of its entries in and below the diagonal.
+        lower: (3 m, 3 m) its entries in and below the diagonal.
         count: number m of centres.
     """
 
-    def __init__(self, rows: FloatArray, columns: FloatArray, count: int) -> None:
-        self._block = rows // 3 * count + columns // 3
+    def __init__(self, lower: SX, count: int) -> None:
+        rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
+        self._block: NDArray[np.int64] = rows // 3 * count + columns // 3
         # An entry below the diagonal of a block on the diagonal stands for two of this block.
         self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
         self._count = count

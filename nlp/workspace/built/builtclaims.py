@@ -42,9 +42,6 @@ from .worst import (
 from .worstplates import worst_radius, worst_ratio, worst_spacing
 
 #: Reasons for claims that are open because errors of joint centres are not covered.
-NO_LEGS = (
-    "errors of joint centres are covered for six straight legs alone; without [tolerance] the exact machine is judged"
-)
 _NO_RULE = "this number has no rule for errors of joint centres; without [tolerance] the exact machine is judged"
 _SHORT = "no length of legs above the errors of joint centres is proved"
 

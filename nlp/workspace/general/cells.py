@@ -117,14 +117,19 @@ class Examined(NamedTuple):
     def some(self, which: NDArray[np.int64]) -> Examined:
         """Return the results for some of the boxes."""
         relation = Relation(*(each[which] for each in self.relation))
-        regular, shares, smallest = (each[which] for each in self[2:])
+        regular, shares, smallest = self.is_regular[which], self.shares[which], self.smallest[which]
         return Examined(self.cells.some(which), relation, regular, shares, smallest)
 
     def followed_by(self, other: Examined) -> Examined:
         """Return these results, then those of other boxes."""
         relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
-        regular, shares, smallest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
-        return Examined(joined([self.cells, other.cells]), relation, regular, shares, smallest)
+        return Examined(
+            joined([self.cells, other.cells]),
+            relation,
+            np.concatenate([self.is_regular, other.is_regular]),
+            np.concatenate([self.shares, other.shares]),
+            np.concatenate([self.smallest, other.smallest]),
+        )
 
 
 class Test(Protocol):
@@ -148,14 +153,14 @@ class Examiner:
     Args:
         problem: the robot.
         test: its entries are in the coordinates of the problem, or of all machines.
-        family: all machines that are meant; None for the design alone.
         engine: ``"c"``, ``"numpy"``, or None.
+        family: all machines that are meant; None for the design alone.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: Test, family: Family | None, engine: str | None) -> None:
+    def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)

@@ -17,7 +17,7 @@ from casadi import SX
 from ....models import FloatArray, Model, frozen_array
 from ....models.displaced import DisplacedRobot, displaced_legs
 from ....models.joints import RobotError
-from ....models.joints.closedform import closed_form
+from ....models.joints.closedform import Reach, closed_form
 from ....models.member import scaled_twists
 from ...case.case import Case
 from ..machine import INSIDE, CentreErrors
@@ -35,10 +35,17 @@ _SEED = 0
 
 
 class BuiltModel(NamedTuple):
-    """A robot with errors of its joint centres, without unknowns in closed form, and the names of the centres."""
+    """A robot with errors of its joint centres.
+
+    Attributes:
+        model: without unknowns in closed form; the errors are its last parameters.
+        names: of the centres.
+        reaches: edges of the reach of limbs with errors.
+    """
 
     model: Model
     names: tuple[str, ...]
+    reaches: tuple[Reach, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,14 +134,15 @@ def built_model(model: Model) -> BuiltModel:
         displaced = _displaced(model)
     except RobotError as error:
         raise NotJudgedError(f"the robot cannot be put together with errors of its joint centres: {error}") from None
-    built = closed_form(displaced.model).model
+    closed = closed_form(displaced.model)
+    built = closed.model
     unknowns = [[item.name for item in each.unknowns] for each in (exact, built)]
     members = [[(item.rank, item.screws.shape, item.is_pinned) for item in each.members] for each in (exact, built)]
     rows = [[item.label for item in each.wrenches] for each in (exact, built)]
     equations = [[item.name for item in each.closure] for each in (exact, built)]
     if any(one != other for one, other in (unknowns, members, rows, equations)) or exact.generic != built.generic:
         raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs or loops change")
-    return BuiltModel(built, tuple(each.name for each in displaced.centres))
+    return BuiltModel(built, tuple(each.name for each in displaced.centres), closed.reaches)
 
 
 def _displaced(model: Model) -> DisplacedRobot:

@@ -34,8 +34,6 @@ _BLOCK, _TRIED = 128, 8
 _LEAST_WIDTH = 2.0**-24
 #: Value below which gaps are parts of this one.
 _NEAR_ZERO = 1e-6
-#: Weight of a coordinate's width beside its share in the slope of an expression, where a box is bisected.
-_WIDTH = 0.2
 
 
 class _Bound:
@@ -62,7 +60,9 @@ class _Bound:
             terms = np.abs(c) + np.abs(a).sum(axis=1) + (size * relation.reach).sum(axis=1) + whole
             lower = c + (own * relation.off).sum(axis=1) - whole - 2 * ROUNDING * terms
         known = np.isfinite(lower)
-        return Tested(np.zeros(len(c), dtype=bool), np.nan_to_num(np.abs(by_pose)), np.where(known, lower, -np.inf))
+        # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
+        shares = np.abs(by_pose) + rest[:, None] / max(by_pose.shape[1], 1)
+        return Tested(np.zeros(len(c), dtype=bool), np.nan_to_num(shares), np.where(known, lower, -np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class _Search:
 
     def __init__(self, family: Family, expression: SX, engine: str | None) -> None:
         self._began, self._family, problem = time.perf_counter(), family, family.problem
-        self._examiner = Examiner(problem, _Bound(expression), family, engine)
+        self._examiner = Examiner(problem, _Bound(expression), engine, family)
         self._points = MachinePoints(family, expression)
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         whole = whole_workspace(problem)
@@ -150,9 +150,7 @@ class _Search:
             if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
                 reason = "the boxes that are left are too small to be divided"
                 break
-            # A wide coordinate counts although the expression hardly changes with it.
-            steep = now.shares / np.maximum(now.shares.max(axis=1, keepdims=True), 1e-300)
-            score = steep + _WIDTH * width / width.max(axis=1, keepdims=True)
+            score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
             split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
             self._open = later.followed_by(self._examined(self._examiner.halves(now, split)))
             done = self._bounds >= self._target(gap, limit, slack)

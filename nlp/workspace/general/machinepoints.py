@@ -16,6 +16,8 @@ from .family import Family
 
 #: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
 _CLOSE = 1e-9
+#: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
+_INSIDE = 1e-13
 
 
 class PointValue(NamedTuple):
@@ -99,7 +101,11 @@ class MachinePoints:
         own, count, problem = self._independent, len(self._free), self._family.problem
         z = z.copy()
         z[:, own] = np.where(slopes[:, own] > 0, cells.lower[:, own], cells.upper[:, own])
-        clipped = problem.box.clipped(problem.pose_of(z))[:, self._free]
+        # Ends of rotations are rounded outwards, and are no poses of the workspace.
+        box = problem.box
+        room = np.where(box.upper > box.lower, _INSIDE * np.maximum(np.abs(box.lower), np.abs(box.upper)), 0.0)
+        room[:3] = 0.0
+        clipped = np.clip(box.clipped(problem.pose_of(z)), box.lower + room, box.upper - room)[:, self._free]
         of_pose = [j for j in own if j < count]
         z[:, of_pose] = clipped[:, of_pose]
         return z
@@ -108,7 +114,8 @@ class MachinePoints:
         """Return whether points are in the workspace, with closed loops in the assembly of their boxes."""
         D, problem = self._dependent, self._family.problem
         room = _CLOSE * (cells.upper - cells.lower)[:, D]
-        own = ((z[:, D] >= cells.lower[:, D] - room) & (z[:, D] <= cells.upper[:, D] + room)).all(axis=1)
+        within = (z[:, D] >= cells.lower[:, D] - room) & (z[:, D] <= cells.upper[:, D] + room)
+        own = np.asarray(within.all(axis=1))
         return np.array(
             [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
         )

@@ -70,7 +70,9 @@ def relation_of(equations: Forms, independent: list[int], dependent: list[int], 
 
     Args:
         equations: their forms.
-        independent, dependent, errors: indices of the coordinates of each kind.
+        independent: indices of the coordinates that are free.
+        dependent: indices of those that follow.
+        errors: indices of errors of joint centres.
     """
     A = equations.a[:, :, dependent]
     other, own = equations.a[:, :, independent], equations.a[:, :, errors]

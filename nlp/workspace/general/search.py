@@ -18,6 +18,7 @@ from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
+from .singularmachine import SingularMachine
 from .singularpose import SingularPose
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ _LEAST_WIDTH = 2.0**-24
 #: Smallest singular value, in parts of the largest, from which Newton's method looks for a singular pose, and most
 #: attempts.
 _SMALL, _MOST = 0.1, 24
+#: Number of boxes after which a singular machine is looked for first; later ones are twice as many each.
+_FIRST = 64
 #: Part of the value before at which it tries again.
 _SMALLER = 0.6
 #: How a singular pose of this search is known.
@@ -83,13 +86,15 @@ class _Search:
     ) -> None:
         self._began = time.perf_counter()
         self._problem, self._family, self._recorder = problem, family, recorder
-        self._newtons = [SingularPose(problem, matrix)]
+        self._newton, self._machine = (
+            SingularPose(problem, matrix),
+            None if family is None else SingularMachine(family, family.matrix(matrix)),
+        )
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
             built = family.matrix(matrix)
-            self._newtons.append(SingularPose(problem, built, family))
             test = RankTest(built, family.coordinates, family.start)
-        self._examiner = Examiner(problem, test, family, engine)
+        self._examiner = Examiner(problem, test, engine, family)
         self._independent = list(problem.independent)
         whole = whole_workspace(problem)
         self._whole = (whole.upper - whole.lower)[0, self._independent]
@@ -98,6 +103,8 @@ class _Search:
         # The boxes in which dependent coordinates became known.
         self._roots: list[Cells] = []
         self._boxes, self._attempts, self._last = 0, 0, _SMALL
+        # Number of boxes from which a singular machine is looked for, although no pose of the design is near to one.
+        self._due = _FIRST
         self._singular: FloatArray | None = None
         self._is_one = True
 
@@ -160,22 +167,27 @@ class _Search:
     def _is_refuted(self, found: Examined) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
         values = np.where(found.is_regular, np.inf, found.smallest)
-        for k in np.argsort(values)[:2]:
+        order = np.argsort(values)[:2]
+        for k in order:
             if not values[k] < self._last or self._attempts >= _MOST:
-                return False
+                break
             self._attempts += 1
             self._last = _SMALLER * float(values[k])
-            z = found.cells.near[k].copy()
-            own = self._independent
-            z[own] = found.cells.centre[k, own]
-            dependent = list(self._problem.dependent)
-            z[dependent] = found.cells.centre[k, dependent]
-            for newton in self._newtons:
-                begin = z if newton is self._newtons[0] or self._family is None else self._family.exact(z)
-                self._singular = newton.search(begin)
-                if self._singular is not None:
-                    return True
-        return False
+            self._singular = self._newton.search(self._middle(found.cells, k))
+            if self._singular is not None:
+                return True
+        if self._machine is None or self._boxes < self._due or not np.isfinite(values[order[0]]):
+            return False
+        self._due = 2 * self._boxes
+        self._singular = self._machine.search(self._middle(found.cells, order[0]))
+        return self._singular is not None
+
+    def _middle(self, cells: Cells, k: np.int64) -> FloatArray:
+        """Return a point (n,) in the middle of a box, with closed loops or near them."""
+        z: FloatArray = cells.near[k].copy()
+        own = [*self._independent, *self._problem.dependent]
+        z[own] = cells.centre[k, own]
+        return z
 
     def _branch(self, found: Examined) -> None:
         """Bisect the open boxes."""

@@ -97,6 +97,23 @@ class SingularPose:
             v /= np.linalg.norm(v)
         return z if self.is_singular(z) else None
 
+    def slopes(self, z: FloatArray) -> FloatArray | None:
+        """Return the derivatives (n + 3 m,) of the smallest singular value at a closed point; None without any.
+
+        To first order it is ``u . M v`` with its vectors u and v; dependent coordinates follow from the others.
+        """
+        M = self._values(z).full()
+        if not np.isfinite(M).all():
+            return None
+        rank = M.shape[1] - self._matrix.nullity
+        left, _, right = np.linalg.svd(M)
+        _, _, by_z, turned = (each.full() for each in self._equations(z, right[rank - 1]))
+        found = left[:, rank - 1] @ turned
+        dependent = list(self._problem.dependent)
+        if dependent:
+            found = found - found[dependent] @ np.linalg.pinv(by_z[:, dependent]) @ by_z
+        return found if np.isfinite(found).all() else None
+
     def is_singular(self, z: FloatArray) -> bool:
         """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
         problem = self._problem

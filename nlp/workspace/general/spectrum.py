@@ -12,11 +12,14 @@ import itertools
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from ....models import FloatArray
 from ..numbers.boundsearch import Bounds
 from .enclosing import Encloser
+from .family import Family
 from .problem import Problem
+from .relation import by_centres
 
 #: Part of its size by which a computed number is moved outwards: rounding of products and of LAPACK.
 _ROUNDING = 1e-10
@@ -31,19 +34,32 @@ class Spectrum:
         problem: the robot, without dependent coordinates.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
+        family: all machines that are meant, whose errors count entry by entry; values are those of the design.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, length: float, *, is_condition: bool, engine: str | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        length: float,
+        *,
+        is_condition: bool,
+        family: Family | None = None,
+        engine: str | None = None,
+    ) -> None:
         self._problem, self._is_condition = problem, is_condition
-        J = ca.densify(problem.jacobian)
-        J[:, 3:] *= problem.length / length
+        scale = ca.diag(ca.vertcat(SX.ones(3), problem.length / length * SX.ones(3)))
+        J = ca.densify(problem.jacobian @ scale)
         self._rows = J.shape[0]
-        self._encloser = Encloser(problem.z, ca.vec(J), engine)
         self._function = ca.Function("J", [problem.z], [ca.vec(J)])
+        own, coordinates = (J, problem.z) if family is None else (family.jacobian @ scale, family.coordinates)
+        self._encloser = Encloser(coordinates, ca.vec(ca.densify(own)), engine)
+        self._errors = np.full(
+            int(coordinates.numel() - problem.z.numel()), 0.0 if family is None else family.tolerance
+        )
         self._corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(problem.free))))
 
     def values(self, points: FloatArray) -> FloatArray:
@@ -59,8 +75,10 @@ class Spectrum:
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
         free = list(self._problem.free)
-        c, a, r = self._encloser(lower[:, free].T, upper[:, free].T)
-        count, f, m = len(c), len(free), self._rows
+        count, f, m = len(lower), len(free), self._rows
+        errors = np.tile(self._errors, (count, 1))
+        c, a, r = self._encloser(np.hstack([lower[:, free], -errors]).T, np.hstack([upper[:, free], errors]).T)
+        a, r = a[:, :, :f], r + by_centres(a[:, :, f:])
         J0 = c.reshape(count, 6, m).transpose(0, 2, 1)
         R = r.reshape(count, 6, m).transpose(0, 2, 1)
         J = a.transpose(0, 2, 1).reshape(count, f, 6, m).transpose(0, 1, 3, 2)

@@ -14,15 +14,15 @@ from ...case.case import Case
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.task import Sense
 from ...errors import UncoveredError
-from ..built.builtclaims import NO_LEGS
 from ..claims import asked_name
-from ..general.problem import NotJudgedError, build_problem
-from ..general.spectrum import Spectrum
+from ..general.family import Family
+from ..general.problem import NotJudgedError
 from ..machine import legs_of
 from ..posebox import PoseBox
 from ..verdict import Outcome
 from .boundsearch import Oracle, prove_minimum
 from .extremes import Extreme
+from .robotlimits import robot_spectrum
 from .singular import SingularValues
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ def spectral_extremes(
     time_limit: float | None,
     interrupted: Callable[[], bool],
     shortest: float = 0.0,
+    family: Family | None = None,
+    unknown: str = "",
     paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the smallest singular value, or the largest condition number, of J over a box of poses.
@@ -61,6 +63,8 @@ def spectral_extremes(
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
         shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of its legs alone.
+        family: all machines that are meant of a robot that is not six straight legs; None for the design alone.
+        unknown: reason why the machines that are meant are not judged; else empty.
         paper: records the searches for a proof.
     """
     for name in names:
@@ -68,7 +72,7 @@ def spectral_extremes(
         sense = Sense.MAX if is_condition else Sense.MIN
         sign = -1.0 if is_condition else 1.0
         try:
-            oracle = _oracle(case, model, box, shortest, is_condition=is_condition)
+            oracle = _oracle(case, model, box, shortest, family, unknown, is_condition=is_condition)
         except (UncoveredError, NotJudgedError) as error:
             nothing = (sign * -math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, str(error))
             yield Extreme(name, sense, Dimension.NUMBER, "", None, *nothing)
@@ -107,19 +111,17 @@ def _width(oracle: Oracle, box: PoseBox) -> float:
     return float(np.nanmax(oracle.values(points) - oracle.bounds(points, points).lower, initial=0.0))
 
 
-def _oracle(case: Case, model: Model, box: PoseBox, shortest: float, *, is_condition: bool) -> Oracle:
+def _oracle(
+    case: Case, model: Model, box: PoseBox, shortest: float, family: Family | None, unknown: str, *, is_condition: bool
+) -> Oracle:
     """Return bounds of a number over boxes.
 
     Raises:
-        NotJudgedError: the robot has loops without a closed form, or other machines than that of a robot without six
-            straight legs are meant.
+        NotJudgedError: the robot has loops without a closed form, or the machines that are meant are not judged.
     """
     legs, length = legs_of(case), case.characteristic_length
     if legs is not None:
         return SingularValues(legs, box, length, is_condition=is_condition, shortest=shortest)
-    if case.joint_centre_tolerance:
-        raise NotJudgedError(NO_LEGS)
-    problem = build_problem(case, model, box)
-    if problem.dependent:
-        raise NotJudgedError("the robot has loops that are not solved in closed form")
-    return Spectrum(problem, length, is_condition=is_condition)
+    if unknown:
+        raise NotJudgedError(unknown)
+    return robot_spectrum(case, model, box, length, family, is_condition=is_condition)

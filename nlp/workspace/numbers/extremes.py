@@ -23,7 +23,7 @@ from ...errors import UncoveredError
 from ...program.layout import Layout
 from ...program.nlp import Nlp
 from ..claims import Claim
-from ..machine import JointErrors, Legs
+from ..machine import CentreErrors, JointErrors, Legs
 from ..posebox import PoseNumbers
 from ..posed import extreme_program, varies
 from ..verdict import Outcome
@@ -63,6 +63,7 @@ class Extreme:
         seconds: wall time.
         reason: for an open outcome; else empty.
         errors: of the joint centres of the machine that reaches the value; None for the exact machine.
+        centres: the same for a robot that is not six straight legs.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Extreme:
     seconds: float
     reason: str
     errors: JointErrors | None = None
+    centres: CentreErrors | None = None
 
 
 def prove_extreme(
@@ -233,15 +235,17 @@ def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
     bound, reached, pose = found.bound, found.reached, found.pose
     shown_bound = read(bound) if math.isfinite(bound) else sign * math.inf
     shown_reached = read(reached) if math.isfinite(reached) else math.nan
-    errors = None
-    if claim.worst is not None and legs is not None:
-        worst = claim.worst
+    errors, centres, worst = None, None, claim.worst
+    if worst is not None and (legs is not None or worst.machine is not None):
         if math.isfinite(bound):
             shown_bound = min(max(shown_bound + sign * worst.allowance, worst.least), worst.most)
             bound = _program_value(claim, shown_bound)
         if pose is not None:
-            errors = worst.errors(pose)
-            shown_reached = worst.value(errors.applied(legs), pose)
+            if worst.machine is not None:
+                centres, shown_reached = worst.machine(pose)
+            elif legs is not None and worst.errors is not None and worst.value is not None:
+                errors = worst.errors(pose)
+                shown_reached = worst.value(errors.applied(legs), pose)
             reached = _program_value(claim, shown_reached)
     outcome, reason = Outcome.PROVED if found.is_met else Outcome.OPEN, found.reason
     if claim.limit is not None:
@@ -270,6 +274,7 @@ def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
         seconds=found.seconds,
         reason="" if outcome is not Outcome.OPEN else reason,
         errors=errors,
+        centres=centres,
     )
 
 

@@ -59,7 +59,7 @@ def own_searches(
 
     def search(oracle: SingularValues | Clearance, least: float, name: str) -> Minimum:
         recorder = None if paper is None else paper.own(name)
-        return _minimum(oracle, box, least, gap, time_limit, interrupted, recorder)
+        return searched_minimum(oracle, box, least, gap, time_limit, interrupted, recorder)
 
     def with_errors(oracle: SingularValues | Clearance, found: Minimum, extreme: Extreme) -> Extreme:
         """Return an extreme with the errors of the machine that reaches it."""
@@ -69,12 +69,12 @@ def own_searches(
         if isinstance(limit, SmallestSingularValue):
             oracle = SingularValues(legs, box, limit.length, is_condition=False, shortest=shortest)
             found = search(oracle, limit.min, "smallest_singular_value")
-            extreme = _from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
+            extreme = from_minimum("smallest_singular_value", "smallest_singular_value.min", limit.min, box, found)
             yield with_errors(oracle, found, extreme)
         elif isinstance(limit, ConditionNumber):
             oracle = SingularValues(legs, box, limit.length, is_condition=True, shortest=shortest)
             found = search(oracle, -limit.max, "condition_number")
-            extreme = _from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
+            extreme = from_minimum("condition_number", "condition_number.max", -limit.max, box, found, sign=-1.0)
             yield with_errors(oracle, found, extreme)
         elif isinstance(limit, LegClearance):
             names = [leg.name for leg in case.model.legs]
@@ -84,11 +84,11 @@ def own_searches(
                     Clearance(legs, box, one, other),
                 )
                 found = search(clearance, limit.min, name)
-                extreme = _from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
+                extreme = from_minimum(name, "leg_clearance.min", limit.min, box, found, Dimension.LENGTH)
                 yield with_errors(clearance, found, extreme)
 
 
-def _minimum(
+def searched_minimum(
     oracle: Oracle,
     box: PoseBox,
     limit: float,
@@ -111,7 +111,7 @@ def _minimum(
     )
 
 
-def _from_minimum(
+def from_minimum(
     name: str,
     key: str,
     limit: float,

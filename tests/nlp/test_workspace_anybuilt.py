@@ -1,0 +1,433 @@
+"""Machines as they are built of robots that are not six straight legs: bounds beside sampled machines.
+
+Sampled machines are computed from geometry alone: from joint centres, cranks, rods and hinges, and not from the
+project's models.
+"""
+
+import json
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import jsonschema
+import numpy as np
+import pytest
+
+from screwsynth.models import FloatArray
+from screwsynth.models.joints.closedform import closed_form
+from screwsynth.nlp import Case
+from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.results.jsondata import json_data
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
+from screwsynth.nlp.workspace.anybuilt import firstorder
+from screwsynth.nlp.workspace.anybuilt.machines import Effort, Machines, machine_extremes, machines_of
+from screwsynth.nlp.workspace.general import machinenumber, rank
+from screwsynth.nlp.workspace.general.cells import Cells, Examiner
+from screwsynth.nlp.workspace.general.singularpose import SingularPose
+from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.machine import workspace_of_case
+from screwsynth.nlp.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
+from screwsynth.nlp.workspace.verdict import Outcome
+
+TWIST_AXIS, TWIST_POINT, PITCH = np.array([1.0, 2.0, 6.0]), np.array([0.3, 0.1, 1.2]), 0.1
+HEAD = """
+[units]
+length = "m"
+[pose]
+position = [0, 0, 1.1]
+[tolerance]
+joint_centre = 1e-3
+[[task]]
+sense = "max"
+axis = [1, 2, 6]
+point = [0.3, 0.1, 1.2]
+pitch = 0.1
+[workspace]
+position = [{ min = -0.05, max = 0.05 }, { min = -0.05, max = 0.05 }, { min = 1.08, max = 1.12 }]
+"""
+TURN = "rotation = { roll = { min = -5, max = 5 }, pitch = { min = -5, max = 5 }, yaw = { min = -5, max = 5 } }\n"
+ROBOTS = {
+    "3-rps": '[robot]\nmodel = "3-rps"\nparameters = { rb = 1.0, rp = 0.6, h = 1.1 }\n',
+    "6-rus": '[robot]\nmodel = "6-rus"\nparameters = { rb = 1.0, rp = 0.6, base_half = 20, platform_half = 43, '
+    "crank = 0.35, lift = 35, h = 1.1 }\n",
+    "6-ups": '[robot]\nmodel = "6-ups"\n'
+    "parameters = { rb = 1.0, rp = 0.45, base_half = 60, platform_half = 5, h = 1.1 }\n",
+    "three-upu": '[robot]\nmodel = "three-upu"\naxes = "snu"\ncharacteristic_length = 0.5\n'
+    "parameters = { base_radius = 1.0, platform_radius = 0.6 }\n"
+    "[limits]\nactuator_rate = { max = 5 }\n",
+}
+#: Number of sampled machines, and of them with errors along the derivatives of the number.
+COUNT, STEEP = 20_000, 256
+
+
+def case_of(name: str) -> Case:
+    return case_from_tables(tomllib.loads(ROBOTS[name] + HEAD + TURN), name=name, source=f"{name}.toml")
+
+
+def machines(case: Case) -> Machines:
+    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
+
+
+@dataclass(frozen=True)
+class Poses:
+    """K poses: (K, 3, 3) rotations and (K, 3) positions."""
+
+    R: FloatArray
+    p: FloatArray
+
+
+def turned(a: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return a vector turned about the axis z by angles."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([c * a[0] - s * a[1], s * a[0] + c * a[1], np.full_like(c, a[2])], axis=-1)
+
+
+def rotations(roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
+    cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def twist() -> tuple[FloatArray, FloatArray]:
+    omega = TWIST_AXIS / np.linalg.norm(TWIST_AXIS)
+    return omega, PITCH * omega - np.cross(omega, TWIST_POINT)
+
+
+def velocity(points: FloatArray) -> FloatArray:
+    omega, v = twist()
+    return v + np.cross(omega, points)
+
+
+class Sampled:
+    """Numbers of machines at poses; every robot gives ``values`` from poses (K, 6) and errors (K, m, 3).
+
+    Poses are position, roll, pitch and yaw.
+    """
+
+    names: tuple[str, ...]
+    centres: int
+
+    def values(self, y: FloatArray, errors: FloatArray) -> FloatArray:
+        """Return (K, len(names))."""
+        raise NotImplementedError
+
+
+class ThreeUpu(Sampled):
+    """Limbs between circles, with the first upper axes radial; each with a force along it and a couple."""
+
+    names = ("leg_length limb 2", "base_joint_angle limb 1", "actuator_rate actuator 3", "F")
+    centres = 6
+
+    def values(self, y: FloatArray, errors: FloatArray) -> FloatArray:
+        R, p = rotations(*y[:, 3:].T), y[:, :3]
+        radial = turned(np.array([1.0, 0.0, 0.0]), np.arange(3) * 2 * math.pi / 3)
+        base, platform = radial + errors[:, ::2], 0.6 * radial + errors[:, 1::2]
+        d = p[:, None] + np.einsum("kij,klj->kli", R, platform) - base
+        length = np.linalg.norm(d, axis=2)
+        n, u = d / length[:, :, None], np.einsum("kij,lj->kli", R, radial)
+        couple = n - u * (u * n).sum(axis=2, keepdims=True)
+        couple /= np.linalg.norm(couple, axis=2, keepdims=True)
+        rates = (velocity(base) * n).sum(axis=2)
+        F = (rates**2).sum(axis=1) + ((0.5 * couple @ twist()[0]) ** 2).sum(axis=1)
+        return np.stack([length[:, 1], np.arccos(n[:, 0, 2]), np.abs(rates[:, 2]), F], axis=1)
+
+
+class SixRus(Sampled):
+    """Cranks about hinges, each with a rod to the platform; centres of a limb: hinge, crank's end, ball."""
+
+    names = ("actuator_angle limb 1", "actuator_angle limb 5", "F")
+    centres = 18
+
+    def values(self, y: FloatArray, errors: FloatArray) -> FloatArray:
+        R, p = rotations(*y[:, 3:].T), y[:, :3]
+        home = np.array([0.0, 0.0, 1.1])
+        angles, F = [], np.zeros(len(y))
+        for i in range(6):
+            side, turn = (-1.0 if i < 3 else 1.0), np.array([(i % 3) * 2 * math.pi / 3])
+            half, out, lift = math.radians(20), math.radians(43), math.radians(35)
+            b = np.array([math.cos(half), side * math.sin(half), 0.0])
+            e = b + 0.35 * np.array([math.cos(lift), 0.0, math.sin(lift)])
+            a = np.array([0.6 * math.cos(out), side * 0.6 * math.sin(out), 1.1])
+            B, E, A = (turned(each, turn)[0] + errors[:, 3 * i + k] for k, each in enumerate((b, e, a)))
+            axis = turned(np.array([0.0, 1.0, 0.0]), turn)[0]
+            crank, rod = E - B, np.linalg.norm(A - E, axis=1)
+            along = axis * (crank @ axis)[:, None]
+            x, z = crank - along, np.cross(axis, crank)
+            ball = p + np.einsum("kij,kj->ki", R, A - home)
+            g = ball - B - along
+            # |g - x cos q - z sin q| is the rod's length; the branch is that of q = 0 at home.
+            c, s = (x * g).sum(axis=1), (z * g).sum(axis=1)
+            k = ((g * g).sum(axis=1) + (x * x).sum(axis=1) - rod**2) / 2
+            middle, reach = np.arctan2(s, c), np.arccos(k / np.hypot(c, s))
+            q = np.stack([middle - reach, middle + reach])
+            q = np.where(np.abs(q[0]) < np.abs(q[1]), q[0], q[1])
+            n = (g - x * np.cos(q)[:, None] - z * np.sin(q)[:, None]) / rod[:, None]
+            F += (velocity(ball) * n).sum(axis=1) ** 2
+            angles.append(q)
+        return np.stack([angles[0], angles[4], F], axis=1)
+
+
+class ThreeRps(Sampled):
+    """Hinges, slides and balls: x, y and yaw follow. A limb resists all motions of its ball but that of its hinge."""
+
+    names = ("actuator_length limb 1", "actuator_length limb 2", "F")
+    centres = 6
+
+    def values(self, y: FloatArray, errors: FloatArray) -> FloatArray:
+        turns = np.arange(3) * 2 * math.pi / 3
+        B0, A0 = turned(np.array([1.0, 0.0, 0.0]), turns), turned(np.array([0.6, 0.0, 1.1]), turns)
+        axis, home = turned(np.array([0.0, 1.0, 0.0]), turns), np.array([0.0, 0.0, 1.1])
+        # The error along a hinge's axis does not matter.
+        B = B0 + errors[:, ::2] - axis * (errors[:, ::2] * axis).sum(axis=2, keepdims=True)
+        A = A0 + errors[:, 1::2]
+        offset = ((A - B) * axis).sum(axis=2)
+        y = y.copy()
+        y[:, [0, 1, 5]] = 0.0
+        for _ in range(8):
+            R = rotations(*y[:, 3:].T)
+            arm = np.einsum("kij,klj->kli", R, A - home)
+            residual = ((y[:, None, :3] + arm - B) * axis).sum(axis=2) - offset
+            spun = np.cross(np.array([0.0, 0.0, 1.0]), arm)
+            slopes = np.stack(
+                [np.tile(axis[:, 0], (len(y), 1)), np.tile(axis[:, 1], (len(y), 1)), (spun * axis).sum(axis=2)], axis=2
+            )
+            y[:, [0, 1, 5]] -= np.linalg.solve(slopes, residual[:, :, None])[:, :, 0]
+        assert np.abs(residual).max() < 1e-12
+        ball = y[:, None, :3] + arm
+        span, at_home = ball - B, A - B
+        way = np.cross(axis, span)
+        way /= np.linalg.norm(way, axis=2, keepdims=True)
+        w = velocity(ball)
+        F = ((w * w).sum(axis=2) - (w * way).sum(axis=2) ** 2).sum(axis=1)
+        # The slide keeps the direction of the design in the turned limb, and its distance from the hinge's axis.
+        slide = (A0 - B0) / np.linalg.norm(A0 - B0, axis=1, keepdims=True)
+        across = np.cross(axis, slide)
+        apart = (at_home * across).sum(axis=2)
+        radius = (span * span).sum(axis=2) - offset**2
+        length = np.sqrt(radius - apart**2) - (at_home * slide).sum(axis=2)
+        return np.stack([length[:, 0], length[:, 1], F], axis=1)
+
+
+SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus, "three-upu": ThreeUpu}
+
+
+def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
+    """Return the smallest and largest value of each of these numbers."""
+    effort = Effort(gap, 60.0, 1, lambda: False)
+    quantities = [each.name for each in found.built.model.quantities]
+    every = machine_extremes(found, quantities, effort, with_objective=True, only=names)
+    return [each for each in every if each.name in names]
+
+
+def samples(robot: Sampled, box: PoseBox, tolerance: float, more: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return numbers of machines at poses, and of the design at these poses, (K, numbers) each.
+
+    Half of the poses are at ends of their ranges, and some (P, 6) are given. Errors are random, and at the given and
+    some other poses along the derivatives.
+    """
+    rng = np.random.default_rng(0)
+    lower, upper = (np.concatenate([end[:3], 2 * np.arctan(end[3:])]) for end in (box.lower, box.upper))
+    y = rng.uniform(lower, upper, (COUNT, 6))
+    ends = np.where(rng.uniform(size=y.shape) < 0.5, lower, upper)
+    y[::2] = np.where(rng.uniform(size=y.shape) < 0.8, ends, y)[::2]
+    y[:64] = lower + np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T * (upper - lower)
+    y[64 : 64 + len(more), :3] = more[:, :3]
+    y[64 : 64 + len(more), 3:] = 2 * np.arctan(more[:, 3:])
+    errors = rng.normal(size=(COUNT, robot.centres, 3))
+    errors *= tolerance / np.linalg.norm(errors, axis=2, keepdims=True)
+    at = np.tile(y[:STEEP], (3 * robot.centres, 1))
+    small = np.repeat(np.eye(3 * robot.centres), STEEP, axis=0).reshape(len(at), -1, 3) * 1e-6
+    slopes = (robot.values(at, small) - robot.values(at, -small)) / 2e-6
+    slopes = slopes.reshape(robot.centres, 3, STEEP, -1)
+    rows = [(y, errors)]
+    for k in range(slopes.shape[3]):
+        along = slopes[..., k].transpose(2, 0, 1)
+        along = tolerance * along / np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-12)
+        rows += [(y[:STEEP], along), (y[:STEEP], -along)]
+    y, errors = (np.concatenate(each) for each in zip(*rows, strict=True))
+    return robot.values(y, errors), robot.values(y, np.zeros_like(errors))
+
+
+def ratios(name: str, gap: float = 1e-4, only: tuple[str, ...] | None = None) -> dict[tuple[str, Sense], float]:
+    """Return the change that is proved in parts of the largest sampled one; below 1 where a sample is outside."""
+    case, robot = case_of(name), SAMPLED[name]()
+    found = machines(case)
+    names = robot.names if only is None else only
+    bounds = wanted(found, names, gap)
+    box = found.family.problem.box
+    poses = np.array([firstorder.coordinates_of(box, each.pose) for each in bounds if each.pose is not None])
+    built, exact = samples(robot, box, found.family.tolerance, poses)
+    result = {}
+    for each in bounds:
+        k, sign = robot.names.index(each.name), 1.0 if each.sense is Sense.MAX else -1.0
+        design = (sign * exact[:, k]).max()
+        result[each.name, each.sense] = (sign * each.bound - design) / ((sign * built[:, k]).max() - design)
+    return result
+
+
+def test_no_sampled_machine_is_outside_of_the_bounds_which_are_near_to_the_worst() -> None:
+    for name, gap in (("three-upu", 1e-4), ("3-rps", 5e-4)):
+        found = ratios(name, gap)
+        assert len(found) >= 6
+        assert min(found.values()) >= 1.0, found
+        assert max(found.values()) <= 1.5, found
+
+
+@pytest.mark.slow
+def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
+    found = ratios("6-rus")
+    assert len(found) == 6
+    assert min(found.values()) >= 1.0, found
+    assert max(found.values()) <= 1.5, found
+
+
+def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    spread = machinenumber.by_centres
+    monkeypatch.setattr(firstorder, "_OUTWARDS", 0.8)
+    monkeypatch.setattr(machinenumber, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
+        assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
+
+
+def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
+    """Count boxes that are said to be regular for all machines, and those of them in which a machine says otherwise.
+
+    With C a pseudo-inverse of the matrix of the design at the middle of a box, the determinant of C M is positive for
+    every machine in a box that is regular for the reason of the search.
+    """
+    family = machines(replace(case_of(name), joint_centre_tolerance=tolerance)).family
+    problem, rng = family.problem, np.random.default_rng(0)
+    test = rank.RankTest(family.locked, family.coordinates, family.start)
+    examiner = Examiner(problem, test, None, family)
+    own, n, count = list(problem.independent), len(problem.start), 64
+    middle = problem.box.random(count, rng)[:, list(problem.free)][:, own]
+    lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
+    half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
+    lower[:, own], upper[:, own] = middle - half, middle + half
+    cells = Cells(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
+    found = examiner.examine(cells)
+    loops, newton = family.loops, SingularPose(problem, family.locked, family)
+    M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
+    wrong = 0
+    for k in np.flatnonzero(found.is_regular):
+        z = family.exact(found.cells.centre[k])
+        design = loops.closed(z, list(problem.dependent))
+        assert design is not None
+        C = np.linalg.pinv(M(design).full())
+        slopes = newton.slopes(design)
+        assert slopes is not None
+        steep = -slopes[n:].reshape(-1, 3)
+        for errors in (steep, *rng.normal(size=(3, *steep.shape))):
+            z[n:] = (tolerance * errors / np.maximum(np.linalg.norm(errors, axis=1, keepdims=True), 1e-12)).ravel()
+            machine = loops.closed(z, list(problem.dependent))
+            wrong += machine is not None and not float(np.linalg.det(C @ M(machine).full())) > 0
+    return int(found.is_regular.sum()), wrong
+
+
+def test_no_box_is_regular_for_all_machines_in_which_one_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("3-rps", "6-ups"):
+        boxes, wrong = wrong_boxes(name, 0.01)
+        assert boxes >= 32
+        assert not wrong
+    # Without the part of the errors boxes are said to be regular in which a machine is not.
+    judged = rank.RankTest._judged
+
+    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, f: int) -> rank.Tested:
+        return judged(self, M0, M[:, :f], np.zeros_like(R), f)
+
+    monkeypatch.setattr(rank.RankTest, "_judged", without)
+    assert wrong_boxes("6-ups", 0.4)[1]
+
+
+def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
+    robot = ThreeRps()
+    text = ROBOTS["3-rps"] + HEAD + TURN
+    largest = 0.0696
+    limits = f'[limits.joint]\n"1:2" = {{ max = {largest} }}\n'
+    case = case_from_tables(tomllib.loads(text + limits), name="3-rps", source="3-rps.toml")
+    finer = judge_workspace(replace(case, joint_centre_tolerance=1e-6), with_objective=False)
+    assert finer.is_proved
+    judged = judge_workspace(case, quantities=["smallest_singular_value"], with_objective=False)
+    (found,) = (each for each in judged.extremes if each.key)
+    assert judged.is_regular
+    assert found.outcome is Outcome.REFUTED
+    assert found.centres is not None
+    assert found.pose is not None
+    errors = found.centres.vectors
+    assert np.linalg.norm(errors, axis=1).max() <= 1e-3
+    assert found.centres.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
+    y = firstorder.coordinates_of(pose_box(workspace_of_case(case)), found.pose)
+    y[3:] = 2 * np.arctan(y[3:])
+    value = robot.values(y[None], errors[None])[0, 0]
+    assert value > largest
+    assert value == pytest.approx(found.reached, abs=1e-9)
+    data = json_data(workspace_of(judged))
+    jsonschema.validate(json.loads(json.dumps(data)), result_schema(WorkspaceResult))
+    assert '"joint": "1:1"' in json.dumps(data)
+
+
+def test_a_machine_far_off_is_singular() -> None:
+    text = (
+        '[robot]\nmodel = "6-ups"\nparameters = { rb = 1.0, rp = 0.45, base_half = 60, platform_half = 5, h = 0.8 }\n'
+    )
+    place = HEAD.replace("1.08", "0.78").replace("1.12", "0.82").replace("1e-3", "0.2")
+    case = case_from_tables(tomllib.loads(text + place + TURN), name="6-ups", source="6-ups.toml")
+    found = judge_workspace(case, with_limits=False).regularity
+    assert found.outcome is Outcome.REFUTED
+    assert found.centres is not None
+    assert found.y is not None
+    assert np.linalg.norm(found.centres.vectors, axis=1).max() <= 0.2
+    # Six straight legs with these errors: the determinant of their unit rows vanishes.
+    pose, e = found.box.pose(found.y), found.centres.vectors
+    rows = []
+    for i in range(6):
+        side, turn = (-1.0 if i < 3 else 1.0), np.array([(i % 3) * 2 * math.pi / 3])
+        base, ball = (
+            turned(np.array([r * math.cos(h), side * r * math.sin(h), z]), turn)[0]
+            for r, h, z in ((1.0, math.radians(60), 0.0), (0.45, math.radians(5), 0.0))
+        )
+        arm = pose.rotation @ (ball + e[2 * i + 1])
+        n = pose.position + arm - base - e[2 * i]
+        n /= np.linalg.norm(n)
+        rows.append(np.concatenate([n, np.cross(arm, n)]))
+    values = np.linalg.svd(np.array(rows), compute_uv=False)
+    assert values[-1] < 1e-8 * values[0]
+
+
+def test_what_is_not_covered_is_open_with_the_reason() -> None:
+    text = '[robot]\nmodel = "spherical-3-rrr"\n'
+    model = build_model("spherical-3-rrr")
+    own = ", ".join(f"{item.name} = {math.degrees(item.typical[0])}" for item in model.parameters)
+    place = (
+        HEAD.replace("{ min = -0.05, max = 0.05 }", "0")
+        .replace("{ min = 1.08, max = 1.12 }", "0")
+        .replace("1.1]", "0]")
+    )
+    tables = tomllib.loads(text + f"parameters = {{ {own} }}\n" + place + TURN)
+    judged = judge_workspace(case_from_tables(tables, name="spherical", source="spherical.toml"), with_objective=False)
+    assert judged.regularity.outcome is Outcome.OPEN
+    assert "take freedoms" in judged.regularity.reason
+    assert judged.extremes
+    assert all(each.outcome is Outcome.OPEN for each in judged.extremes)
+    assert all("take freedoms" in each.reason for each in judged.extremes)
+    del tables["workspace"]
+    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
+        case_from_tables(tables, name="spherical", source="spherical.toml")
+    # Limits without a search over a workspace are open too, with and without a tolerance.
+    limits = "leg_clearance = { min = 0.01 }\nactuator = { stroke_max = 0.5 }\n"
+    tables = tomllib.loads(ROBOTS["three-upu"] + limits + HEAD + TURN)
+    case = case_from_tables(tables, name="upu", source="upu.toml")
+    for each in (case, replace(case, joint_centre_tolerance=None)):
+        found = {one.key: one.outcome for one in judge_workspace(each, with_objective=False).extremes}
+        assert found["leg_clearance.min"] is found["actuator.stroke_max"] is Outcome.OPEN
