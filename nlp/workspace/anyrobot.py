@@ -60,7 +60,7 @@ def prove_ranks(
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is not None:
-                recorder = None if paper is None or problem.dependent else paper.own(name)
+                recorder = None if paper is None else paper.own(name)
                 found.append(
                     prove_rank(
                         problem, matrix, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder

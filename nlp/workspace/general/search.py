@@ -154,6 +154,7 @@ class _Search:
         cells = cells._replace(lower=new_lower, upper=new_upper)
         if self._recorder is not None:
             self._recorder.contractions(self._ends(before), self._ends(cells), ~kept)
+            self._recorder.lacks_boxes |= bool(apart.any())
         return cells.some(np.flatnonzero(kept))
 
     def _ends(self, cells: Cells) -> tuple[FloatArray, FloatArray]:

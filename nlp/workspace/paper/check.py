@@ -144,6 +144,7 @@ class _Checker:
         _compare_legs(self._legs, proof)
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         self._layout: Layout = robot.layout
+        self._model = robot.model
         self._root: PoseRoot = pose_root(workspace)
         self._eps = leg_error_of(case, proof.leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
@@ -168,9 +169,12 @@ class _Checker:
         if given.reason == "singular":
             return self._check_sides(each, given)
         if each.kind in ("regular", "constraints"):
-            is_legs = self._legs is not None
-            ranks = RankClaim(self._root, self._joints) if is_legs else rank_claim(self._case, self._root, each.name)
-            self._show(ranks, given.tree)
+            if self._legs is not None:
+                self._show(RankClaim(self._root, self._joints), given.tree)
+            else:
+                robot = rank_claim(self._case, self._model, self._root, each.name)
+                self._show(robot, given.tree)
+                robot.finish()
             return CheckedClaim(each.name, each.sense)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")

@@ -25,7 +25,7 @@ _AS_BUILT = "it is about every machine within the tolerance of joint centres, an
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
 #: Reasons of claims about other robots than six straight legs.
-_NO_LOOPS = "proofs of ranks are written for robots whose loops are solved in closed form"
+_BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
@@ -114,8 +114,8 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperC
     if found.outcome is Outcome.PROVED:
         if legs_of(judged.case) is not None:
             return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
-        own = record.boxes.get(each.name)
-        return _NO_LOOPS if own is None else PaperClaim(each.name, "", "regular", tree=own.tree())
+        own = record.own(each.name)
+        return _BEYOND if own.lacks_boxes else PaperClaim(each.name, "", "regular", tree=own.tree())
     if found.outcome is Outcome.REFUTED and found.sides is not None:
         return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
