@@ -142,6 +142,8 @@ class _Checker:
             raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         _compare_legs(self._legs, proof)
+        if self._legs is None and case.joint_centre_tolerance and proof.claims:
+            raise ProofError("claims about every machine within a tolerance have no proof for this robot")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         self._layout: Layout = robot.layout
         self._model = robot.model
@@ -169,13 +171,7 @@ class _Checker:
         if given.reason == "singular":
             return self._check_sides(each, given)
         if each.kind in ("regular", "constraints"):
-            if self._legs is not None:
-                self._show(RankClaim(self._root, self._joints), given.tree)
-            else:
-                robot = rank_claim(self._case, self._model, self._root, each.name)
-                self._show(robot, given.tree)
-                robot.finish()
-            return CheckedClaim(each.name, each.sense)
+            return self._check_rank(each, given)
         if given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
         if each.kind == "number":
@@ -195,6 +191,16 @@ class _Checker:
         self._show(claim, given.tree)
         dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
         return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
+
+    def _check_rank(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+        """Check that J, or the constraint wrenches alone, have full rank."""
+        if self._legs is not None:
+            self._show(RankClaim(self._root, self._joints), given.tree)
+        else:
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            self._show(robot, given.tree)
+            robot.finish()
+        return CheckedClaim(each.name, each.sense)
 
     @property
     def _joints(self) -> Joints:
