@@ -264,3 +264,18 @@ def test_balls_hold_the_entries_and_could_be_no_smaller() -> None:
     assert known.mean() > 0.8
     assert (missed <= e + 1e-12 * (1 + np.abs(values)))[known].all()
     assert (missed > 0.05 * e + 1e-12)[known].any()
+
+
+def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
+    case = gallery_case("6-ups", 0.4, 70, 1)
+    record = PaperRecord()
+    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
+    (found,) = check_paper(proof, case).claims
+    assert found.is_refuted
+    first, second = claim(proof, "regular").sides
+    assert "opposite signs" in rejected(changed(proof, "regular", sides=(first, first)), case)
+    assert "not one of the workspace" in rejected(changed(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
+    small = gallery_case("6-ups", 0.02, 5, 1)
+    assert small.workspace is not None
+    other = replace(proof, workspace=workspace_numbers(small.workspace))
+    assert "not one of the workspace" in rejected(other, small)

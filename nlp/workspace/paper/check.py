@@ -24,6 +24,7 @@ from ..machine import Legs, legs_of, workspace_of_case
 from ..posed import extreme_program
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
+from .anyrobot.signchange import show_sign_change
 from .ballrows import Joints
 from .clearanceclaim import ClearanceClaim
 from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
@@ -226,6 +227,10 @@ class _Checker:
             raise ProofError("the claim has no two poses")
         if not all(self._root.holds(side) for side in sides):
             raise ProofError("a pose is not one of the workspace")
+        if self._legs is None:
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            show_sign_change(robot, self._root, sides[0], sides[1])
+            return CheckedClaim(each.name, each.sense, is_refuted=True)
         claim = RankClaim(self._root, self._joints)
         if claim.sign_at(sides[0]) * claim.sign_at(sides[1]) >= 0:
             raise ProofError("the determinant has not opposite signs at the two poses")

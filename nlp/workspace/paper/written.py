@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...certificate.paper.proof import fingerprint
 from ..machine import Legs, legs_of
-from ..verdict import Outcome
+from ..verdict import Outcome, Regularity
 from .anyrobot.robotclaims import RobotClaims, robot_claims
+from .anyrobot.singularsides import singular_sides
 from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
 
 if TYPE_CHECKING:
+    from ....models import Model
     from ..judge import Judgement
     from ..numbers.extremes import Extreme
 
@@ -59,7 +61,7 @@ def paper_of(
             continue
         extremes = first if each.kind == "number" else last
         is_rank = each.kind in ("regular", "constraints")
-        found = _rank(each, judged, record) if is_rank else _number(each, extremes, record, proved)
+        found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
         if isinstance(found, PaperClaim):
             proved[each.key] = found
         else:
@@ -106,7 +108,7 @@ def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
 
 
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperClaim | str:
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> PaperClaim | str:
     """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
     found = judged.regularity if each.kind == "regular" else judged.constraints
     if found is None:
@@ -116,9 +118,22 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperC
             return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
         own = record.own(each.name)
         return _BEYOND if own.lacks_boxes else PaperClaim(each.name, "", "regular", tree=own.tree())
-    if found.outcome is Outcome.REFUTED and found.sides is not None:
-        return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+    if found.outcome is Outcome.REFUTED:
+        return _refuted(each, found, judged, model)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
+
+
+def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> PaperClaim | str:
+    """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
+    if found.sides is not None:
+        return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+    why = "a computed pose has no proof"
+    if each.kind == "regular" and found.y is not None and legs_of(judged.case) is None:
+        sides = singular_sides(judged.case, model, judged.workspace, found.y)
+        if not isinstance(sides, str):
+            return PaperClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
+        why = sides
+    return f"{found.outcome.value}: {found.reason}; {why}"
 
 
 def _number(

@@ -18,8 +18,9 @@ import numpy as np
 
 from .....models import FloatArray
 from ....certificate.paper.slopes import SlopeArithmetic
+from ..exactly import sign_of_determinant
 from ..pieces import Attempt
-from ..positive import contraction
+from ..positive import contraction, inverses
 from .assembly import Assembly, Enclosed
 from .connected import Pieces, refuse_apart
 from .interval import PRODUCT, UP, Balls, balls, half_widths, off_identity
@@ -87,8 +88,42 @@ class MotionClaim:
         if self._shown:
             refuse_apart(self._assembly, Pieces(*(np.concatenate(each) for each in zip(*self._shown, strict=True))))
 
+    @property
+    def is_square(self) -> bool:
+        """Whether the matrix is J itself, with rows that are neither normalised nor zero, over poses without loops."""
+        return self._constant.shape == (6, 6) and not self._freedoms and not self._assembly.dependent
+
+    def signs_at(self, y: FloatArray) -> list[int]:
+        """Return the signs of the determinant at poses (K, 6); 0 where a sign is not shown.
+
+        With ``|I - C M|`` of a spectral radius below 1 the determinant of ``C M`` is positive: that of M has the sign
+        of that of C, which is computed in fractions.
+        """
+        at = y[:, self._free]
+        M, E, _, _ = self._matrices(self._assembly.enclosed(at, at, self._assembly.near(at, at)))
+        C = inverses(M)
+        with np.errstate(all="ignore"):
+            bound = (off_identity(C, M) + np.abs(C) @ (E + PRODUCT * np.abs(M))) * UP
+        known = contraction(np.where(np.isfinite(bound), bound, np.inf)).holds
+        return [sign_of_determinant(each.tolist()) if good else 0 for each, good in zip(C, known, strict=True)]
+
+    def has_values(self, lower: FloatArray, upper: FloatArray) -> bool:
+        """Return whether all entries surely have values over a box (6,), in which they are continuous."""
+        low, high = lower[None, self._free], upper[None, self._free]
+        M, E, S, _ = self._matrices(self._assembly.enclosed(low, high, self._assembly.near(low, high)))
+        return bool(np.isfinite(M).all() and np.isfinite(E).all() and np.isfinite(S).all())
+
+    def values_at(self, y: FloatArray) -> FloatArray:
+        """Return the matrices (K, m, c) at poses (K, 6) without loops: computed numbers."""
+        low = y[:, self._free]
+        return self._matrices(self._assembly.enclosed(low, low, self._assembly.near(low, low)))[0]
+
     def _examined(self, closed: Enclosed) -> tuple[NDArray[np.bool_], FloatArray]:
         """Return where the rank is shown (B,), and shares (B, f), of boxes with known closed loops."""
+        return self._judged(*self._matrices(closed))
+
+    def _matrices(self, closed: Enclosed) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return middles at the centre, radii over the boxes, middles of slopes, and half widths."""
         own, D = self._assembly.independent, self._assembly.dependent
         low, high = closed.lower.T, closed.upper.T
         h = half_widths(low, high)
@@ -101,7 +136,7 @@ class MotionClaim:
         rows, columns = self._at
         M[:, rows, columns], E[:, rows, columns] = middle, rest
         S[:, :, rows, columns] = slopes.transpose(0, 2, 1)
-        return self._judged(M, E, S, h[:, own])
+        return M, E, S, h[:, own]
 
     def _judged(
         self, M: FloatArray, E: FloatArray, S: FloatArray, h: FloatArray
