@@ -19,17 +19,27 @@ from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.workspace.general.problem import build_problem
 from screwsynth.nlp.workspace.general.singularpose import SingularPose
 from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.paper.anyrobot.motionclaim import MotionClaim, balls
+from screwsynth.nlp.workspace.paper import pieces
+from screwsynth.nlp.workspace.paper.anyrobot.connected import Pieces, refuse_apart
+from screwsynth.nlp.workspace.paper.anyrobot.interval import balls, half_widths
 from screwsynth.nlp.workspace.paper.anyrobot.rankofrobot import rank_claim
 from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
+from screwsynth.nlp.workspace.paper.document import (
+    PaperClaim,
+    PaperProof,
+    Unproved,
+    read_paper,
+    workspace_numbers,
+)
+from screwsynth.nlp.workspace.paper.pieces import show
 from screwsynth.nlp.workspace.paper.poseroot import pose_root
 from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.tree import PoseNode, split_bytes
+from screwsynth.nlp.workspace.paper.tree import PoseNode, read_leaves, split_bytes
 from screwsynth.nlp.workspace.paper.written import paper_of
 from screwsynth.nlp.workspace.posebox import pose_box
 
 CASES = Path(__file__).parents[2] / "cases"
+OTHERS = [f"stewart_{k} =" for k in range(2, 7)]
 
 
 def reachy_text(factor: float) -> str:
@@ -79,13 +89,18 @@ def rejected(proof: PaperProof, case: Case) -> str:
     return str(caught.value)
 
 
+def one_motor(text: str) -> str:
+    """The text with the limits of the first motor alone."""
+    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith(tuple(OTHERS)))
+
+
 def reachy_case(text: str) -> Case:
     return case_from_tables(tomllib.loads(text), name="head", source="head.toml")
 
 
 @pytest.fixture(scope="module")
 def reachy() -> tuple[Case, PaperProof]:
-    text = reachy_text(0.3)
+    text = one_motor(reachy_text(0.2))
     return reachy_case(text), proof_of(reachy_case(text), text)
 
 
@@ -96,7 +111,7 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, PaperProof]) -> None:
     names = [each.name for each in checked.claims]
     assert names[0] == "regular"
     assert [name for name in names if name.startswith("reach limb")] == [f"reach limb stewart_{k}" for k in range(1, 7)]
-    assert sum(name.startswith("joint.stewart") for name in names) == 12
+    assert sum(name.startswith("joint.stewart") for name in names) == 2
     assert all(each.limit is not None and each.bound is not None for each in checked.claims[1:])
 
 
@@ -104,11 +119,9 @@ def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, PaperProof]) 
     case, proof = reachy
     tree = claim(proof, "regular").tree
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
-    assert "goes on" in rejected(changed(proof, "regular", tree=tree + bytes([PoseNode.CLOSED])), case)
     assert "not outside" in rejected(changed(proof, "regular", tree=bytes([PoseNode.OUTSIDE])), case)
     moved = split_bytes(tree[1], 2.0) + tree[10:]
     assert "outside of it" in rejected(changed(proof, "regular", tree=moved), case)
-    assert "no reason" in rejected(changed(proof, "regular", reason="boxes"), case)
     assert "no two poses" in rejected(changed(proof, "regular", reason="singular"), case)
     bound = claim(proof, "reach limb stewart_1").bound
     assert bound is not None
@@ -116,7 +129,7 @@ def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, PaperProof]) 
     assert "reach limb stewart_1" in rejected(changed(proof, "reach limb stewart_1", bound=bound - 0.2), case)
     # A limit on a motor alone has the loops as conditions: the closed forms need the reach of all limbs.
     assert "other expressions" in rejected(changed(proof, "joint.stewart_1 joint stewart_1:1"), case)
-    other = reachy_case(reachy_text(0.3).replace("rc = 0.062", "rc = 0.060"))
+    other = reachy_case(one_motor(reachy_text(0.2)).replace("rc = 0.062", "rc = 0.060"))
     assert "other expressions" in rejected(changed(proof, "reach limb stewart_1"), other)
 
 
@@ -130,13 +143,14 @@ def test_reachy_mini_is_on_paper_for_most_of_its_documented_rotations() -> None:
 
 def boxes_about(y: FloatArray, half: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Boxes of many sizes with a point of theirs at y."""
-    width = half * 10.0 ** rng.uniform(-6, -0.3, (300, 1)) * rng.uniform(0.2, 1, (300, 6))
-    share = rng.uniform(0.05, 0.95, (300, 6))
+    width = half * 10.0 ** rng.uniform(-6, -0.3, (100, 1)) * rng.uniform(0.2, 1, (100, 6))
+    share = rng.uniform(0.05, 0.95, (100, 6))
     return y - share * width, y + (1 - share) * width
 
 
 @pytest.mark.parametrize(
-    ("name", "part", "degrees", "seed"), [("6-ups", 0.4, 70, 1), ("6-rus", 0.1, 40, 2), ("6-pus", 0.4, 70, 3)]
+    ("name", "part", "degrees", "seed"),
+    [("6-rus", 0.1, 40, 2), pytest.param("6-ups", 0.4, 70, 1, marks=pytest.mark.slow)],
 )
 def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: float, degrees: float, seed: int) -> None:
     """The pose is one that Newton's method finds to 1e-10, in a robot with random dimensions."""
@@ -147,28 +161,127 @@ def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: flo
     newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
     tried = (newton.search(each) for each in box.random(200, rng))
     y = next(each for each in tried if each is not None)
-    shown = rank_claim(case, root, "regular")
+    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
     half = 0.5 * (root.upper - root.lower)
     assert not shown.attempt(*boxes_about(y, half, rng)).holds.any()
     home = 0.5 * (root.lower + root.upper)
     assert shown.attempt(*boxes_about(home, 0.1 * half, rng)).holds.mean() > 0.5
 
 
+@pytest.mark.parametrize(
+    ("name", "part", "degrees", "seed"),
+    [("3-rps", 0.3, 60, 1), pytest.param("planar-3-rrr", 0.3, 60, 2, marks=pytest.mark.slow)],
+)
+def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, degrees: float, seed: int) -> None:
+    case = gallery_case(name, part, degrees, seed)
+    assert case.workspace is not None
+    root, box = pose_root(case.workspace), pose_box(case.workspace)
+    problem = build_problem(case, closed_form(case.model).model, box)
+    newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
+    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
+    half = 0.5 * (root.upper - root.lower)
+    assert shown.attempt(*boxes_about(problem.pose_of(problem.start), 0.05 * half, rng)).holds.mean() > 0.5
+    points = np.broadcast_to(problem.start, (60, len(problem.start))).copy()
+    points[:, list(problem.independent)] += 0.3 * half[list(problem.independent)] * rng.uniform(-1, 1, (60, 3))
+    z = next(each for each in (newton.search(each) for each in points) if each is not None)
+    # The assembly that is singular there, and no other.
+    shown._assembly.start = z
+    assert not shown.attempt(*boxes_about(problem.pose_of(z), half, rng)).holds.any()
+
+
+@pytest.mark.parametrize("name", ["3-rps", "tricept"])
+def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
+    case = gallery_case(name, 0.1, 20, 4)
+    assert case.workspace is not None
+    root = pose_root(case.workspace)
+    assembly = rank_claim(case, closed_form(case.model).model, root, "regular")._assembly
+    own, D = assembly.independent, assembly.dependent
+    rng = np.random.default_rng(5)
+    half = 0.5 * (root.upper - root.lower)
+    boxes = boxes_about(0.5 * (root.lower + root.upper), half, rng)
+    lower, upper = (each[:, own] for each in boxes)
+    found = assembly.enclosed(lower, upper, assembly.near(lower, upper))
+    known = found.is_known
+    assert known.mean() > 0.3
+    at = lower + rng.choice([0.01, 0.99], lower.shape) * (upper - lower)
+    z = assembly.points.moved(found.near, at, own, D)[known][:, D]
+    low, high = found.lower[known][:, D], found.upper[known][:, D]
+    assert ((low < z) & (z < high)).all()
+    moved = z - 0.5 * (low + high) - found.off[known]
+    moved += (found.T[known] @ (at - 0.5 * (lower + upper))[known][:, :, None])[:, :, 0]
+    assert (np.abs(moved) <= found.rho[known] + 1e-9).all()
+    # Without the rest the relation would be wrong: the test can fail.
+    assert (np.abs(moved) > 0.1 * found.rho[known] + 1e-9).any()
+
+
+def test_robots_with_loops_are_on_paper() -> None:
+    case = gallery_case("tricept", 0.02, 5)
+    record = PaperRecord()
+    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
+    checked = check_paper(read_paper(proof.as_text(), "again"), case)
+    assert [each.name for each in checked.claims] == ["regular", "constraints regular"]
+    tree = claim(proof, "regular").tree
+    assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
+    assert "not outside" in rejected(changed(proof, "constraints regular", tree=bytes([PoseNode.OUTSIDE])), case)
+
+
+def test_boxes_with_another_assembly_do_not_belong_together() -> None:
+    case = gallery_case("3-rps", 0.05, 10)
+    assert case.workspace is not None
+    root = pose_root(case.workspace)
+    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
+    tree = split_bytes(2, 0.5 * (root.lower[2] + root.upper[2])) + bytes([PoseNode.CLOSED] * 2)
+    show(shown, root, read_leaves(tree, root.lower, root.upper))
+    shown.finish()
+    (whole,) = shown._shown
+    refuse_apart(shown._assembly, whole)
+    lower, upper = whole.lower.copy(), whole.upper.copy()
+    D = shown._assembly.dependent
+    lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
+    with pytest.raises(ProofError, match="same assembly"):
+        refuse_apart(shown._assembly, Pieces(lower, upper, whole.near))
+
+
+def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
+    reachy: tuple[Case, PaperProof], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, proof = reachy
+    case = reachy_case(one_motor(reachy_text(1.0)))
+    assert case.workspace is not None
+    monkeypatch.setattr(pieces, "_MOST_PIECES", 100)
+    other = replace(changed(proof, "regular"), workspace=workspace_numbers(case.workspace))
+    # All claims about limits are named, and none is proved.
+    assert "could not be shown" in rejected(other, case)
+
+
 def test_balls_hold_the_entries_and_could_be_no_smaller() -> None:
     case = gallery_case("6-rus", 0.1, 20)
     assert case.workspace is not None
     root = pose_root(case.workspace)
-    shown = rank_claim(case, root, "regular")
-    assert isinstance(shown, MotionClaim)
+    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
     rng = np.random.default_rng(3)
     lower, upper = boxes_about(0.5 * (root.lower + root.upper), 0.5 * (root.upper - root.lower), rng)
-    h = 0.5 * (upper - lower) * (1 + 1e-12)
-    function = shown._entries._function
-    c, e, s = balls(shown._entries(lower.T, upper.T), shown._count, h)
+    h = half_widths(lower.T, upper.T)
+    c, e, s = balls(shown._entries(lower.T, upper.T), h)
     centre, off = 0.5 * (lower + upper), h * rng.choice([-1.0, 1.0], h.shape) * (1 - 1e-9)
-    values = function(ca.DM((centre + off).T)).full().reshape(shown._count, len(h), order="F").T
+    values = shown._entries._function(ca.DM((centre + off).T)).full().T
     missed = np.abs(values - c - np.einsum("brn,bn->br", s, off))
     known = np.isfinite(e).all(axis=1)
     assert known.mean() > 0.8
     assert (missed <= e + 1e-12 * (1 + np.abs(values)))[known].all()
     assert (missed > 0.05 * e + 1e-12)[known].any()
+
+
+def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
+    case = gallery_case("6-ups", 0.4, 70, 1)
+    record = PaperRecord()
+    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
+    (found,) = check_paper(proof, case).claims
+    assert found.is_refuted
+    first, second = claim(proof, "regular").sides
+    assert "opposite signs" in rejected(changed(proof, "regular", sides=(first, first)), case)
+    assert "not one of the workspace" in rejected(changed(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
+    small = gallery_case("6-ups", 0.02, 5, 1)
+    assert small.workspace is not None
+    other = replace(proof, workspace=workspace_numbers(small.workspace))
+    assert "not one of the workspace" in rejected(other, small)

@@ -75,26 +75,40 @@ def whole_workspace(problem: Problem) -> Cells:
     return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
 
 
-def contracted_cells(problem: Problem, cells: Cells) -> tuple[Cells, NDArray[np.bool_]]:
-    """Return boxes contracted to the workspace, and (B,) whether they hold poses of it."""
+class Contracted(NamedTuple):
+    """Boxes contracted to a workspace.
+
+    Attributes:
+        cells: (B,) boxes.
+        kept: (B,) whether they hold poses of the workspace.
+        beyond: (B,) whether a number of the pose that follows from others is outside of its range.
+    """
+
+    cells: Cells
+    kept: NDArray[np.bool_]
+    beyond: NDArray[np.bool_]
+
+
+def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
+    """Return boxes contracted to the workspace."""
     box, free = problem.box, list(problem.free)
     ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
     # Numbers of the pose that are not known yet may be any of the workspace.
     lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
     upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
-    apart = (lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1)
+    beyond = np.asarray((lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1))
     found = box.contracted(lower, upper)
     own = [j for j in problem.independent if j < len(free)]
     columns = [free[j] for j in own]
     new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
     new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
-    return cells._replace(lower=new_lower, upper=new_upper), ~(apart | found.outside)
+    return Contracted(cells._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond)
 
 
 def in_workspace(problem: Problem, cells: Cells) -> Cells:
     """Return the boxes that hold poses of the workspace, contracted to them."""
-    found, kept = contracted_cells(problem, cells)
-    return found.some(np.flatnonzero(kept))
+    found = contracted_cells(problem, cells)
+    return found.cells.some(np.flatnonzero(found.kept))
 
 
 class Examined(NamedTuple):

@@ -150,10 +150,11 @@ class _Search:
 
     def _in_workspace(self, before: Cells) -> Cells:
         """Return the boxes that hold poses of the workspace, contracted to them."""
-        cells, kept = contracted_cells(self._problem, before)
+        found = contracted_cells(self._problem, before)
         if self._recorder is not None:
-            self._recorder.contractions(self._ends(before), self._ends(cells), ~kept)
-        return cells.some(np.flatnonzero(kept))
+            self._recorder.contractions(self._ends(before), self._ends(found.cells), ~found.kept)
+            self._recorder.lacks_boxes |= bool(found.beyond.any())
+        return found.cells.some(np.flatnonzero(found.kept))
 
     def _ends(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
         """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""

@@ -25,6 +25,7 @@ from ..machine import legs_of, workspace_of_case
 from ..posed import extreme_program
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
+from .anyrobot.signchange import show_sign_change
 from .ballrows import Joints
 from .built.built import Built
 from .clearanceclaim import ClearanceClaim
@@ -143,8 +144,11 @@ class _Checker:
             raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         compare_legs(self._legs, proof)
+        if self._legs is None and case.joint_centre_tolerance and proof.claims:
+            raise ProofError("claims about every machine within a tolerance have no proof for this robot")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         self._layout: Layout = robot.layout
+        self._model = robot.model
         self._root: PoseRoot = pose_root(workspace)
         self._tolerance = case.joint_centre_tolerance or 0.0
         if self._tolerance != proof.tolerance:
@@ -231,7 +235,9 @@ class _Checker:
         if given.reason == "singular machine":
             return self._check_machine(each, given)
         if self._legs is None:
-            self._show(rank_claim(self._case, self._root, each.name), given.tree)
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            self._show(robot, given.tree)
+            robot.finish()
         else:
             self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
         return CheckedClaim(each.name, each.sense)
@@ -243,6 +249,10 @@ class _Checker:
             raise ProofError("the claim has no two poses")
         if not all(self._root.holds(side) for side in sides):
             raise ProofError("a pose is not one of the workspace")
+        if self._legs is None:
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            show_sign_change(robot, self._root, sides[0], sides[1])
+            return CheckedClaim(each.name, each.sense, is_refuted=True)
         claim = RankClaim(self._root, self._joints)
         if claim.sign_at(sides[0]) * claim.sign_at(sides[1]) >= 0:
             raise ProofError("the determinant has not opposite signs at the two poses")

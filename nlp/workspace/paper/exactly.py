@@ -103,6 +103,11 @@ def _scaled_rotation(q: _Quaternion) -> list[list[Fraction]]:
     ]
 
 
+def sign_of_determinant(matrix: Sequence[Sequence[float]]) -> int:
+    """Return the sign of the determinant of a square matrix of doubles."""
+    return _sign([[Fraction(each) for each in row] for row in matrix])
+
+
 def _sign(rows: list[list[Fraction]]) -> int:
     """Return the sign of a determinant, by elimination."""
     rows, sign = [list(row) for row in rows], 1

@@ -27,9 +27,15 @@ _FOLDED = 1e-12
 
 
 class TreeRecord:
-    """The boxes that a search has cut, by their ends: a box that is cut nowhere is a leaf."""
+    """The boxes that a search has cut, by their ends: a box that is cut nowhere is a leaf.
+
+    Attributes:
+        lacks_boxes: whether boxes were left out that the check has no rule for: a number of the pose that follows from
+            others leaves its range there.
+    """
 
     def __init__(self) -> None:
+        self.lacks_boxes = False
         self._root = b""
         self._outside: set[bytes] = set()
         self._moved: dict[bytes, bytes] = {}

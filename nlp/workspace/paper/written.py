@@ -10,13 +10,15 @@ from ...case.limits.singular_values import ConditionNumber, SmallestSingularValu
 from ...certificate.paper.proof import fingerprint
 from ..claims import asked_name, exact_length_name, one_machine_name
 from ..machine import Legs, legs_of
-from ..verdict import Outcome
+from ..verdict import Outcome, Regularity
 from .anyrobot.robotclaims import RobotClaims, robot_claims
+from .anyrobot.singularsides import singular_sides
 from .document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from .expected import ERRORS, ExpectedClaim, expected_claims
 from .record import PaperRecord
 
 if TYPE_CHECKING:
+    from ....models import Model
     from ..judge import Judgement
     from ..numbers.extremes import Extreme
 
@@ -28,7 +30,7 @@ _AS_BUILT = "it is about every machine within the tolerance of joint centres, wh
 _NO_RULES = "claims of this kind have no proof on paper"
 _NO_BOUND = "its search has no bound"
 #: Reasons of claims about other robots than six straight legs.
-_NO_LOOPS = "proofs of ranks are written for robots whose loops are solved in closed form"
+_BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
@@ -63,7 +65,7 @@ def paper_of(
             continue
         extremes = first if each.kind == "number" else last
         is_rank = each.kind in ("regular", "constraints")
-        found = _rank(each, judged, record) if is_rank else _number(each, extremes, record, proved)
+        found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
         if each.kind == "error" and not _has_lengths(judged, record, proved):
             found = _NO_LENGTHS
         if isinstance(found, PaperClaim):
@@ -138,7 +140,7 @@ def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
 
 
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperClaim | str:
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> PaperClaim | str:
     """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
     found = judged.regularity if each.kind == "regular" else judged.constraints
     if found is None:
@@ -146,15 +148,28 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> PaperC
     if found.outcome is Outcome.PROVED:
         if legs_of(judged.case) is not None:
             return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
-        own = record.boxes.get(each.name)
-        return _NO_LOOPS if own is None else PaperClaim(each.name, "", "regular", tree=own.tree())
-    if found.outcome is Outcome.REFUTED and found.sides is not None:
+        own = record.own(each.name)
+        return _BEYOND if own.lacks_boxes else PaperClaim(each.name, "", "regular", tree=own.tree())
+    if found.outcome is Outcome.REFUTED:
+        return _refuted(each, found, judged, model)
+    return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
+
+
+def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> PaperClaim | str:
+    """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
+    if found.sides is not None:
         return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
     legs = legs_of(judged.case)
-    if found.outcome is Outcome.REFUTED and found.errors is not None and found.y is not None and legs is not None:
+    if found.errors is not None and found.y is not None and legs is not None:
         machine = found.errors.applied(legs)
         return PaperClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
-    return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
+    why = "a computed pose has no proof"
+    if each.kind == "regular" and found.y is not None and legs is None:
+        sides = singular_sides(judged.case, model, judged.workspace, found.y)
+        if not isinstance(sides, str):
+            return PaperClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
+        why = sides
+    return f"{found.outcome.value}: {found.reason}; {why}"
 
 
 def _number(

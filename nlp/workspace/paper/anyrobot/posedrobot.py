@@ -22,7 +22,8 @@ class PosedRobot:
     Attributes:
         z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns.
         free: indices of these coordinates among the six.
-        fixed: (6,) values of the others.
+        middle: (6,) the middle of the workspace: the values of the others.
+        size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
         equations: (k, 1) that are 0 where the loops are closed, of order 1.
         rows: rows of limbs, one wrench each.
         members: members of limbs.
@@ -33,7 +34,8 @@ class PosedRobot:
 
     z: SX
     free: tuple[int, ...]
-    fixed: FloatArray
+    middle: FloatArray
+    size: FloatArray
     equations: SX
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
@@ -44,8 +46,7 @@ class PosedRobot:
     @property
     def centre(self) -> FloatArray:
         """(n,) the middle of the workspace, with unknowns of 0 as at home."""
-        middle = self.fixed[list(self.free)]
-        return np.concatenate([middle, np.zeros(self.z.numel() - len(self.free))])
+        return np.concatenate([self.middle[list(self.free)], np.zeros(self.z.numel() - len(self.free))])
 
 
 def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
@@ -73,12 +74,14 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         *[part for member in model.members for part in (member.centre, member.screws)],
         *[each.screw for each in model.actuators],
         *[each.scaled for each in model.closure],
+        *[each.size for each in model.unknowns],
     ]
     following = iter(ca.Function("robot", Substitution.identity(model).all, outputs).call(given.all))
-    return PosedRobot(
+    robot = PosedRobot(
         z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
         free=free,
-        fixed=middle,
+        middle=middle,
+        size=(0.5 * (root.upper - root.lower))[list(free)],
         rows=tuple(replace(row, force=next(following), moment=next(following)) for row in model.wrenches),
         members=tuple(
             replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
@@ -88,6 +91,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         position=position,
         length=case.characteristic_length,
     )
+    sizes = [float(next(following)) for _ in model.unknowns]
+    return replace(robot, size=np.concatenate([robot.size, np.array(sizes)]))
 
 
 def _rotation(root: PoseRoot, turn: list[SX]) -> SX:

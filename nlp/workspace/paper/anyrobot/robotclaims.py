@@ -23,10 +23,12 @@ class RobotClaims(NamedTuple):
     Attributes:
         layout: the case as symbols of the pose in which its numbers are bounded: without the unknowns that follow in
             closed form, where all limbs reach every pose.
+        model: the robot without these unknowns, over whose poses its ranks are claimed.
         more: claims about constraint wrenches and reach; none about six straight legs.
     """
 
     layout: Layout
+    model: Model
     more: tuple[ExpectedClaim, ...]
 
 
@@ -39,7 +41,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         reached: names of those claims about reach that are proved.
     """
     if legs_of(case) is not None:
-        return RobotClaims(posed_layout(case, workspace), ())
+        return RobotClaims(posed_layout(case, workspace), case.model, ())
     closed = closed_form(case.model)
     more = [ExpectedClaim(CONSTRAINTS, "", "constraints")] if has_constraints(closed.model) else []
     layout = None
@@ -52,7 +54,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         more += own
         if all(each.name in reached for each in own):
             layout = closed_layout(case, closed, workspace)
-    return RobotClaims(layout or posed_layout(case, workspace), tuple(more))
+    return RobotClaims(layout or posed_layout(case, workspace), closed.model, tuple(more))
 
 
 def has_constraints(model: Model) -> bool:
