@@ -16,10 +16,12 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.certificate.paper.proof import ProofError
+from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
 from screwsynth.nlp.workspace.general.problem import build_problem
 from screwsynth.nlp.workspace.general.singularpose import SingularPose
 from screwsynth.nlp.workspace.judge import judge_workspace
 from screwsynth.nlp.workspace.paper import pieces
+from screwsynth.nlp.workspace.paper.anyrobot import motionclaim
 from screwsynth.nlp.workspace.paper.anyrobot.connected import Pieces, refuse_apart
 from screwsynth.nlp.workspace.paper.anyrobot.interval import balls, half_widths
 from screwsynth.nlp.workspace.paper.anyrobot.rankofrobot import rank_claim
@@ -254,7 +256,9 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     assert "could not be shown" in rejected(other, case)
 
 
-def test_balls_hold_the_entries_and_could_be_no_smaller() -> None:
+def test_balls_hold_the_entries_and_could_be_no_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries: list[ca.Function] = []
+    monkeypatch.setattr(motionclaim, "SlopeArithmetic", lambda given: entries.append(given) or SlopeArithmetic(given))
     case = gallery_case("6-rus", 0.1, 20)
     assert case.workspace is not None
     root = pose_root(case.workspace)
@@ -264,7 +268,7 @@ def test_balls_hold_the_entries_and_could_be_no_smaller() -> None:
     h = half_widths(lower.T, upper.T)
     c, e, s = balls(shown._entries(lower.T, upper.T), h)
     centre, off = 0.5 * (lower + upper), h * rng.choice([-1.0, 1.0], h.shape) * (1 - 1e-9)
-    values = shown._entries._function(ca.DM((centre + off).T)).full().T
+    values = entries[-1](ca.DM((centre + off).T)).full().T
     missed = np.abs(values - c - np.einsum("brn,bn->br", s, off))
     known = np.isfinite(e).all(axis=1)
     assert known.mean() > 0.8

@@ -8,5 +8,6 @@ The modules import each other in this order, and who checks a proof imports noth
 * the check: ``exactly`` (fractions), ``poseroot`` (the box of coordinates), ``ballslopes`` (arithmetic), ``ballrows``
   (rows of legs), ``pieces`` (bisection), ``positive`` (positive definite matrices), ``rankclaim`` and
   ``clearanceclaim`` (claims about boxes), ``inverserows`` (the inverse of the rows), ``singularclaim`` and
-  ``errorclaim`` (claims that need it), ``comparing`` (with the case), and ``check``.
+  ``errorclaim`` (claims that need it), ``anyrobot`` (ranks of robots that are not six straight legs),
+  ``comparing`` (with the case), and ``check``.
 """
