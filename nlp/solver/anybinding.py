@@ -37,8 +37,9 @@ from .tighter import TIGHTER, tightened
 #: Smallest squared sine or cosine of a limb's reach: of a number between 0 and 1 the limit 0 is tighter by as much.
 _REACH = TIGHTER
 #: Part of the determinant of J'J at the stated pose that is demanded at a singular pose: the square of the part of the
-#: determinant that is demanded of six legs.
-_DETERMINANT = 1e-4
+#: determinant that is demanded of six legs. J'J has no sign that tells the far side of a singular pose, so that the
+#: singular pose moves by little: of each further one more is demanded, up to a largest part.
+_DETERMINANT, _MORE, _MOST = 1e-4, 4.0, 1e-2
 #: Steps from the middle of the workspace to a pose, along which closed loops are followed.
 _WAY = 16
 #: Half ranges by which a number of the pose that the robot has no choice of may leave its range in a search.
@@ -102,6 +103,7 @@ class AnyBinder:
         if case.workspace is None:
             raise TypeError("a case with limits over its workspace has a workspace")
         self._nlp, self._case, self._box = nlp, case, pose_box(case.workspace)
+        self._singular = 0
         self._closed: ClosedForm = closed_form(case.model, extended=True)
         names = [item.name for item in case.model.unknowns]
         own = nlp.program.places.unknowns[0] if names else ()
@@ -190,15 +192,17 @@ class AnyBinder:
         if claim == "regular":
             length = case.characteristic_length
             ratio = _gram(robot, length) / _gram(nlp.program.robot, length)
-            yield BoundedConstraint(Constraint(f"{claim}{where}", ratio, NUMBER), _DETERMINANT, math.inf)
+            least = min(_DETERMINANT * _MORE**self._singular, _MOST)
+            self._singular += 1
+            yield BoundedConstraint(Constraint(f"{claim}{where}", ratio, NUMBER), least, math.inf)
             return
         own = [each.value for each in self._closed.reaches if claim == f"reach limb {each.limb}"]
         if own:
             values = ca.Function("reach", Substitution.identity(self._closed.model).all, own).call(given.all)
             numbers = ca.Function("reach", [nlp.program.x, nlp.program.p], [ca.vertcat(*values)])
             # Both rods of a parallelogram reach equally far: one of two equal constraints is enough.
-            least = int(np.argmin(numbers(x, nlp.arguments).full()))
-            yield BoundedConstraint(Constraint(f"{claim}{where}", values[least], NUMBER), _REACH, math.inf)
+            farthest = int(np.argmin(numbers(x, nlp.arguments).full()))
+            yield BoundedConstraint(Constraint(f"{claim}{where}", values[farthest], NUMBER), _REACH, math.inf)
             return
         for limit in case.limits:
             for item in limit.at_pose(PosedRobot(self._closed.model, robot, tuple(t.name for t in case.tasks), where)):
