@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from casadi import SX
 
 from .machine import CentreErrors, JointErrors
-from .posebox import PoseNumbers
+
+if TYPE_CHECKING:
+    from .posebox import PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,7 +155,7 @@ class _Search:
 
     def _middle(self, cells: Cells, k: np.int64) -> FloatArray:
         """Return a point (n,) in the middle of a box, with closed loops or near them."""
-        z = cells.near[k].copy()
+        z: FloatArray = cells.near[k].copy()
         own = [*self._independent, *self._problem.dependent]
         z[own] = cells.centre[k, own]
         return z
