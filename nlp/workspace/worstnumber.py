@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from casadi import SX
 
 from .machine import CentreErrors, JointErrors
-
-if TYPE_CHECKING:
-    from .posebox import PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,4 +32,4 @@ class Worst:
     allowance: float = 0.0
     least: float = -math.inf
     most: float = math.inf
-    machine: Callable[[PoseNumbers], tuple[CentreErrors, float]] | None = None
+    machine: Callable[..., tuple[CentreErrors, float]] | None = None
