@@ -421,6 +421,14 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     assert judged.extremes
     assert all(each.outcome is Outcome.OPEN for each in judged.extremes)
     assert all("take freedoms" in each.reason for each in judged.extremes)
+    # With errors a Delta that is held without rotation would have to turn.
+    values = ", ".join(f"{item.name} = {item.typical[0]}" for item in build_model("delta").parameters)
+    height = build_model("delta").home[2]
+    place = HEAD.replace("{ min = 1.08, max = 1.12 }", f"{height}").replace("1.1]", f"{height}]")
+    delta = tomllib.loads(f'[robot]\nmodel = "delta"\nparameters = {{ {values} }}\n' + place)
+    found = judge_workspace(case_from_tables(delta, name="delta", source="delta.toml"), with_limits=False).regularity
+    assert found.outcome is Outcome.OPEN
+    assert "does not have the poses" in found.reason
     del tables["workspace"]
     with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
         case_from_tables(tables, name="spherical", source="spherical.toml")
