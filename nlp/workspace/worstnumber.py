@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from casadi import SX
 
 from .machine import CentreErrors, JointErrors
-from .posebox import PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,4 +32,4 @@ class Worst:
     allowance: float = 0.0
     least: float = -math.inf
     most: float = math.inf
-    machine: Callable[[PoseNumbers], tuple[CentreErrors, float]] | None = None
+    machine: Callable[..., tuple[CentreErrors, float]] | None = None

@@ -31,23 +31,23 @@ class SingularMachine:
     def __init__(self, family: Family, matrix: RankMatrix) -> None:
         self._family, self._newton, self._loops = family, SingularPose(family.problem, matrix, family), family.loops
 
-    def search(self, design: FloatArray) -> FloatArray | None:
+    def search(self, z: FloatArray) -> FloatArray | None:
         """Return the coordinates (n + 3 m,) of a singular machine and its pose, near a pose (n,); None without one."""
         family, n = self._family, len(self._family.problem.start)
         dependent = list(family.problem.dependent)
-        z: FloatArray | None = family.exact(design)
+        machine: FloatArray | None = family.exact(z)
         for step in range(_STEPS):
-            if dependent and z is not None:
-                z = self._loops.closed(z, dependent)
-            slopes = None if z is None else self._newton.slopes(z)
-            if z is None or slopes is None:
+            if dependent and machine is not None:
+                machine = self._loops.closed(machine, dependent)
+            slopes = None if machine is None else self._newton.slopes(machine)
+            if machine is None or slopes is None:
                 return None
             parts = slopes[n:].reshape(-1, 3)
             sizes = np.linalg.norm(parts, axis=1, keepdims=True)
             unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
-            z = z.copy()
-            z[n:] += 2 / (step + 2) * (-family.tolerance * unit.ravel() - z[n:])
-            found = self._newton.search(family.within(z))
+            machine = machine.copy()
+            machine[n:] += 2 / (step + 2) * (-family.tolerance * unit.ravel() - machine[n:])
+            found = self._newton.search(family.within(machine))
             if found is not None:
                 return found
         return None
