@@ -87,16 +87,27 @@ def squares_of(function: SX) -> tuple[SX, list[Square]]:
     """Return a function (1, 1) as a rest and squared quotients."""
     rest, found = SX(0), []
     for term in terms_of(function):
-        factor, core = 1.0, term
-        while core.is_op(ca.OP_MUL) and (core.dep(0).is_constant() or core.dep(1).is_constant()):
-            constant, other = (0, 1) if core.dep(0).is_constant() else (1, 0)
-            factor, core = factor * float(core.dep(constant)), core.dep(other)
+        factor, core = _without_factors(term)
         is_square = core.is_op(ca.OP_DIV) and core.dep(0).is_op(ca.OP_SQ) and not core.dep(1).is_constant()
         if is_square and np.isfinite(factor):
             found.append(Square(core.dep(0).dep(0), core.dep(1), factor))
         else:
             rest += term
     return rest, found
+
+
+def _without_factors(term: SX) -> tuple[float, SX]:
+    """Return the product of a term's constant factors, and what they multiply."""
+    factor, core = 1.0, term
+    while True:
+        if core.is_op(ca.OP_NEG) or core.is_op(ca.OP_TWICE):
+            factor, core = factor * (2.0 if core.is_op(ca.OP_TWICE) else -1.0), core.dep(0)
+        elif core.is_op(ca.OP_MUL) and core.dep(0).is_constant():
+            factor, core = factor * float(core.dep(0)), core.dep(1)
+        elif core.is_op(ca.OP_MUL) and core.dep(1).is_constant():
+            factor, core = factor * float(core.dep(1)), core.dep(0)
+        else:
+            return factor, core
 
 
 def slopes_of_square(each: SquareSlopes) -> tuple[FloatArray, FloatArray]:
