@@ -6,20 +6,17 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from ...models.joints.closedform import ClosedForm, closed_form
 from ..case.case import Case
-from ..case.limits.constraint import LENGTH
-from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..interruption import is_requested
 from ..program.layout import Layout
 from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .anyrobot import Ranks, not_judged, prove_ranks, touched
-from .built.builtclaims import built_claims
-from .built.worst import Directions, length_beside
-from .claims import Claim, claims_of, exact_length_name, one_machine_name
+from .builtlegs import as_built, refined
+from .claims import Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
 from .looplimits import loop_extremes
@@ -40,8 +37,6 @@ if TYPE_CHECKING:
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
-#: Gap of the shortest lengths of legs that bounds of errors of joint centres rest on: they change little with it.
-_ROUGH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +240,7 @@ class _Numbers:
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
-        shortest, claims = _as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
+        shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         if legs is None and self.paper is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             own = search(case, self.closed, box)
@@ -255,7 +250,7 @@ class _Numbers:
         yield from self._add_proved(found, layout, claims)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
-            refine = partial(_refined, layout, legs, shortest, claims, again, self.paper)
+            refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
             yield from (each.outcome for each in found[before:])
@@ -303,55 +298,3 @@ def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Outcome]:
     for each in more:
         found.append(each)
         yield each.outcome
-
-
-class _AsBuilt(NamedTuple):
-    """Claims about every machine within the tolerance, and a proven shortest length of the exact machine's legs."""
-
-    shortest: float
-    claims: list[Claim]
-
-
-def _as_built(
-    layout: Layout, workspace: Workspace, legs: Legs | None, claims: list[Claim], prove: Callable[..., Extreme]
-) -> _AsBuilt:
-    """Return claims about every machine within the case's tolerance from those about the exact one."""
-    if legs is None or not legs.tolerance or not claims:
-        return _AsBuilt(0.0, claims)
-    # A proof on paper has these searches beside those of the same lengths that are claims, which have other gaps.
-    names = {k: exact_length_name(leg.name) for k, leg in enumerate(layout.robots[0].legs)}
-    lengths = [
-        replace(each, limit=None, name=names[each.leg])
-        for each in claims
-        if each.leg is not None and each.sense is Sense.MIN
-    ]
-    shortest = min(prove(each, gap=_ROUGH).bound for each in lengths)
-    return _AsBuilt(shortest, built_claims(layout, workspace, legs, claims, shortest))
-
-
-def _refined(
-    layout: Layout,
-    legs: Legs,
-    shortest: float,
-    claims: Sequence[Claim],
-    prove: Callable[..., Extreme],
-    paper: PaperRecord | None,
-    leg: int,
-    sense: Sense,
-    gap: float,
-    about: Directions | None,
-) -> Extreme | None:
-    """Return a length of a leg, proved more finely; None where the work is requested to stop, or none is bounded."""
-    if is_requested():
-        return None
-    claim = next(each for each in claims if each.leg == leg and each.sense is sense)
-    if about is None:
-        return prove(claim, gap=gap)
-    if not shortest > 2 * legs.tolerance:
-        return None
-    sign = 1.0 if sense is Sense.MAX else -1.0
-    expression = length_beside(legs, leg, layout.robots[0], sign, shortest, about)
-    name = one_machine_name(about.claim)
-    if paper is not None:
-        paper.directions[name] = about.base, about.platform
-    return prove(Claim(name, sense, expression, LENGTH), gap=gap)

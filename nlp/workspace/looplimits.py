@@ -18,8 +18,9 @@ from ...models import FloatArray
 from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..errors import UncoveredError
-from .general.cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
+from .general.cells import Cells, Examined, Examiner, joined
 from .general.connected import is_connected
+from .general.covering import in_workspace, whole_workspace
 from .general.limitvalues import Enclosed, LimitValues
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.rank import RankTest

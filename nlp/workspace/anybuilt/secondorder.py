@@ -19,7 +19,8 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from ..general.cells import in_workspace, joined, whole_workspace
+from ..general.cells import joined
+from ..general.covering import in_workspace, whole_workspace
 from ..general.enclosing import Encloser
 from ..general.family import Family
 

@@ -20,8 +20,9 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from .cells import Cells, Examined, Examiner, in_workspace, joined, whole_workspace
+from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
+from .covering import in_workspace, whole_workspace
 from .enclosing import Forms
 from .family import Family
 from .machinepoints import MachinePoints, PointValue

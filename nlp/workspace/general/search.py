@@ -12,8 +12,9 @@ from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached
 from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
-from .cells import Cells, Examined, Examiner, contracted_cells, joined, whole_workspace
+from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
+from .covering import contracted_cells, whole_workspace
 from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
