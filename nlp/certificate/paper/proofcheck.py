@@ -19,7 +19,7 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..kinks import refuse_jumps
 from ..standardform import StandardForm, standard_form
-from .limbs.limbpart import ClaimChecker, LimbPartChecker
+from .limbs.limbpart import ClaimChecker, LimbPartChecker, is_one_square
 from .limbs.sharedcheck import check_shared
 from .proof import Node, Proof, ProofError, fingerprint, is_same_program
 from .prooftree import Claim, read_parts
@@ -73,7 +73,7 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     leaves, pieces, done = sum(len(part.claims) for part in parts), 0, 0
     for part in parts:
         checker: ClaimChecker = _Checker(part.form, part.bound)
-        if part.form is not form:
+        if part.form is not form or is_one_square(form):
             checker = LimbPartChecker(part.form, part.bound, checker)
         groups: dict[tuple[Node, int], list[Claim]] = {}
         for claim in part.claims:

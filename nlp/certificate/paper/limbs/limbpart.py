@@ -9,10 +9,16 @@ import numpy as np
 from ...standardform import StandardForm
 from ..proof import Node, ProofError
 from .limbclaims import LimbChecker, LimbClaims
+from .squares import squares_of
 from .tilts import tilts_over
 
 if TYPE_CHECKING:
     from ..prooftree import Claim
+
+
+def is_one_square(form: StandardForm) -> bool:
+    """Return whether a form's only function has exactly one squared quotient, as that of a single limb mostly has."""
+    return len(form.functions) == 1 and len(squares_of(form.functions[0])[1]) == 1
 
 
 class ClaimChecker(Protocol):
