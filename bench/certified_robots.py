@@ -48,7 +48,9 @@ def row(name: str, limit: float, *, free_pose: bool) -> None:
     gap = "inf" if found.relative_gap is None else f"{found.relative_gap:.1e}"
     unknowns = len(nlp.program.model.unknowns)
     reason = "" if found.reason.startswith("stopped") else found.reason
-    print(f"{name:20} {unknowns:3} {found.status.value:10} {found.boxes:9,} {seconds:7.2f} {gap:8} {reason}", flush=True)
+    print(
+        f"{name:20} {unknowns:3} {found.status.value:10} {found.boxes:9,} {seconds:7.2f} {gap:8} {reason}", flush=True
+    )
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -37,29 +38,48 @@ _TESTS, _SPREAD = 4, 0.02
 #: Part of its size below which a coefficient or a slope is 0 at home: home is on the edge of reach there.
 _EDGE = 1e-6
 _SEED = 0
+#: Number of results that are kept: a certificate needs those of one robot several times.
+_CACHED = 16
 #: Name of one of the equations of a path's loop.
 _LOOP = re.compile(r"loop (\S+) \((\d+)\)")
 
 
-class Eliminated(NamedTuple):
-    """An unknown in closed form.
+class Root(NamedTuple):
+    """The choice of one of two solutions of an equation.
 
     Attributes:
-        index: of the unknown in the model.
-        solved: what replaces it, in the model's parameters and pose.
-        reach: (1, 1) not negative where the equation has a solution, about 1 at home; None where it always has one.
+        equation: name of the equation in the model; empty for one that follows from several.
+        value: (1, 1) its left side, of order 1.
+        slope: (1, 1) the derivative by the unknown with the sign that makes it positive at home.
+        reach: (1, 1) not negative where there are solutions, and 1 at home.
     """
 
-    index: int
-    solved: Solved
-    reach: SX | None
+    equation: str
+    value: SX
+    slope: SX
+    reach: SX
+
+
+class Eliminated(NamedTuple):
+    """An unknown that follows from dimensions, pose, and the unknowns that are held as variables.
+
+    Attributes:
+        place: index of the unknown in the model.
+        solved: what replaces it; None for one that is held as a variable.
+        root: of the equation that determines it; None where there is one solution.
+    """
+
+    place: int
+    solved: Solved | None
+    root: Root | None
 
 
 class _Equation(NamedTuple):
-    """A left side of an equation (k, 1), and the length or number by which it is of order 1."""
+    """Left sides of equations (k, 1), the length or number by which they are of order 1, and the name of one."""
 
     expression: SX
     size: SX
+    name: str = ""
 
 
 @dataclass(eq=False)
@@ -72,24 +92,30 @@ class _Elimination:
         solved: what replaces the unknowns found by now.
         found: these unknowns, in the order in which they were found.
         points: arguments of functions of the symbols: home, then those of the tests.
+        held: indices of unknowns that stay variables where they have two solutions.
+        failed: attempts without success: number of the attempt, and the unknowns that were open.
     """
 
     model: Model
     symbols: list[SX]
     points: list[list[FloatArray]]
+    held: frozenset[int]
     solved: dict[int, Solved] = field(default_factory=dict)
     found: list[Eliminated] = field(default_factory=list)
+    failed: set[tuple[int, ...]] = field(default_factory=set)
 
     def turned(self, equation: _Equation, rotation: FloatArray | None) -> _Equation:
         """Return an equation with numbers in the place of the platform's rotation, where it is given."""
         if rotation is None:
             return equation
         expression = ca.substitute(equation.expression, self.symbols[2], SX(rotation.tolist()))
-        return _Equation(expression, equation.size)
+        return equation._replace(expression=expression)
 
     def open_unknowns(self, expression: SX) -> list[int]:
-        """Return the indices of the unknowns that an expression depends on."""
-        names = {each.element_hash(): k for k, each in enumerate(ca.vertsplit(self.symbols[1]))}
+        """Return the indices of the unknowns that an expression depends on, and that are not determined by now."""
+        known = {each.place for each in self.found}
+        every = enumerate(ca.vertsplit(self.symbols[1]))
+        names = {each.element_hash(): k for k, each in every if k not in known}
         return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)
 
     def replaced(self, expression: SX) -> SX:
@@ -113,32 +139,40 @@ class _Elimination:
             q, size = self.model.unknowns[k].symbol, equation.size / self.model.unknowns[k].size
             if self.is_zero(ca.jacobian(expression, q) / size):
                 expression = ca.substitute(expression, q, SX(0))
-        return _Equation(expression, equation.size)
+        return equation._replace(expression=expression)
 
-    def add(self, index: int, solved: Solved, reach: SX | None) -> None:
+    def add(self, index: int, solved: Solved, root: Root | None = None) -> None:
         """Add an unknown in closed form."""
+        if root is not None and index in self.held:
+            self.found.append(Eliminated(index, None, root))
+            return
         self.solved[index] = solved
-        self.found.append(Eliminated(index, solved, reach))
+        self.found.append(Eliminated(index, solved, root))
 
 
-def eliminated(model: Model, rotation: FloatArray | None = None) -> tuple[Eliminated, ...]:
+@lru_cache(maxsize=_CACHED)
+def eliminated(
+    model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
+) -> tuple[Eliminated, ...]:
     """Return the unknowns of a robot that follow from dimensions and pose in closed form, each in home's solution.
 
     Args:
         model: the robot.
-        rotation: (3, 3) rotation of the platform where it is fixed: more unknowns may follow then.
+        rotation: nine numbers, column by column, of a rotation that is fixed: more unknowns may follow then.
+        held: indices of unknowns that stay variables where they have two solutions; others follow from them.
     """
     if not model.unknowns:
         return ()
     own = Substitution.identity(model)
-    work = _Elimination(model, own.all, _points(model, rotation))
-    gaps = {name: work.turned(gap, rotation) for name, gap in _gaps(model).items()}
-    single = [_Equation(each.expression, each.size) for each in model.distances]
+    turn = None if rotation is None else np.array(rotation).reshape(3, 3, order="F")
+    work = _Elimination(model, own.all, _points(model, turn), held)
+    gaps = {name: work.turned(gap, turn) for name, gap in _gaps(model).items()}
+    single = [_Equation(each.expression, each.size, each.name) for each in model.distances]
     single += [
         _Equation(ca.dot(axis, gap.expression), gap.size) for name, gap in gaps.items() for axis in _axes(model, name)
     ]
-    single += [_Equation(each.expression, each.size) for each in model.closure]
-    single = [work.without_absent(work.turned(each, rotation)) for each in single]
+    single += [_Equation(each.expression, each.size, each.name) for each in model.closure]
+    single = [work.without_absent(work.turned(each, turn)) for each in single]
     while _eliminate_one(work, list(gaps.values()), single):
         pass
     return tuple(work.found)
@@ -146,15 +180,16 @@ def eliminated(model: Model, rotation: FloatArray | None = None) -> tuple[Elimin
 
 def _eliminate_one(work: _Elimination, gaps: Sequence[_Equation], single: Sequence[_Equation]) -> bool:
     """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
-    for given, solve in (
-        *((gap, _from_gap) for gap in gaps),
-        *((each, _from_linear) for each in single),
-        *((each, _from_one) for each in single),
-    ):
-        left = [k for k in work.open_unknowns(given.expression) if k not in work.solved]
-        if not left:
+    attempts = [
+        (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
+    ]
+    for attempt, (solve, given) in enumerate(attempts):
+        left = work.open_unknowns(given.expression)
+        if not left or (attempt, *left) in work.failed:
             continue
-        equation = _Equation(work.replaced(given.expression), given.size)
+        # Repeated only where another unknown is determined by then.
+        work.failed.add((attempt, *left))
+        equation = given._replace(expression=work.replaced(given.expression))
         if len(left) > 1:
             equation = work.without_absent(equation)
             left = work.open_unknowns(equation.expression)
@@ -172,14 +207,14 @@ def _from_gap(work: _Elimination, k: int, gap: _Equation) -> bool:
         c = ca.substitute(e, q, SX(0))
         if not work.is_zero(a * q + c - e) or not _is_positive(work, ca.sumsqr(a * work.model.unknowns[k].size)):
             return False
-        work.add(k, Solved(-ca.dot(a, c) / ca.sumsqr(a), None, None, SX(0)), None)
+        work.add(k, Solved(-ca.dot(a, c) / ca.sumsqr(a), None, None, SX(0)))
         return True
     a, b, c = _harmonics(work, e, q)
     same = ca.vertcat(ca.dot(a, b), ca.sumsqr(a) - ca.sumsqr(b), a * ca.cos(q) + b * ca.sin(q) + c - e)
     if not work.is_zero(same) or not _is_positive(work, ca.sumsqr(a)):
         return False
     cosine, sine = -ca.dot(a, c) / ca.sumsqr(a), -ca.dot(b, c) / ca.sumsqr(b)
-    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), None)
+    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)))
     return True
 
 
@@ -187,10 +222,11 @@ def _from_one(work: _Elimination, k: int, equation: _Equation) -> bool:
     """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
     unknown = work.model.unknowns[k]
     q, e = unknown.symbol, equation.expression / equation.size
-    slope = float(work.values(ca.jacobian(e, q) * unknown.size)[0, 0])
-    if not abs(slope) > _EDGE:
+    slope = ca.jacobian(e, q) * unknown.size
+    at_home = float(work.values(slope)[0, 0])
+    if not abs(at_home) > _EDGE:
         return False
-    sign = 1.0 if slope > 0 else -1.0
+    sign = 1.0 if at_home > 0 else -1.0
     if unknown.dimension is Dimension.ANGLE:
         A, B, C = _harmonics(work, e, q)
         if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
@@ -199,7 +235,9 @@ def _from_one(work: _Elimination, k: int, equation: _Equation) -> bool:
         reach = square - C * C
         root = sign * ca.sqrt(ca.fmax(reach, 0))
         cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
-        work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), _of_order_one(work, reach))
+        work.add(
+            k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), _root(work, equation.name, e, slope / at_home, reach)
+        )
         return True
     c0, c1, c2 = _coefficients(e, q)
     if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
@@ -208,7 +246,7 @@ def _from_one(work: _Elimination, k: int, equation: _Equation) -> bool:
         return False
     reach = c1 * c1 - 4 * c0 * c2
     value = (sign * ca.sqrt(ca.fmax(reach, 0)) - c1) / (2 * c2)
-    work.add(k, Solved(value, None, None, SX(0)), _of_order_one(work, reach))
+    work.add(k, Solved(value, None, None, SX(0)), _root(work, equation.name, e, slope / at_home, reach))
     return True
 
 
@@ -221,7 +259,7 @@ def _from_linear(work: _Elimination, k: int, equation: _Equation) -> bool:
     c0, c1, _ = _coefficients(e, q)
     if not work.is_zero(c0 + c1 * q - e) or not abs(float(work.values(c1 * unknown.size)[0, 0])) > _EDGE:
         return False
-    work.add(k, Solved(-c0 / c1, None, None, SX(0)), None)
+    work.add(k, Solved(-c0 / c1, None, None, SX(0)))
     return True
 
 
@@ -250,9 +288,9 @@ def _angle(sine: SX, cosine: SX) -> SX:
     return 2 * ca.atan(sine / (1 + cosine))
 
 
-def _of_order_one(work: _Elimination, reach: SX) -> SX:
-    """Return a number of an equation's solutions in parts of its value at home, where it is positive."""
-    return reach / float(work.values(reach)[0, 0])
+def _root(work: _Elimination, name: str, value: SX, slope: SX, reach: SX) -> Root:
+    """Return the choice of a solution, with numbers of order 1."""
+    return Root(name, value, slope, reach / float(work.values(reach)[0, 0]))
 
 
 def _is_positive(work: _Elimination, value: SX) -> bool:

@@ -36,6 +36,7 @@ import numpy as np
 from ...errors import InputError
 from ...program.nlp import Nlp
 from ...program.pairs import with_all_pairs
+from ..standardform import standard_form
 
 _FORMAT = "screwsynth-proof"
 _VERSION = 2
@@ -162,12 +163,18 @@ def fingerprint(nlp: Nlp) -> str:
     shares = rng.random((_POINTS, nlp.n))
     points = [nlp.lower + share * (nlp.upper - nlp.lower) for share in shares]
     values = [function(x, nlp.arguments).full().ravel() for x in points]
+    size = nlp.n
+    if nlp.in_home_mode:
+        # Unknowns that follow in closed form are no variables of the tree's boxes.
+        form = standard_form(nlp)
+        size, function = form.n, ca.Function("form", [form.x], [form.expressions])
+        values += [function(form.point_of(x)).full().ravel() for x in points]
     numbers = np.concatenate([*values, nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper])
     # Each number counts by its size and by its sign; one that is not finite by a constant.
     known = np.isfinite(numbers)
     parts = np.where(known, numbers / (1 + np.abs(np.where(known, numbers, 0.0))), np.where(numbers > 0, 2.0, -2.0))
     sums = rng.normal(size=(_SUMS, numbers.size)) @ parts
-    return " ".join([str(nlp.n), str(len(nlp.g_lower)), str(int(nlp.sign)), *(f"{each:.12e}" for each in sums)])
+    return " ".join([str(size), str(len(nlp.g_lower)), str(int(nlp.sign)), *(f"{each:.12e}" for each in sums)])
 
 
 def is_same_program(one: str, other: str) -> bool:
