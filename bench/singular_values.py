@@ -11,8 +11,12 @@ import sys
 import time
 from dataclasses import replace
 
+from pathlib import Path
+
 import numpy as np
-from limbs import ANGLE, machine
+
+sys.path.insert(0, str(Path(__file__).parent))
+from limbs import ANGLE, machine  # noqa: E402
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, formulate, load_case, solve
@@ -46,7 +50,7 @@ def values_at(case: Case, points: list[np.ndarray]) -> np.ndarray:
         state = nlp.program.kernels.robot_state(x, nlp.arguments)
         J, p = np.array(state.jacobian), np.array(state.position).ravel()
         moments = (J[:, 3:] - np.cross(p, J[:, :3])) / LENGTH
-        found.append(np.linalg.svd(np.hstack([J[:, :3], moments]), compute_uv=False))
+        found.append(np.linalg.svd(np.nan_to_num(np.hstack([J[:, :3], moments])), compute_uv=False))
     return np.array(found)
 
 
@@ -63,7 +67,7 @@ def main(limit: float) -> None:
         print(f"{name:10} without limit {best.F:.6g} {plain.boxes:9,} smallest {own[-1]:.4g} to {others[:, -1].max():.4g}",
               f"condition {own[0] / own[-1]:.4g} to {(others[:, 0] / others[:, -1]).min():.4g}", flush=True)
         for what, each in (("smallest", SmallestSingularValue(smallest, LENGTH)), ("condition", ConditionNumber(condition, LENGTH))):
-            with_limit = replace(case, limits=Limits(**{each.key: each}))
+            with_limit = replace(case, limits=Limits(each))
             solution = solve(with_limit, starts=8)
             for gap in GAPS:
                 began = time.process_time()
