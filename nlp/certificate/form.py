@@ -17,11 +17,19 @@ from .lift import Lift
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """A condition ``expression <= 0``, or ``expression = 0``."""
+    """A condition ``expression <= 0``, or ``expression = 0``.
+
+    Attributes:
+        name: in the words of a case.
+        expression: (1, 1).
+        is_equation: whether it must be 0.
+        follows: whether it follows from another one. It excludes boxes, and has no multiplier of its own.
+    """
 
     name: str
     expression: SX
     is_equation: bool
+    follows: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +76,11 @@ class StandardForm:
     def is_equation(self) -> tuple[bool, ...]:
         """Whether each of the R expressions must be 0; false for functions."""
         return (*(False for _ in self.functions), *(condition.is_equation for condition in self.conditions))
+
+    @property
+    def follows(self) -> tuple[bool, ...]:
+        """Whether each of the R expressions is a condition that follows from others."""
+        return (*(False for _ in self.functions), *(condition.follows for condition in self.conditions))
 
     @cached_property
     def expressions(self) -> SX:

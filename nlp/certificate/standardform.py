@@ -24,6 +24,7 @@ from ..program.pairs import with_all_pairs
 from ..program.program import Program
 from .form import Condition, StandardForm
 from .reduction import without_unknowns
+from .spectral import spectral_conditions
 
 __all__ = ["Condition", "StandardForm", "is_in_home_mode", "standard_form"]
 
@@ -62,6 +63,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
     further = _further_loop_equations(program, x, nlp.arguments)
     stated, implied, signs = _conditions(constraints), _conditions(further), _signs(nlp, x)
+    stated += _of_singular_values(nlp, x)
     form = StandardForm(
         nlp=nlp,
         x=x[:count],
@@ -77,6 +79,22 @@ def standard_form(nlp: Nlp) -> StandardForm:
         return form
     loops = _loop_names(program)
     return without_unknowns(form, [*(each for each in stated if each.name in loops), *implied, *signs])
+
+
+def _of_singular_values(nlp: Nlp, x: SX) -> list[Condition]:
+    """Return the conditions that follow from limits on singular values."""
+    program = nlp.program
+    found = [
+        condition
+        for k, each in enumerate(program.constraints)
+        if each.spectral is not None
+        for condition in spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]), float(nlp.g_upper[k]))
+    ]
+    if not found:
+        return []
+    function = ca.Function("minors", [program.x, program.p], [each.expression for each in found])
+    values = function.call([x, SX(ca.DM(nlp.arguments))])
+    return [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
 
 
 def _loop_names(program: Program) -> set[str]:

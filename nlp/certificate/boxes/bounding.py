@@ -100,7 +100,7 @@ class NumpyEngine:
         alone = self._values is not None and objective_tape(form, len(self._tape)) is not None
         self._objective = NumpyEngine(without_conditions(form)) if alone else None
         self.functions = len(form.functions)
-        self.equation = np.array(form.is_equation)
+        self.equation, self._follows = np.array(form.is_equation), np.array(form.follows)
         self.depends = np.array(form.dependence, dtype=bool)
 
     def close(self) -> None:
@@ -117,7 +117,7 @@ class NumpyEngine:
         with np.errstate(all="ignore"):
             if self._values is None:
                 return self._examine(lower, upper, threshold, Cuts.none(lower.shape))
-            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold)
+            first = first_pass(self._values, self.equation, self.functions, lower, upper, threshold, self._follows)
             whole = Remainder.whole(lower, upper)
             result = Examination(
                 verdict=first.verdict,
@@ -238,7 +238,8 @@ class NumpyEngine:
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian: see :func:`.quadratic.multipliers`."""
-        return multipliers(model.b, high, self.equation, self.functions, first)
+        weighed = np.where(self._follows[:, None], -np.inf, high)
+        return multipliers(model.b, weighed, self.equation, self.functions, first)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""

@@ -74,7 +74,7 @@ class KernelEngine:
         rows = search_rows(form, apart=shared is not None)
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form)
         objective = objective_tape(form, len(tape))
-        equation = np.array(form.is_equation, dtype=np.int32)
+        equation = np.where(form.follows, 2, form.is_equation).astype(np.int32)
         depends = np.array(form.dependence, dtype=np.int32)
         self._form = (
             form.n,

@@ -86,7 +86,13 @@ class FirstPass(NamedTuple):
 
 
 def first_pass(
-    tape: Tape, equation: NDArray[np.bool_], functions: int, lower: FloatArray, upper: FloatArray, threshold: float
+    tape: Tape,
+    equation: NDArray[np.bool_],
+    functions: int,
+    lower: FloatArray,
+    upper: FloatArray,
+    threshold: float,
+    follows: NDArray[np.bool_] | None = None,
 ) -> FirstPass:
     """Return the first pass over boxes.
 
@@ -97,13 +103,15 @@ def first_pass(
         lower: (n, B) lower ends.
         upper: (n, B) upper ends.
         threshold: boxes whose bound is at most this are closed.
+        follows: (R,) whether each follows from others, and has no weight; none where it is left out.
     """
     J, forms = functions, enclose_second(tape, lower, upper)
     matrices = _matrices(forms, len(lower))
     size = np.abs(forms.c) + (forms.q - forms.p) + forms.s
     size = size + np.abs(forms.a).sum(axis=1) + np.abs(matrices).sum(axis=(1, 2))
     defined = np.asarray((forms.s[:J] < np.inf).all(axis=0))
-    L = _sum_model(forms, matrices, size, multipliers(forms.a, forms.hi, equation, J))
+    weighed = forms.hi if follows is None else np.where(follows[:, None], -np.inf, forms.hi)
+    L = _sum_model(forms, matrices, size, multipliers(forms.a, weighed, equation, J))
     bound = np.where(defined, np.fmin(forms.hi[:J].min(axis=0), L.bound()), np.inf)
     impossible = (forms.lo > 0) | (equation[:, None] & (forms.hi < 0))
     impossible[:J] = False

@@ -32,7 +32,7 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     Py_ssize_t B = report->B;
     int holds = 1; /* whether every condition holds on the whole box */
     for (int r = J; r < R; r++)
-        holds = holds && !form->equation[r] && x->high[r] < 0;
+        holds = holds && form->equation[r] != 1 && x->high[r] < 0;
     *to = defined + 2 * holds, *(to += B) = x->q_middle, *(to += B) = x->q_rounding;
     for (int k = 0; k < 4; k++)
         for (int i = 0; i < n; i++)
@@ -47,7 +47,7 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
             if (r < J)
                 low = smaller(low, least), high = larger(high, most);
             else if (form->depends[r * n + i] && !(x->high[r] < 0))
-                up |= form->equation[r] || !(most < 0), down |= form->equation[r] || !(least > 0);
+                up |= form->equation[r] == 1 || !(most < 0), down |= form->equation[r] == 1 || !(least > 0);
         }
         *(to += B) = low, *(to += B) = high, *(to += B) = up, *(to += B) = down;
     }
@@ -77,7 +77,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
             bound = smaller(bound, x->high[r]);
             value = passed ? value : smaller(value, middle - error);
         } else {
-            if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] && x->high[r] < 0)))
+            if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] == 1 && x->high[r] < 0)))
                 impossible = r;
             if (!passed && !(middle + error <= 0))
                 value = -INFINITY;
@@ -117,7 +117,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
                 if (r < J)
                     applies = side > 0 ? low > 0 : high < 0;
                 else if (form->depends[r * n + i] && !(x->high[r] < 0) && r != impossible)
-                    applies = !form->equation[r] && (side > 0 ? high < 0 : low > 0);
+                    applies = form->equation[r] != 1 && (side > 0 ? high < 0 : low > 0);
             }
             if (!applies)
                 continue;
@@ -131,7 +131,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         }
     /* Contraction. */
     for (int r = 0; r < R && defined; r++) {
-        if (r < J || form->equation[r])
+        if (r < J || form->equation[r] == 1)
             reach_expression(x, r, 1.0, r < J ? threshold : 0.0);
         if (r >= J)
             reach_expression(x, r, -1.0, 0.0);

@@ -46,7 +46,7 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
             bound = smaller(bound, x->hi[r]);
             value = smaller(value, x->c[r] - x->s[r]);
         } else {
-            if (impossible < 0 && (x->lo[r] > 0 || (form->equation[r] && x->hi[r] < 0)))
+            if (impossible < 0 && (x->lo[r] > 0 || (form->equation[r] == 1 && x->hi[r] < 0)))
                 impossible = r;
             if (!(x->c[r] + x->s[r] <= 0))
                 value = -INFINITY;
@@ -77,7 +77,7 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
         memset(none, 0, (size_t)n * sizeof(double));
         for (int r = 0; r < R; r++)
             for (int side = 1; side >= -1; side -= 2) {
-                if ((r < J && side < 0) || (r >= J && side > 0 && !form->equation[r]))
+                if ((r < J && side < 0) || (r >= J && side > 0 && form->equation[r] != 1))
                     continue;
                 for (int i = 0; i < n; i++)
                     x->fb[i] = side * x->gb[r * n + i];

@@ -40,7 +40,8 @@ static void choose_multipliers(Box *x, const int *equation, int first)
     memcpy(x->left, x->gb, (size_t)n * sizeof(double));
     for (int round = 0; round < (R > 1 ? MULTIPLIER_ROUNDS : 0); round++)
         for (int r = 1; r < R; r++) {
-            if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->high[r] >= 0)))
+            /* A condition that follows from others has no weight: 2 in the place of whether it is an equation. */
+            if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->high[r] >= 0)) || equation[r] == 2)
                 continue;
             double product = 0.0, weight = x->weights[r];
             for (int i = first; i < n; i++)

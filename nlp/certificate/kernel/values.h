@@ -35,7 +35,7 @@ typedef struct {
 
 typedef struct {
     int n, functions, expressions; /* R expressions, the functions first, then the conditions */
-    const int *equation;      /* (R) whether it must be 0 */
+    const int *equation;      /* (R) 1 where it must be 0, 2 where it has no weight */
     const int *depends;       /* (R, n) whether it depends on a variable */
     const double *low, *high; /* (n) ends of the whole box */
     int quotients;       /* terms sign N^2 / D of functions: the rows after the expressions are N and D of each */
