@@ -11,7 +11,8 @@ that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and mem
 (nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their unknowns, rows and actuators), ``outline``
 (corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and ``pictures`` (the drawing), ``structure``
 (its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``closedform``
-(a model without unknowns that follow from the pose in closed form).
+(a model without unknowns that follow from the pose in closed form), ``limbequations``, ``elimination`` and
+``replacing`` (unknowns that follow one after the other, of any dimensions).
 """
 
 from .expression import ExpressionError

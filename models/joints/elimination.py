@@ -5,7 +5,7 @@ A joint's own rotation changes neither a distance from its axis nor a gap along 
 have one unknown less than the gap itself. An unknown follows from one equation, or from the three of the gap:
 
 * an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: one of two solutions, that of home,
-  at which the derivative of the equation has the same sign;
+  at which the derivative of the equation has the same sign; in limbs alone that have a sign of their working mode;
 * an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
   and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
 
@@ -17,8 +17,7 @@ the edge of reach too; a search excludes what is beyond by ``v >= 0``.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -27,7 +26,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .. import Dimension, FloatArray, Model, Substitution
+from .. import Dimension, FloatArray, Model, Substitution, Unknown
+from .limbequations import Equation, axes_of, gaps_of, limb_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
@@ -40,8 +40,6 @@ _EDGE = 1e-6
 _SEED = 0
 #: Number of results that are kept: a certificate needs those of one robot several times.
 _CACHED = 16
-#: Name of one of the equations of a path's loop.
-_LOOP = re.compile(r"loop (\S+) \((\d+)\)")
 
 
 class Root(NamedTuple):
@@ -74,14 +72,6 @@ class Eliminated(NamedTuple):
     root: Root | None
 
 
-class _Equation(NamedTuple):
-    """Left sides of equations (k, 1), the length or number by which they are of order 1, and the name of one."""
-
-    expression: SX
-    size: SX
-    name: str = ""
-
-
 @dataclass(eq=False)
 class _Elimination:
     """The state of an elimination.
@@ -104,7 +94,7 @@ class _Elimination:
     found: list[Eliminated] = field(default_factory=list)
     failed: set[tuple[int, ...]] = field(default_factory=set)
 
-    def turned(self, equation: _Equation, rotation: FloatArray | None) -> _Equation:
+    def turned(self, equation: Equation, rotation: FloatArray | None) -> Equation:
         """Return an equation with numbers in the place of the platform's rotation, where it is given."""
         if rotation is None:
             return equation
@@ -132,7 +122,7 @@ class _Elimination:
         found = self.values(ca.vertcat(ca.vec(expression), SX(size)))
         return bool(np.all(np.abs(found[:, :-1]) <= _SAME * (1 + np.abs(found[:, -1:]))))
 
-    def without_absent(self, equation: _Equation) -> _Equation:
+    def without_absent(self, equation: Equation) -> Equation:
         """Return an equation with zeros in the place of unknowns on which its value does not depend."""
         expression = equation.expression
         for k in self.open_unknowns(expression):
@@ -166,19 +156,21 @@ def eliminated(
     own = Substitution.identity(model)
     turn = None if rotation is None else np.array(rotation).reshape(3, 3, order="F")
     work = _Elimination(model, own.all, _points(model, turn), held)
-    gaps = {name: work.turned(gap, turn) for name, gap in _gaps(model).items()}
-    single = [_Equation(each.expression, each.size, each.name) for each in model.distances]
+    gaps = {name: work.turned(gap, turn) for name, gap in gaps_of(model).items()}
+    single = [Equation(each.expression, each.size, limb_of(each.name), each.name) for each in model.distances]
     single += [
-        _Equation(ca.dot(axis, gap.expression), gap.size) for name, gap in gaps.items() for axis in _axes(model, name)
+        Equation(ca.dot(axis, gap.expression), gap.size, gap.limb)
+        for name, gap in gaps.items()
+        for axis in axes_of(model, name)
     ]
-    single += [_Equation(each.expression, each.size, each.name) for each in model.closure]
+    single += [Equation(each.expression, each.size, limb_of(each.name), each.name) for each in model.closure]
     single = [work.without_absent(work.turned(each, turn)) for each in single]
     while _eliminate_one(work, list(gaps.values()), single):
         pass
     return tuple(work.found)
 
 
-def _eliminate_one(work: _Elimination, gaps: Sequence[_Equation], single: Sequence[_Equation]) -> bool:
+def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequence[Equation]) -> bool:
     """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
     attempts = [
         (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
@@ -198,7 +190,7 @@ def _eliminate_one(work: _Elimination, gaps: Sequence[_Equation], single: Sequen
     return False
 
 
-def _from_gap(work: _Elimination, k: int, gap: _Equation) -> bool:
+def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
     """Eliminate an unknown on which a gap (3, 1) depends linearly, by its sine and cosine or by itself."""
     q, e = work.model.unknowns[k].symbol, gap.expression / gap.size
     slope = ca.jacobian(e, q)
@@ -218,39 +210,52 @@ def _from_gap(work: _Elimination, k: int, gap: _Equation) -> bool:
     return True
 
 
-def _from_one(work: _Elimination, k: int, equation: _Equation) -> bool:
+def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
     """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
     unknown = work.model.unknowns[k]
+    if all(each.limb != equation.limb for each in work.model.signs if each.is_mode):
+        # A limb without a sign of its mode is covered in every mode.
+        return False
     q, e = unknown.symbol, equation.expression / equation.size
     slope = ca.jacobian(e, q) * unknown.size
     at_home = float(work.values(slope)[0, 0])
     if not abs(at_home) > _EDGE:
         return False
-    sign = 1.0 if at_home > 0 else -1.0
-    if unknown.dimension is Dimension.ANGLE:
-        A, B, C = _harmonics(work, e, q)
-        if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
-            return False
-        square = A * A + B * B
-        reach = square - C * C
-        root = sign * ca.sqrt(ca.fmax(reach, 0))
-        cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
-        work.add(
-            k, Solved(_angle(sine, cosine), sine, cosine, SX(0)), _root(work, equation.name, e, slope / at_home, reach)
-        )
-        return True
-    c0, c1, c2 = _coefficients(e, q)
-    if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
+    solve = _angle_of if unknown.dimension is Dimension.ANGLE else _slide_of
+    solved, reach = solve(work, unknown, e, 1.0 if at_home > 0 else -1.0)
+    if solved is None:
         return False
-    if not abs(float(work.values(c2 * unknown.size**2)[0, 0])) > _EDGE:
-        return False
-    reach = c1 * c1 - 4 * c0 * c2
-    value = (sign * ca.sqrt(ca.fmax(reach, 0)) - c1) / (2 * c2)
-    work.add(k, Solved(value, None, None, SX(0)), _root(work, equation.name, e, slope / at_home, reach))
+    root = Root(equation.name, e, slope / at_home, reach / float(work.values(reach)[0, 0]))
+    work.add(k, solved, root)
     return True
 
 
-def _from_linear(work: _Elimination, k: int, equation: _Equation) -> bool:
+def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
+    """Return the angle with ``A cos q + B sin q + C = 0`` and a slope of a sign, and its reach; None without one."""
+    q = unknown.symbol
+    A, B, C = _harmonics(work, e, q)
+    if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
+        return None, SX(0)
+    square = A * A + B * B
+    reach = square - C * C
+    root = sign * ca.sqrt(ca.fmax(reach, 0))
+    cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
+    return Solved(_angle(sine, cosine), sine, cosine, SX(0)), reach
+
+
+def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
+    """Return the slide with ``c0 + c1 q + c2 q^2 = 0`` and a slope of a sign, and its reach; None without one."""
+    q = unknown.symbol
+    c0, c1, c2 = _coefficients(e, q)
+    if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
+        return None, SX(0)
+    if not abs(float(work.values(c2 * unknown.size**2)[0, 0])) > _EDGE:
+        return None, SX(0)
+    reach = c1 * c1 - 4 * c0 * c2
+    return Solved((sign * ca.sqrt(ca.fmax(reach, 0)) - c1) / (2 * c2), None, None, SX(0)), reach
+
+
+def _from_linear(work: _Elimination, k: int, equation: Equation) -> bool:
     """Eliminate a slide on which one equation (1, 1) depends linearly."""
     unknown = work.model.unknowns[k]
     if unknown.dimension is Dimension.ANGLE:
@@ -288,41 +293,9 @@ def _angle(sine: SX, cosine: SX) -> SX:
     return 2 * ca.atan(sine / (1 + cosine))
 
 
-def _root(work: _Elimination, name: str, value: SX, slope: SX, reach: SX) -> Root:
-    """Return the choice of a solution, with numbers of order 1."""
-    return Root(name, value, slope, reach / float(work.values(reach)[0, 0]))
-
-
 def _is_positive(work: _Elimination, value: SX) -> bool:
     """Return whether a coefficient (1, 1) of order 1 is positive at home."""
     return bool(float(work.values(value)[0, 0]) > _EDGE)
-
-
-def _gaps(model: Model) -> dict[str, _Equation]:
-    """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
-
-    Any three equations of a path would do, as its gap is read off by its form alone: others have another one.
-    """
-    parts: dict[str, dict[int, _Equation]] = {}
-    for each in (*model.loops, *model.closure):
-        match = _LOOP.match(each.name)
-        if match is not None:
-            parts.setdefault(match[1], {}).setdefault(int(match[2]), _Equation(each.expression, each.size))
-    first = {name: [own[k] for k in (1, 2, 3) if k in own] for name, own in parts.items()}
-    return {
-        name: _Equation(ca.vertcat(*[each.expression for each in own]), own[0].size)
-        for name, own in first.items()
-        if len(own) == 3
-    }
-
-
-def _axes(model: Model, name: str) -> Iterator[SX]:
-    """Yield the current direction (3, 1) of each rotation of a path's limb."""
-    for each in model.joint_screws:
-        if each.limb == name.partition(".")[0] and not each.is_nested:
-            for k in range(each.all.shape[1]):
-                if not each.all[:3, k].is_zero():
-                    yield each.all[:3, k]
 
 
 def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]:
