@@ -1,13 +1,14 @@
-"""Conditions that follow from limits on singular values, and that exclude wide boxes.
+"""Conditions that follow from a limit on the smallest singular value, and that exclude wide boxes.
 
-The limits are on estimates of the smallest and largest eigenvalue of ``A = J'J`` that take thousands of operations. An
-enclosure of these is of use on small boxes alone. Where they hold,
+The limit is on an estimate of the smallest eigenvalue of ``A = J'J`` that takes thousands of operations. An enclosure
+of it is of use on small boxes alone. The estimate is from below, so that where it is at least ``s^2``
 
-    M = A - r I   has no negative eigenvalue,   r = s^2,  or  r = l / c^2  with  l = tr A^4 / tr A^3 <= lambda_max,
+    M = A - s^2 I   has no negative eigenvalue.
 
-with the smallest singular value s, or the condition number c: the estimates are on the safe side. So no principal minor
-of M is negative. Minors are polynomials in J, whose terms cancel in forms of second order. By interlacing a box with
-two eigenvalues of M below 0, where the determinant is positive, has smaller minors that are negative.
+So no principal minor of M is negative. Minors are polynomials in J, whose terms cancel in forms of second order. By
+interlacing a box with two eigenvalues of M below 0, where the determinant is positive, has smaller minors that are
+negative. For condition numbers the like, with ``tr A^4 / (c^2 tr A^3)`` in the place of ``s^2``, excludes wide boxes
+too, but saved no boxes of a search.
 """
 
 from __future__ import annotations
@@ -25,35 +26,24 @@ from .form import Condition
 #: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
 #: gain nothing more, as few poses have so many small singular values.
 _ORDERS = (4, 5, 6)
-#: Part of itself by which r is smaller than stated: rounding of its numbers.
+#: Part of itself by which s^2 is smaller than stated: rounding of its numbers.
 _ROUNDING = 1e-9
 _SIZE = 6
 
 
-def spectral_conditions(name: str, spectral: Spectral, lower: float, upper: float) -> Iterator[Condition]:
-    """Yield conditions on the minors of a matrix that is a function of J.
+def spectral_conditions(name: str, spectral: Spectral, lower: float) -> Iterator[Condition]:
+    """Yield conditions on the minors of a matrix that is a function of J; none for a condition number.
 
     Args:
         name: of the constraint.
         spectral: what the constraint is on.
         lower: lower bound of the smallest eigenvalue; not finite without one.
-        upper: upper bound of minus the ratio of eigenvalues; not finite without one.
     """
+    if spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+        return
     scale = SX([1, 1, 1, *[1 / spectral.length] * 3])
     J = spectral.matrix @ ca.diag(scale)
-    A = J.T @ J
-    if spectral.end is End.SMALLEST:
-        if not (np.isfinite(lower) and lower > 0):
-            return
-        least = SX(lower)
-    else:
-        if not (np.isfinite(upper) and upper < 0):
-            return
-        square = A @ A
-        # A is divided by nothing: both traces are sums of products of entries of A and of its square.
-        least = -upper * ca.sumsqr(square) / ca.sum1(ca.sum2(square * A))
-    M = A - (1 - _ROUNDING) * least * SX.eye(_SIZE)
-    minors = _Minors(M)
+    minors = _Minors(J.T @ J - (1 - _ROUNDING) * lower * SX.eye(_SIZE))
     for order in _ORDERS:
         for chosen in combinations(range(_SIZE), order):
             places = "".join(str(k + 1) for k in chosen)

@@ -82,13 +82,13 @@ def standard_form(nlp: Nlp) -> StandardForm:
 
 
 def _of_singular_values(nlp: Nlp, x: SX) -> list[Condition]:
-    """Return the conditions that follow from limits on singular values."""
+    """Return the conditions that follow from limits on the smallest singular value."""
     program = nlp.program
     found = [
         condition
         for k, each in enumerate(program.constraints)
         if each.spectral is not None
-        for condition in spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]), float(nlp.g_upper[k]))
+        for condition in spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]))
     ]
     if not found:
         return []

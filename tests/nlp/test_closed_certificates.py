@@ -9,7 +9,7 @@ import pytest
 from screwsynth.models import Dimension, Model, hexapod, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, certify, formulate, solve
-from screwsynth.nlp.case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.certificate import standardform
 from screwsynth.nlp.certificate.boxes.engines import engine_for
 from screwsynth.nlp.certificate.boxes.examination import Verdict
@@ -116,7 +116,7 @@ def test_a_proof_without_unknowns_is_checked() -> None:
     assert check_proof(proof, found.certificate.nlp).leaves > 1
 
 
-def hexapod_with(limit: SmallestSingularValue | ConditionNumber | None) -> Case:
+def hexapod_with(limit: SmallestSingularValue) -> Case:
     """A hexapod with its pose free by far, and a limit on singular values."""
     angles = np.radians([-10, 10, 110, 130, 230, 250])
     parameters = {}
@@ -125,17 +125,12 @@ def hexapod_with(limit: SmallestSingularValue | ConditionNumber | None) -> Case:
         parameters[f"base_{k + 1}"] = (26.5 * np.array([np.cos(angle), np.sin(angle), 0.0])).tolist()
         parameters[f"platform_{k + 1}"] = (11.5 * np.array([np.cos(turned), np.sin(turned), 0.0])).tolist()
     position = [Free(-10.0, 10.0), Free(-10.0, 10.0), Free(12.0, 28.0)]
-    limits = Limits() if limit is None else Limits(limit)
     rotation = Rotation(axis=None, angle=Free(-0.7, 0.7))
-    return Case(hexapod(), parameters, position, [Task(TWIST, "min")], rotation=rotation, limits=limits)  # type: ignore[arg-type]
+    return Case(hexapod(), parameters, position, [Task(TWIST, "min")], rotation=rotation, limits=Limits(limit))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    "limit", [SmallestSingularValue(0.8, 10.0), ConditionNumber(2.5, 10.0)], ids=["least", "ratio"]
-)
-def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit(
-    limit: SmallestSingularValue | ConditionNumber,
-) -> None:
+def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
+    limit = SmallestSingularValue(0.8, 10.0)
     form = standard_form(formulate(hexapod_with(limit)))
     follows = np.array([each.follows for each in form.conditions])
     assert follows.sum() == 22
@@ -148,8 +143,6 @@ def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit(
     assert 20 < kept.sum() < 380
     assert np.all(h[kept][:, follows] <= 0)
     assert np.mean((h[~kept][:, follows] > 0).any(axis=1)) > 0.7
-    if isinstance(limit, ConditionNumber):
-        return
     # Boxes around poses that are far from keeping the limit: the estimate excludes none of them.
     bad = points[np.argsort(-h[:, k])[:4]].T
     half = np.array([[0.3], [0.3], [0.3], [0.015], [0.015], [0.015]])
