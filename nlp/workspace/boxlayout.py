@@ -40,6 +40,7 @@ def box_layout(case: Case, box: PoseBox, chosen: Sequence[int]) -> Layout:
         displacements=(HERE,),
         further=(),
         workspace=None,
+        joint_centre_tolerance=None,
     )
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
