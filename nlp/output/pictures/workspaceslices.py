@@ -77,7 +77,8 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     for k, each in enumerate(slices):
         _paint(figure.add_subplot(rows, columns, k + 1), case, each, kinds)
     title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
-    words = [*title, "slices through the middle of the workspace"]
+    whose = " for the design itself, without its tolerance" if case.joint_centre_tolerance else ""
+    words = [*title, f"slices through the middle of the workspace{whose}"]
     figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
     handles = [
         Patch(facecolor=kind.colour, edgecolor=INK, linewidth=0.4, hatch=kind.hatch, label=legible(kind.words))

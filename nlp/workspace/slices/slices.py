@@ -78,6 +78,7 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
         CaseError: the case has no workspace, a free dimension, fewer than two numbers that the robot can choose, or a
             robot whose loops are not closed in the middle of the workspace.
     """
+    case = replace(case, joint_centre_tolerance=None)
     workspace, legs = workspace_of_case(case), legs_of(case)
     box = pose_box(workspace)
     wide = pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace))))
