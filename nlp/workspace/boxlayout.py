@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import casadi as ca
@@ -16,6 +15,7 @@ from ..case.workspace import TurnKind
 from ..program.layout import Layout, StatedPoseSymbols, lay_out
 from ..program.places import SymbolTable
 from .posebox import PoseBox
+from .posed import at_one_pose
 
 
 class _Quaternion(NamedTuple):
@@ -33,15 +33,7 @@ def box_layout(case: Case, box: PoseBox, chosen: Sequence[int]) -> Layout:
     values: list[Value] = [
         Free(float(box.lower[k]), float(box.upper[k])) if k in chosen else float(middle[k]) for k in range(6)
     ]
-    one = replace(
-        case,
-        position=tuple(values[:3]),
-        rotation=Rotation(None, 0.0),
-        displacements=(HERE,),
-        further=(),
-        workspace=None,
-        joint_centre_tolerance=None,
-    )
+    one = at_one_pose(case, tuple(values[:3]), Rotation(None, 0.0))
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
         """Add a pose whose rotation is in the coordinates of the box."""

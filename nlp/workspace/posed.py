@@ -11,7 +11,7 @@ from casadi import SX
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.pose import HERE, Pose, Rotation
+from ..case.pose import HERE, Pose, Rotation, Value
 from ..case.task import Sense
 from ..case.workspace import TurnKind, Workspace
 from ..program.assembly import assemble
@@ -23,6 +23,19 @@ from ..program.sampling import starting_points
 #: Number of points from which the size of an expression is taken.
 _POINTS = 33
 _SEED = 0
+
+
+def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Case:
+    """Return the exact machine of a case at one pose, without a workspace."""
+    return replace(
+        case,
+        position=position,
+        rotation=rotation,
+        displacements=(HERE,),
+        further=(),
+        workspace=None,
+        joint_centre_tolerance=None,
+    )
 
 
 def posed_layout(case: Case, workspace: Workspace) -> Layout:
@@ -37,15 +50,7 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
     rotation = Rotation(None, turns.angles[0] if turns.kind is TurnKind.ANY_AXIS else 0.0)
     if turns.kind is TurnKind.AXIS:
         rotation = Rotation(turns.axis, turns.angles[0])
-    one = replace(
-        case,
-        position=workspace.position,
-        rotation=rotation,
-        displacements=(HERE,),
-        further=(),
-        workspace=None,
-        joint_centre_tolerance=None,
-    )
+    one = at_one_pose(case, workspace.position, rotation)
 
     def add_turns(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
         """Add a pose whose rotation is by roll, pitch and yaw."""

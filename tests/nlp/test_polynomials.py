@@ -1,13 +1,12 @@
 """The checker's polynomials of second order against 200-bit balls, and what becomes of undefined values."""
 
-import importlib.util
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
+from random_graphs import N, random_function
 
 from screwsynth.models import robot_function
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate, load_case
@@ -22,37 +21,7 @@ from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.solver.certified import certify, program_of, proof_of
 
 flint = pytest.importorskip("flint")
-_spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
-assert _spec is not None
-assert _spec.loader is not None
-balls = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(balls)
-
-UNARY = (
-    ca.sin, ca.cos, ca.sqrt, ca.exp, ca.log, ca.atan, ca.tan, ca.asin, ca.acos, ca.sumsqr,
-    ca.fabs, ca.sign, lambda x: -x, lambda x: 2 * x, lambda x: 1 / x, lambda x: x**3, lambda x: x**-2, lambda x: x**1.5,
-)  # fmt: skip
-BINARY = (
-    lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y, lambda x, y: x / y, ca.atan2, ca.hypot,
-    ca.fmin, ca.fmax, lambda x, y: x <= y,
-)  # fmt: skip
-N = 3
-
-
-def random_function(rng: np.random.Generator, steps: int) -> ca.Function:
-    """A graph of random operations on three variables and constants; every value is a result."""
-    x = ca.SX.sym("x", N)
-    values = list(ca.vertsplit(x))
-    while len(values) < N + steps:
-        one = values[rng.integers(len(values))]
-        if rng.random() < 0.45:
-            value = UNARY[rng.integers(len(UNARY))](one)
-        else:
-            other = ca.SX(float(rng.normal())) if rng.random() < 0.3 else values[rng.integers(len(values))]
-            value = BINARY[rng.integers(len(BINARY))](*((one, other) if rng.random() < 0.5 else (other, one)))
-        if not value.is_constant():
-            values.append(value)
-    return ca.Function("random", [x], [ca.densify(ca.vertcat(*values[N:]))])
+balls = pytest.importorskip("balls")
 
 
 def is_outside(each: Polynomial, box: int, ball: object, e: list[object]) -> tuple[bool, bool]:

@@ -1,8 +1,6 @@
 """Models of squared quotients from those of N and D, against values in 200-bit balls and against gradients."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -20,11 +18,7 @@ from screwsynth.nlp.certificate.separation import terms_of
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
-_spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
-assert _spec is not None
-assert _spec.loader is not None
-balls = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(balls)
+balls = pytest.importorskip("balls")
 
 ENGINES = ["numpy", pytest.param("c", marks=pytest.mark.skipif(kernel() is None, reason="no C kernel here"))]
 

@@ -1,6 +1,5 @@
 """Regular poses of any robot: closed forms, forms of entries, relations of dependent coordinates, verdicts."""
 
-import importlib.util
 import json
 import math
 from collections.abc import Iterator
@@ -32,11 +31,7 @@ from screwsynth.nlp.workspace.numbers.boundsearch import prove_minimum
 from screwsynth.nlp.workspace.posebox import pose_box
 from screwsynth.nlp.workspace.verdict import Outcome
 
-_spec = importlib.util.spec_from_file_location("balls", Path(__file__).with_name("balls.py"))
-assert _spec is not None
-assert _spec.loader is not None
-balls = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(balls)
+balls = pytest.importorskip("balls")
 
 #: A robot of each kind: cranks, slides, members, parasitic motions, parallel rods, a platform in a plane.
 ROBOTS = ("6-rus", "6-pus", "delta", "3-rps", "3-upu", "exechon", "tricept", "planar-3-rrr", "4-upu", "spherical-3-rrr")

@@ -1,11 +1,9 @@
 """Forms of second order against 200-bit ball arithmetic, and the first pass in both engines."""
 
-import importlib.util
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
+import random_graphs
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
@@ -23,17 +21,7 @@ from screwsynth.nlp.errors import UncoveredError
 flint = pytest.importorskip("flint")
 
 
-def _load(name: str) -> object:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-balls = _load("balls")
-graphs = _load("test_enclosure")
+balls = pytest.importorskip("balls")
 
 
 def count_violations(tape: Tape, lower: np.ndarray, upper: np.ndarray, seed: int) -> tuple[int, int, int]:
@@ -77,8 +65,8 @@ def count_violations(tape: Tape, lower: np.ndarray, upper: np.ndarray, seed: int
 def test_random_graphs_stay_inside_their_forms_of_second_order() -> None:
     finite = 0
     for seed in range(24):
-        tape = compile_tape(graphs.random_function(seed, 24))
-        bad, _, some = count_violations(tape, *graphs.random_boxes(seed + 1, 10), seed)
+        tape = compile_tape(random_graphs.random_function(seed, 24))
+        bad, _, some = count_violations(tape, *random_graphs.random_boxes(seed + 1, 10), seed)
         assert bad == 0
         finite += some
     assert finite > 2000
@@ -119,18 +107,18 @@ def test_a_form_without_its_rounding_or_its_third_order_is_caught(fault: str, mo
         )
     found = 0
     for seed in range(12):
-        tape = compile_tape(graphs.random_function(seed, 24))
-        found += count_violations(tape, *graphs.random_boxes(seed + 1, 10), seed)[0]
+        tape = compile_tape(random_graphs.random_function(seed, 24))
+        found += count_violations(tape, *random_graphs.random_boxes(seed + 1, 10), seed)[0]
     assert found > 10
 
 
 def random_form(seed: int) -> StandardForm:
     """A random graph as a function and two conditions; where it is undefined does not matter."""
-    function = graphs.random_function(seed, 9)
-    x = ca.SX.sym("x", graphs.N)
+    function = random_graphs.random_function(seed, 9)
+    x = ca.SX.sym("x", random_graphs.N)
     values = ca.vertsplit(function(x))
     conditions = tuple(Condition(f"h{k}", values[-1 - k] - 1.0, is_equation=k == 1) for k in range(2))
-    ends = np.full(graphs.N, 4.0)
+    ends = np.full(random_graphs.N, 4.0)
     nlp = formulate(load_case("paper-4.2-rotation"))
     return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions, (), 1.0, has_epigraph=False)
 
@@ -146,7 +134,7 @@ def test_the_first_pass_is_the_same_in_both_engines_on_random_graphs() -> None:
         assert module is not None
         if not any(any(row) for row in form.dependence[1:]) or ca.jacobian(form.expressions, form.x).is_constant():
             continue
-        lower, upper = graphs.random_boxes(seed + 1, 40)
+        lower, upper = random_graphs.random_boxes(seed + 1, 40)
         try:
             reference = NumpyEngine(form)
         except UncoveredError:  # a graph whose value jumps

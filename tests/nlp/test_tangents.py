@@ -1,9 +1,6 @@
 """Tangents to the squares of a minimum: against 200-bit ball arithmetic, in both engines, and what they save."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
-from types import ModuleType
 
 import casadi as ca
 import numpy as np
@@ -27,16 +24,7 @@ from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 flint = pytest.importorskip("flint")
 
 
-def _load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-balls = _load("balls")
+balls = pytest.importorskip("balls")
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 NAMES = ("paper-4.3", "drilling-spindle", "two poses")
 

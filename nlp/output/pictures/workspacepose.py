@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ....models import Dimension
 from ...case.case import Case
-from ...case.pose import HERE, Rotation
+from ...case.pose import Rotation
 from ...evidence.closing import closed_start
 from ...evidence.state import evaluate
 from ...program.formulation import formulate_each
 from ...results.workspaceposes import PosedClaim
+from ...workspace.posed import at_one_pose
 from ...workspace.verdict import Outcome
 from .drawing import Drawing, drawing_of
 
@@ -27,15 +26,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
     """
     pose = claim.pose
     angle = case.units.to_internal(pose.angle, Dimension.ANGLE)
-    posed = replace(
-        case,
-        position=tuple(pose.position),
-        rotation=Rotation(tuple(pose.axis), angle),
-        displacements=(HERE,),
-        further=(),
-        workspace=None,
-        joint_centre_tolerance=None,
-    )
+    posed = at_one_pose(case, tuple(pose.position), Rotation(tuple(pose.axis), angle))
     nlp = formulate_each(posed)[0]
     x = closed_start(nlp)
     headline = f"{claim.outcome.value}: {claim.words}"

@@ -17,6 +17,7 @@ from ...program.places import SymbolTable
 from ..general.family import BuiltModel, Family
 from ..general.problem import rotation_of
 from ..posebox import PoseBox
+from ..posed import at_one_pose
 
 
 def box_layout(case: Case, box: PoseBox) -> Layout:
@@ -30,15 +31,7 @@ def box_layout(case: Case, box: PoseBox) -> Layout:
     position = tuple(
         Free(float(box.lower[k]), float(box.upper[k])) if k in box.free else float(middle[k]) for k in range(3)
     )
-    one = replace(
-        case,
-        position=position,
-        rotation=Rotation(None, 0.0),
-        displacements=(HERE,),
-        further=(),
-        workspace=None,
-        joint_centre_tolerance=None,
-    )
+    one = at_one_pose(case, position, Rotation(None, 0.0))
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
         """Add a pose with the box's coordinates of its rotation."""
