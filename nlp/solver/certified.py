@@ -9,8 +9,8 @@ from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
-from ..certificate.boxes.bounding import search_tape
 from ..certificate.boxes.proofwriter import ProofWriter
+from ..certificate.boxes.tapes import search_tape
 from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
 from ..certificate.certificate import Certificate, CertificateStatus
 from ..certificate.paper.proof import Proof, Statement, fingerprint

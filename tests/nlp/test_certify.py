@@ -15,9 +15,10 @@ from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.certificate.boxes import bounding, firstpass, tangents
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine, search_tape
+from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
 from screwsynth.nlp.certificate.boxes.engines import engine_for, kernel
 from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
+from screwsynth.nlp.certificate.boxes.tapes import search_tape
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.enclosing import quadratic

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from random_graphs import N, random_boxes, random_function
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import search_tape
+from screwsynth.nlp.certificate.boxes.tapes import search_tape
 from screwsynth.nlp.certificate.enclosing import enclosure, intervals, univariate
 from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape

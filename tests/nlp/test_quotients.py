@@ -8,8 +8,9 @@ import pytest
 from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine, search_tape
+from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
 from screwsynth.nlp.certificate.boxes.engines import kernel, limb_engine_for
+from screwsynth.nlp.certificate.boxes.tapes import search_tape
 from screwsynth.nlp.certificate.enclosing import quotients
 from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
 from screwsynth.nlp.certificate.enclosing.quadratic import GradientModel

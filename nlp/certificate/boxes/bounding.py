@@ -17,67 +17,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import casadi as ca
 import numpy as np
 
 from ..enclosing.enclosure import Enclosures, Midpoints, enclose, midpoints
-from ..enclosing.instructions import compile_tape
 from ..enclosing.intervals import ULP
 from ..enclosing.quadratic import GradientModel, QuadraticModel, affine_ends_reaching, multipliers, ranges
-from ..enclosing.quotients import SearchRows, search_rows, with_quotients
-from ..enclosing.tape import Tape
-from ..kinks import refuse_jumps
+from ..enclosing.quotients import search_rows, with_quotients
 from ..standardform import StandardForm
 from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
-from .firstpass import LINEAR, MOST_VARIABLES, Cuts, FirstPass, first_pass, value_tape, without_conditions
+from .firstpass import LINEAR, Cuts, FirstPass, first_pass, value_tape, without_conditions
 from .tangents import tangent_rows
+from .tapes import objective_tape, search_tape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
-from ...errors import UncoveredError
 
-#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
-_MANY_CONDITIONS = 4
 #: Part of a side below which a contraction is not worth its leaf in a proof.
 _WORTH = 0.1
-
-
-def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
-    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
-
-    Raises:
-        UncoveredError: an expression holds an operation without a rule, or its value jumps.
-    """
-    try:
-        rows = search_rows(form, apart=False) if rows is None else rows
-        refuse_jumps(rows.expressions, form.x)
-        return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
-    except UncoveredError as error:
-        raise UncoveredError(error.operation, _uncovered_limit(form)) from None
-
-
-def objective_tape(form: StandardForm, length: int) -> Tape | None:
-    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
-    if form.n > MOST_VARIABLES or not form.conditions:
-        return None
-    tape = search_tape(without_conditions(form))
-    return tape if len(tape) * _MANY_CONDITIONS <= length else None
-
-
-def _uncovered_limit(form: StandardForm) -> str | None:
-    """Return the key of the limit whose expressions hold an operation without a rule; None where the robot's do."""
-    keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
-    whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
-    for k, key in enumerate(whose):
-        row = form.expressions[k]
-        try:
-            refuse_jumps(row, form.x)
-            compile_tape(ca.Function("row", [form.x], [row, ca.densify(ca.jacobian(row, form.x)).T]))
-        except UncoveredError:
-            return None if key is None else f"limits.{key}"
-    return None
 
 
 class NumpyEngine:

@@ -14,10 +14,11 @@ from ..enclosing.quotients import search_rows
 from ..enclosing.tape import Tape
 from ..limbs.limbmodels import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
 from ..standardform import StandardForm
-from .bounding import NumpyEngine, objective_tape, search_tape
+from .bounding import NumpyEngine
 from .examination import Examination, Verdict
 from .firstpass import value_tape
 from .tangents import tangent_rows
+from .tapes import objective_tape, search_tape
 from .threads import Threads, pieces
 
 if TYPE_CHECKING:

@@ -24,20 +24,18 @@ from ...results.wording import (
     task_words,
     tolerance_line,
 )
-from ..pictures.style import RATE_COLOURS
 from .exploration import optima, surroundings
-from .frames import ViewData
 from .judgement import certificate_section, evidence_section, published_section, workspace_section
-from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
-from .poseviews import drawings, pose_controls
+from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
+from .robotview import robot_section
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
     """Return the anchor, heading and content of every section that has content."""
     found = [
         ("case", "The case in words", _case(report)),
-        ("robot", "The robot and its motion", _robot(report)),
+        ("robot", "The robot and its motion", robot_section(report)),
         ("result", "Result", _result(report)),
         ("limits", "Limits: margins and costs", _limits(report)),
         ("optima", "Optima found", optima(report)),
@@ -112,127 +110,6 @@ def _case(report: Report) -> Markup:
     if names:
         lines.append(f"Searched from {counted(search.starts, 'starting point')}, seed {search.seed}.")
     return paragraphs(lines)
-
-
-def _robot(report: Report) -> Markup:
-    """Return the 3-D view with its controls, its legend and the rates."""
-    views = [view for part in report.parts for view in part.views]
-    if not views:
-        return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
-    first = views[0]
-    head: list[Markup] = []
-    if not report.is_answer:
-        head.append(tag("p", "This is what was reached, and not an optimum.", class_="warning"))
-    if len(report.parts) > 1:
-        options = [tag("option", part.name, value=k) for k, part in enumerate(report.parts) if part.views]
-        head.append(
-            tag("p", tag("label", "Task: ", for_="task"), tag("select", *options, id="task"), class_="controls script")
-        )
-    controls = pose_controls(views, report.case.pose_count)
-    if controls is not None:
-        head.append(controls)
-    last = len(first["frames"]) - 1
-    moving = tag(
-        "p",
-        tag("label", "Move the platform along the task's motion", for_="travel"),
-        tag("input", type="range", id="travel", min=0, max=last, step=1, value=first["zero"]),
-        tag("output", first["frames"][first["zero"]]["words"], id="travelled", for_="travel"),
-        class_="controls travel script",
-    )
-    turns = [("left", "Turn left"), ("right", "Turn right"), ("up", "Tilt up"), ("down", "Tilt down")]
-    turns += [("in", "Nearer"), ("out", "Farther"), ("reset", "First view")]
-    buttons = tag(
-        "div",
-        *(tag("button", words, type="button", data_turn=key) for key, words in turns),
-        class_="controls buttons script",
-        role="group",
-        aria_label="View",
-    )
-    picture = tag(
-        "figure",
-        script_frame("view", "picture", "The robot in three dimensions; the table below says the same in numbers."),
-        drawings(report),
-        buttons,
-        # A copy of the picture is for printing, because browsers do not print WebGL.
-        tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
-        tag("figcaption", _legend(first), id="view-words"),
-    )
-    content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
-    note = "Without a script nothing moves; every number is in the tables."
-    return join_markup([*content, tag("noscript", tag("p", note))])
-
-
-def _legend(view: ViewData) -> Markup:
-    gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
-    bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
-    words = [
-        "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
-        " Bold black: the axis of the task's motion",
-        ", with a purple path of its pitch" if view["motion"] and view["motion"]["path"] else "",
-        ". Purple arrows: velocities of the platform's corners, not to scale.",
-        " Dotted grey: the start." if view["reference"] else "",
-        " Green, dashed: motions that nothing resists." if view["free"] else "",
-        " Arrows with two heads: couples." if any(row["kind"] == "couple" for row in view["rows"]) else "",
-        " Nothing moves: the loops open along the task's motion."
-        if view["motion"] and len(view["frames"]) == 1
-        else "",
-        " Joints: dark where an actuator drives them." if view["joints"] else "",
-        f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
-        ", at a joint for its kind." if view["joints"] else ".",
-    ]
-    return join_markup([bar, *words])
-
-
-def _measure_header(view: ViewData) -> str:
-    """Return the header of the measure of limbs, with its unit where all rows have one."""
-    words = "actuator from home" if view["joints"] else view["measure"]["words"]
-    units = {unit for unit in view["measure"]["units"] if unit}
-    return f"{words}, {units.pop()}" if len(units) == 1 else words
-
-
-def _rates(view: ViewData) -> Markup:
-    """Return the rates of every row at the drawn posture; the script updates the table as the platform moves."""
-    frame = view["frames"][view["zero"]]
-    # Where nothing resists the task's motion, the rates are rounding error.
-    rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
-    largest = max(map(abs, rates), default=0.0) or 1.0
-    total = sum(rate**2 for rate in rates)
-    couples = any(row["kind"] == "couple" for row in view["rows"])
-    headers = [
-        "limb",
-        *(["wrench"] if couples else []),
-        _measure_header(view),
-        f"rate, {view['rate_unit']}",
-        "",
-        "share of F",
-    ]
-    body = []
-    for k, row in enumerate(view["rows"]):
-        rate = rates[k]
-        part = rate / largest
-        bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
-        share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
-        length = frame["lengths"][k]
-        cells = ["" if length is None else f"{length:.5g}", f"{rate:+.6g}", bar, share]
-        kinds = ["length number", "rate number", "bars", "share number"]
-        body.append(
-            tag(
-                "tr",
-                tag("th", row["member"], scope="row"),
-                tag("td", row["kind"]) if couples else None,
-                *(tag("td", cell, class_=kind) for cell, kind in zip(cells, kinds, strict=True)),
-            )
-        )
-    head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
-    caption = tag(
-        "caption",
-        "F = ",
-        tag("span", f"{frame['F'] if total > 0 else 0:.7g} {view['objective_unit']}".rstrip(), id="F-there"),
-        " with the platform ",
-        tag("span", frame["words"], id="where"),
-    )
-    table = tag("table", caption, tag("thead", head), tag("tbody", *body), id="rates")
-    return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label="Rates at this position")
 
 
 def _result(report: Report) -> Markup:
