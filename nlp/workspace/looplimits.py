@@ -173,7 +173,7 @@ class _Search:
         )
         z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
-        off, T, _ = (each[rows] for each in enclosed.relation)
+        off, T, _, _ = (each[rows] for each in enclosed.relation)
         z[:, self._dependent] += half[:, self._dependent] * (off - (T @ ends[:, :, None])[:, :, 0])
         free, count = list(self._problem.free), len(self._problem.free)
         inside = self._problem.box.clipped(self._problem.pose_of(z))[:, free]

@@ -164,7 +164,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
     def careless(*given: object) -> LimbBound:
         found = bound_limb(*given)  # type: ignore[arg-type]
-        own = given[3]
+        own = given[4]
         assert isinstance(own, OwnBoxes)
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)
