@@ -18,9 +18,9 @@ from ...models import FloatArray
 from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..errors import UncoveredError
-from .general.cells import Cells, Examined, Examiner, joined
+from .general.cells import Cells, Examiner, joined
 from .general.connected import is_connected
-from .general.covering import in_workspace, whole_workspace
+from .general.covering import coordinates_to_split, in_workspace, whole_workspace, widths_of
 from .general.limitvalues import Enclosed, LimitValues
 from .general.problem import NotJudgedError, Problem, build_problem
 from .general.rank import RankTest
@@ -138,22 +138,11 @@ class _Search:
             parts = np.abs(enclosed.numbers.slopes) * is_open[:, :, None] / np.maximum(size, 1e-300)[:, :, None]
             shares[rows] = np.nan_to_num(parts).sum(axis=1)
         left = np.flatnonzero(is_left)
-        part = Examined(
-            found.cells.some(left),
-            type(found.relation)(*(each[left] for each in found.relation)),
-            found.is_regular[left],
-            shares[left],
-            found.smallest[left],
-        )
-        width = (part.cells.upper - part.cells.lower)[:, self._independent] / np.where(whole > 0, whole, np.inf)
+        part = found._replace(shares=shares).some(left)
+        width = widths_of(part.cells, self._independent, whole)
         if left.size and float(width.max(axis=1).min()) < _LEAST_WIDTH:
             return None
-        # A coordinate that counts for little is divided where it is much wider than all others.
-        score = np.where(width > 0, part.shares, -1.0)
-        flat = ~(score > 0).any(axis=1)
-        score[flat] = width[flat]
-        score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
-        return self._examiner.halves(part, np.argmax(score, axis=1))
+        return self._examiner.halves(part, coordinates_to_split(part.shares, width))
 
     @property
     def _least(self) -> FloatArray:

@@ -12,6 +12,8 @@ from .problem import Problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ....models import FloatArray
+
 
 def whole_workspace(problem: Problem) -> Cells:
     """Return the whole workspace as one box; its dependent coordinates are not known."""
@@ -21,6 +23,26 @@ def whole_workspace(problem: Problem) -> Cells:
     dependent = list(problem.dependent)
     lower[0, dependent] = upper[0, dependent] = np.nan
     return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
+
+
+def widths_of(cells: Cells, own: list[int], whole: FloatArray) -> FloatArray:
+    """Return the widths (B, f) of boxes along f coordinates, in parts of those (f,) of the whole box."""
+    return (cells.upper - cells.lower)[:, own] / np.where(whole > 0, whole, np.inf)
+
+
+def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
+    """Return the places (B,) of the coordinates to bisect.
+
+    Args:
+        shares: (B, f) share of each coordinate in what is missing.
+        width: (B, f) widths in parts of the whole box.
+    """
+    score = np.where(width > 0, shares, -1.0)
+    flat = ~(score > 0).any(axis=1)
+    score[flat] = width[flat]
+    # A coordinate that counts for little is divided where it is much wider than all others.
+    score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
+    return np.argmax(score, axis=1)
 
 
 class Contracted(NamedTuple):

@@ -22,7 +22,7 @@ from casadi import SX
 from ....models import FloatArray
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
-from .covering import in_workspace, whole_workspace
+from .covering import in_workspace, whole_workspace, widths_of
 from .enclosing import Forms
 from .family import Family
 from .machinepoints import MachinePoints, PointValue
@@ -147,7 +147,7 @@ class _Search:
                 break
             order = np.argpartition(bounds, min(_BLOCK, len(bounds)) - 1)
             now, later = self._open.some(order[:_BLOCK]), self._open.some(order[_BLOCK:])
-            width = self._widths(now)
+            width = widths_of(now.cells, self._independent, self._whole)
             if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
                 reason = "the boxes that are left are too small to be divided"
                 break
@@ -163,12 +163,6 @@ class _Search:
     def _bounds(self) -> FloatArray:
         """Lower bounds of the open boxes; nothing is known of a box in which dependent coordinates are not."""
         return np.where(self._open.cells.is_known, self._open.smallest, -np.inf)
-
-    def _widths(self, found: Examined) -> FloatArray:
-        """Return the widths (B, f) of boxes in parts of the whole box."""
-        cells = found.cells
-        own = self._independent
-        return (cells.upper - cells.lower)[:, own] / np.where(self._whole > 0, self._whole, np.inf)
 
     def _target(self, gap: float, limit: float | None, slack: float) -> float:
         """Return the bound at which the search ends."""

@@ -14,7 +14,7 @@ from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
-from .covering import contracted_cells, whole_workspace
+from .covering import contracted_cells, coordinates_to_split, whole_workspace, widths_of
 from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
@@ -198,18 +198,12 @@ class _Search:
             return
         part = found.some(rows)
         own = self._independent
-        width = (part.cells.upper - part.cells.lower)[:, own]
-        whole = np.where(self._whole > 0, self._whole, np.inf)
-        score = np.where(width > 0, part.shares, -1.0)
-        flat = ~(score > 0).any(axis=1)
-        score[flat] = width[flat] / whole
-        # A coordinate that counts for little is divided where it is much wider than all others.
-        score += 1e-3 * score.max(axis=1, keepdims=True) * width / whole
-        split = np.argmax(score, axis=1)
+        width = widths_of(part.cells, own, self._whole)
+        split = coordinates_to_split(part.shares, width)
         every = np.arange(len(rows))
         low, high = (each[every, np.array(own)[split]] for each in (part.cells.lower, part.cells.upper))
         middle = 0.5 * low + 0.5 * high
-        small = ((width / whole).max(axis=1) < _LEAST_WIDTH) | ~((low < middle) & (middle < high))
+        small = (width.max(axis=1) < _LEAST_WIDTH) | ~((low < middle) & (middle < high))
         if small.any():
             self._small.append(part.cells.some(np.flatnonzero(small)))
         if (~small).any():

@@ -17,7 +17,7 @@ from ..general.limitvalues import LimitValues
 from ..general.problem import Problem
 from ..general.relation import Relation
 from ..general.spectrum import Spectrum
-from .limitcells import LimitState, SampledLimit, SliceLimit, states_of
+from .limitcells import LimitState, SampledLimit, SliceLimit, states_of, states_of_limits
 
 
 class Judged(NamedTuple):
@@ -110,10 +110,7 @@ class AnyLimits:
 
     def states(self, found: NDArray[np.int8]) -> NDArray[np.int8]:
         """Return the states (M, B) of the limits from those of their claims (K, B)."""
-        states = np.full((len(self.limits), found.shape[1]), LimitState.KEPT, dtype=np.int8)
-        for place, row in zip(self._places, found, strict=True):
-            states[place] = np.maximum(states[place], row)
-        return states
+        return states_of_limits(found, self._places, len(self.limits))
 
     def violated(self, z: FloatArray) -> NDArray[np.bool_]:
         """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""

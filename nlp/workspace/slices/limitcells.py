@@ -145,10 +145,7 @@ class LimitCells:
 
     def states(self, found: NDArray[np.int8]) -> NDArray[np.int8]:
         """Return the states (M, B) of the limits from those of their parts (K, B)."""
-        states = np.full((len(self.limits), found.shape[1]), LimitState.KEPT, dtype=np.int8)
-        for place, row in zip(self._places, found, strict=True):
-            states[place] = np.maximum(states[place], row)
-        return states
+        return states_of_limits(found, self._places, len(self.limits))
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return whether each limit is violated at points (P, 6): (M, P)."""
@@ -237,3 +234,17 @@ class SampledLimit:
 def states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
     """Return states from whether each claim is proved to be kept, or violated."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
+
+
+def states_of_limits(found: NDArray[np.int8], places: Sequence[int], count: int) -> NDArray[np.int8]:
+    """Return the states (M, B) of limits, each the worst of its parts.
+
+    Args:
+        found: (K, B) states of the parts.
+        places: (K,) the limit of each part.
+        count: number M of the limits.
+    """
+    states = np.full((count, found.shape[1]), LimitState.KEPT, dtype=np.int8)
+    for place, row in zip(places, found, strict=True):
+        states[place] = np.maximum(states[place], row)
+    return states
