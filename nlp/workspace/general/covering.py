@@ -42,7 +42,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
     score[flat] = width[flat]
     # A coordinate that counts for little is divided where it is much wider than all others.
     score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
-    return np.argmax(score, axis=1)
+    return np.asarray(np.argmax(score, axis=1))
 
 
 class Contracted(NamedTuple):
