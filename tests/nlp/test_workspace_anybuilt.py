@@ -9,6 +9,7 @@ import math
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import casadi as ca
 import jsonschema
@@ -439,3 +440,19 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     for each in (case, replace(case, joint_centre_tolerance=None)):
         found = {one.key: one.outcome for one in judge_workspace(each, with_objective=False).extremes}
         assert found["leg_clearance.min"] is found["actuator.stroke_max"] is Outcome.OPEN
+
+
+def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(
+    cli: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    """Numbers of the pose that follow from others are the machine's: the design's loops do not close there."""
+    case, page, drawn = (tmp_path / name for name in ("robot.toml", "page.html", "robot.png"))
+    case.write_text(ROBOTS["3-rps"] + HEAD + TURN, encoding="utf-8")
+    code, _, err = cli("workspace", str(case), "--gap", "0.1", "--html", str(page))
+    assert code == 0, err
+    words = "the worst pose is that of a machine within the tolerance, not of the design"
+    assert f"No picture: {words}." in page.read_text(encoding="utf-8")
+    code, _, err = cli("workspace", str(case), "--gap", "0.1", "--picture", str(drawn))
+    assert code == 2
+    assert words in err
+    assert not drawn.exists()
