@@ -139,6 +139,8 @@ def _slices(report: WorkspaceReport) -> Markup:
         "Two coordinates vary in each slice, three times as wide as the workspace; the others stay at its middle. "
         "A box is coloured by what is proved for all of its poses."
     )
+    if report.case.joint_centre_tolerance:
+        words += " The slices are those of the design itself, without its tolerance."
     legend = [tag("li", _swatch(kind), kind.words) for kind in slices_legend(report.case, slices)]
     legend.append(tag("li", tag("span", class_="swatch outline"), "workspace"))
     notes = [f"{note[0].upper()}{note[1:]}." for note in slices_notes(slices)]
