@@ -91,9 +91,9 @@ def solved_items() -> Iterator[Item]:
     for name in shipped_cases():
         yield Item(f"solve {name}", name, [["solve", "CASE", "--json", "JSON"]])
     for name, gap in (
-        ("paper-4.1-helical", "1e-4"), ("paper-4.1-rotation", "1e-4"), ("paper-4.2-rotation", "1e-4"), ("paper-4.3", "1e-4"),
-        ("paper-4.4-max", "1e-4"), ("paper-4.4-min", "1e-4"), ("drilling-spindle", "1e-4"), ("camera-mount", "1e-2"),
-        ("free-wrist", "1e-4"), ("hexapod-machining", "0.5"),
+        ("paper-4.1-helical", "1e-4"), ("paper-4.1-rotation", "1e-4"), ("paper-4.2-rotation", "1e-4"),
+        ("paper-4.3", "1e-4"), ("paper-4.4-max", "1e-4"), ("paper-4.4-min", "1e-4"), ("drilling-spindle", "1e-4"),
+        ("camera-mount", "1e-2"), ("free-wrist", "1e-4"), ("hexapod-machining", "0.5"),
     ):  # fmt: skip
         search = ["certify", "CASE", "--gap", gap, "--jobs", "1", "--starts", "8", "--json", "JSON", "--proof", "PROOF"]
         yield Item(f"certify {name}", name, [search, ["verify-proof", "PROOF", "CASE"]])
