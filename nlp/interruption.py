@@ -2,7 +2,8 @@
 
 A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
 requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
-Python's own ``KeyboardInterrupt``.
+Python's own ``KeyboardInterrupt``. In a search it ends the search, which returns the state that its last complete step
+left; the searches that follow in the same call (:func:`one_call`) end at once. Elsewhere it ends the call.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import enum
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from threading import Event, Lock
 from types import FrameType
 
@@ -22,6 +25,8 @@ _TO_SHOW = 5.0
 _TO_WRITE = 0.5
 #: Ends the line of progress and shows the cursor, which that line hides.
 _CLEAR = "\r\x1b[K\x1b[?25h"
+#: Reason for which an interrupted search stops.
+STOPPED = "interrupted"
 
 
 class Milestone(enum.Enum):
@@ -37,6 +42,8 @@ WRITING = Lock()
 _awaited: set[Milestone] = set()
 _answers = Event()
 _requested = Event()
+#: Set once a search of the present call was interrupted by Python.
+_call: ContextVar[Event | None] = ContextVar("call", default=None)
 #: Process that has something to say where it is ended, and the function that returns its sentence.
 _parting: list[tuple[int, Callable[[], str]]] = []
 
@@ -59,7 +66,53 @@ def say_on_leaving(sentence: Callable[[], str]) -> None:
 
 def is_requested() -> bool:
     """Return whether the work is requested to stop."""
-    return _requested.is_set()
+    call = _call.get()
+    return _requested.is_set() or (call is not None and call.is_set())
+
+
+@contextmanager
+def one_call() -> Iterator[None]:
+    """Let an interrupt that ends a search end all others of this block, or of the outermost one, at once too."""
+    if _call.get() is not None:
+        yield
+        return
+    token = _call.set(Event())
+    try:
+        yield
+    finally:
+        _call.reset(token)
+
+
+def reason_of(search: Callable[[], str]) -> str:
+    """Run a search; return its reason for stopping before its end, or that Python interrupted it.
+
+    Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
+    step too: a step changes what is claimed by one assignment, its last.
+    """
+    try:
+        return search()
+    except KeyboardInterrupt:
+        call = _call.get()
+        if call is not None:
+            call.set()
+        return STOPPED
+
+
+def reason_to_stop(
+    seconds: float,
+    time_limit: float | None,
+    interrupted: Callable[[], bool] = is_requested,
+    boxes: int = 0,
+    most_boxes: int | None = None,
+) -> str:
+    """Return the reason for stopping a search before its end; empty for none."""
+    if interrupted():
+        return STOPPED
+    if time_limit is not None and seconds >= time_limit:
+        return f"stopped after {seconds:.3g} s"
+    if most_boxes is not None and boxes >= most_boxes:
+        return f"stopped after {boxes:,} boxes"
+    return ""
 
 
 def listen() -> None:

@@ -14,7 +14,7 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, listing
 from ..evidence.singularities import clause_of
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from ..solver.certified import certify
 from ..solver.exchange import design_of
 from ..solver.solve import solve
@@ -70,6 +70,7 @@ class Comparison:
         return tuple(each for each in self.entries if part_of(each) == "ranked")
 
 
+@one_call()
 def compare(
     case: Case,
     robots: Sequence[str | Path | Model],

@@ -26,7 +26,7 @@ from ..case.settings import Search
 from ..certificate.branchandbound import certify_program
 from ..certificate.certificate import Certificate
 from ..errors import EvaluationError
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
 from .goals import Goal
@@ -78,6 +78,7 @@ class Front:
     seconds: float
 
 
+@one_call()
 def find_front(
     case: Case,
     goals: tuple[Goal, ...],

@@ -16,6 +16,7 @@ from ..certificate.certificate import Certificate, CertificateStatus
 from ..certificate.paper.proof import Proof, Statement, fingerprint
 from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
+from ..interruption import one_call
 from ..program.epigraph import formulate_worst
 from ..program.formulation import formulate, formulate_each, formulate_weighted
 from ..program.nlp import Nlp
@@ -92,6 +93,7 @@ class Certified(Whole, Shown, Answer):
         return all(each.status is CertificateStatus.PROVED for each in every)
 
 
+@one_call()
 def certify(
     found: Case | Solution,
     *,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.workspace import LARGEST_TURN, Workspace
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from .judge import Judgement, judge_workspace
 from .machine import workspace_of_case
 from .posebox import PoseNumbers, scaled
@@ -38,6 +38,7 @@ class Scale:
     pose: PoseNumbers | None
 
 
+@one_call()
 def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | None = None) -> Scale:
     """Return the largest factor of a case's workspace for which J is regular and every limit holds, to 1 %.
 
