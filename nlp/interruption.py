@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 from threading import Event, Lock
 from types import FrameType
 
@@ -35,10 +36,16 @@ class Milestone(enum.Enum):
     START = "a start of a search is done"
     BOUND = "the search of the whole box has begun"
     VALUE = "a value of a trade-off is solved"
+    POINT = "the ends of a front are found"
+    ROBOT = "a robot of a comparison is done"
+    CASE = "a case is checked"
 
 
 #: Held while a file is written, so that none is left half written.
 WRITING = Lock()
+#: Files that are being written under names that are not theirs, and names of those that are written.
+_unfinished: set[Path] = set()
+_written: list[str] = []
 _awaited: set[Milestone] = set()
 _answers = Event()
 _requested = Event()
@@ -60,8 +67,31 @@ def reached(milestone: Milestone) -> None:
 
 
 def say_on_leaving(sentence: Callable[[], str]) -> None:
-    """Declare a function whose sentence is written where a request ends this process, but none that it starts."""
+    """Declare a function that says what is kept where a request ends this process, but none that it starts."""
     _parting[:] = [(os.getpid(), sentence)]
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[None]:
+    """Declare a file that is removed where a request ends the process in this block."""
+    _unfinished.add(path)
+    try:
+        yield
+    finally:
+        _unfinished.discard(path)
+
+
+def wrote(name: str) -> None:
+    """Declare that a file is written."""
+    _written.append(name)
+
+
+def kept() -> str:
+    """Return what is kept of the work that a request ended."""
+    for process, sentence in _parting:
+        if process == os.getpid():
+            return sentence()
+    return f"written: {', '.join(ascii(each)[1:-1] for each in _written)}" if _written else "nothing is written"
 
 
 def is_requested() -> bool:
@@ -132,13 +162,14 @@ def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
 
 
 def leave() -> None:
-    """End the process once a file that is being written is complete, with its sentence, or a newline, on stderr."""
+    """End the process once a file that is being written is complete, and say on stderr what is kept."""
     WRITING.acquire(timeout=_TO_WRITE)
     try:
+        for path in list(_unfinished):
+            path.unlink(missing_ok=True)
         # Only a bar of progress hides the cursor.
         is_shown = "rich.progress" in sys.modules and os.isatty(2)
-        words = "".join(f"\n{sentence()}" for process, sentence in _parting if process == os.getpid())
-        os.write(2, f"{_CLEAR if is_shown else ''}{words}\n".encode())
+        os.write(2, f"{_CLEAR if is_shown else ''}\nscrewsynth: interrupted: {kept()}\n".encode())
     except OSError:  # nobody reads any more
         pass
     os._exit(INTERRUPTED)

@@ -66,6 +66,8 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
         )
         if judged_holds(judged):
             proved = factor
+        elif is_requested() and not judged.is_refuted:  # an interrupted search shows no fault
+            break
         else:
             failed, fault = factor, judged
         if failed == float("inf"):
