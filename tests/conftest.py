@@ -1,10 +1,20 @@
-"""Signals of the tests' children."""
+"""What all tests share: children that can be interrupted, and searches whose time is counted in looks at the clock."""
 
+import itertools
 import signal
-import time
 from collections.abc import Callable
+from importlib import import_module
+from types import SimpleNamespace
 
 import pytest
+
+#: Modules of searches with a limit on their time; each looks at the clock once a step.
+SEARCHES = (
+    *("certificate.branchandbound", "workspace.regular.search", "workspace.general.search", "workspace.looplimits"),
+    *("workspace.general.machinenumber", "workspace.numbers.boundsearch", "workspace.numbers.extremes"),
+)
+#: Seconds from one look at the clock to the next: about those of a step on a quiet machine.
+STEP = 0.01
 
 
 def let_children_be_interrupted() -> None:
@@ -26,7 +36,11 @@ def children_can_be_interrupted() -> Callable[[], None]:
     return let_children_be_interrupted
 
 
-@pytest.fixture(autouse=True)
-def time_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let limits on the time of a search count what this process uses: no other process can end a search then."""
-    monkeypatch.setattr(time, "perf_counter", time.process_time)
+@pytest.fixture(scope="session", autouse=True)
+def clock_of_steps() -> None:
+    """Let a search of so many seconds take a number of steps: no test depends on how fast or busy the machine is."""
+    looks = itertools.count()
+    for name in SEARCHES:
+        module = import_module(f"screwsynth.nlp.{name}")
+        assert module.time.perf_counter
+        module.time = SimpleNamespace(perf_counter=lambda: STEP * next(looks))  # type: ignore[attr-defined]
