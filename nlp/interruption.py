@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from threading import Event, Lock
@@ -91,7 +91,7 @@ def kept() -> str:
     for process, sentence in _parting:
         if process == os.getpid():
             return sentence()
-    return f"written: {', '.join(ascii(each)[1:-1] for each in _written)}" if _written else "nothing is written"
+    return f"written: {', '.join(ascii(each)[1:-1] for each in _written)}" if _written else "no file is written"
 
 
 def is_requested() -> bool:
@@ -165,11 +165,12 @@ def leave() -> None:
     """End the process once a file that is being written is complete, and say on stderr what is kept."""
     WRITING.acquire(timeout=_TO_WRITE)
     try:
-        for path in list(_unfinished):
-            path.unlink(missing_ok=True)
         # Only a bar of progress hides the cursor.
         is_shown = "rich.progress" in sys.modules and os.isatty(2)
         os.write(2, f"{_CLEAR if is_shown else ''}\nscrewsynth: interrupted: {kept()}\n".encode())
     except OSError:  # nobody reads any more
         pass
+    for path in list(_unfinished):
+        with suppress(OSError):
+            path.unlink()
     os._exit(INTERRUPTED)

@@ -85,7 +85,7 @@ def run() -> int:
         gc.set_threshold(*thresholds)
     if not is_requested() and status != INTERRUPTED:
         return status
-    _say(f"interrupted: what was known by then is the result; {kept()}" if is_requested() else f"interrupted: {kept()}")
+    _say(f"interrupted: the result is what was known by then; {kept()}" if is_requested() else f"interrupted: {kept()}")
     return INTERRUPTED
 
 

@@ -2,9 +2,11 @@
 
 import json
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Event
 from types import FrameType, SimpleNamespace
 from typing import NamedTuple
 
@@ -14,7 +16,10 @@ import reachy
 
 import screwsynth.nlp
 from screwsynth.nlp import interruption
+from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.front.front import find_front
+from screwsynth.nlp.front.goals import read_goals
 
 Run = Callable[..., tuple[int, str, str]]
 ROOT = str(Path(screwsynth.nlp.__file__).parent)
@@ -194,6 +199,16 @@ def test_the_commands_are_those_of_help() -> None:
     assert {
         each.name or str(each.callback.__name__).replace("_", "-") for each in app.registered_commands if each.callback
     } == set(COMMANDS)
+
+
+def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    requested = Event()
+    monkeypatch.setattr(interruption, "_requested", requested)
+    case = case_from_tables(tomllib.loads(SMALL), name="small", source="small.toml")
+    goals = read_goals(["max F", "min limits.leg_length.max"], case)
+    found = find_front(case, goals, 6, search=case.search, progress=lambda *_: requested.set())
+    assert len(found.points) == 2
+    assert found.gaps == ()
 
 
 @pytest.mark.parametrize("name", COMMANDS)
