@@ -2,6 +2,7 @@
 
 import itertools
 import signal
+import threading
 from collections.abc import Callable
 from importlib import import_module
 from types import SimpleNamespace
@@ -23,7 +24,8 @@ def let_children_be_interrupted() -> None:
     A shell's background job, ``nohup`` and some runners ignore the signal, which children inherit; a handler they do
     not. This process goes on without interrupts: its handler does nothing.
     """
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, lambda *_: None)
 
 

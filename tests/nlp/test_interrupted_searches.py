@@ -20,7 +20,7 @@ from limb_cases import machine, poses
 import screwsynth.nlp
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Nlp, load_case, sweep
+from screwsynth.nlp import Case, Nlp, load_case, solve, sweep
 from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.reader import case_from_tables
@@ -311,12 +311,16 @@ def interrupting(calls: int, real: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def octahedral() -> Case:
+def octahedral(x1: str = "12", over: str = "", longest: str = "31") -> Case:
     """Six legs that are regular, and whose longest length is too large, over a small workspace."""
-    text = """
+    text = f"""
 [robot]
 model = "stewart-gough"
-parameters = { x1 = 12, x2 = 8, x3 = 4, x4 = 9 }
+[robot.parameters]
+x1 = {x1}
+x2 = 8
+x3 = 4
+x4 = 9
 [pose]
 position = [0, 0, 30]
 [[task]]
@@ -325,9 +329,10 @@ axis = [2, 2, 1]
 point = [2, 3, 6]
 pitch = 1
 [limits]
-leg_length = { min = 20, max = 31 }
+{over}
+leg_length = {{ min = 20, max = {longest} }}
 [workspace]
-position = [{ min = -2, max = 2 }, { min = -2, max = 2 }, { min = 28, max = 32 }]
+position = [{{ min = -2, max = 2 }}, {{ min = -2, max = 2 }}, {{ min = 28, max = 32 }}]
 """
     return case_from_tables(tomllib.loads(text), name="octahedral", source="octahedral.toml")
 
@@ -365,6 +370,18 @@ def test_an_interrupted_scale_is_no_larger(monkeypatch: pytest.MonkeyPatch) -> N
     found = largest_scale(case, time_limit=None)
     assert found.factor <= whole.factor
     assert found.failed >= whole.failed
+
+
+def test_an_interrupted_exchange_of_poses_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    assert whole.workspace is not None
+    assert whole.workspace.is_proved
+    monkeypatch.setattr(BoxSearch, "_step", interrupting(2, BoxSearch._step))
+    found = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    assert found.workspace is not None
+    assert not found.workspace.is_proved
+    assert STOPPED in {each.reason for each in found.workspace.judgement.extremes}
+    assert len(found.workspace.history) <= len(whole.workspace.history)
 
 
 def test_an_interrupted_sweep_keeps_no_row_of_the_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
