@@ -53,6 +53,7 @@ def certify(
     from .progress import certify_with_progress
 
     try:
+        answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":

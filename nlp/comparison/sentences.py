@@ -8,6 +8,7 @@ import numpy as np
 
 from ...models import Dimension
 from ..results.point import violations
+from ..solver.status import Status
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
 
@@ -71,6 +72,8 @@ def _no_answer(entry: Entry) -> str:
     if solution is None or own is None:
         return "No answer."
     status = solution.status.value
+    if solution.status is Status.INTERRUPTED:
+        return f"No answer ({status})."
     closure = {equation.name for equation in (*entry.contender.model.closure, *entry.contender.model.loops)}
     names = [row.name for row in violations(own.nlp, own.x)]
     if any(name.split(" at ")[0] in closure for name in names):

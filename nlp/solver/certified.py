@@ -16,6 +16,7 @@ from ..certificate.certificate import Certificate, CertificateStatus
 from ..certificate.paper.proof import Proof, Statement, fingerprint
 from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
+from ..interruption import is_requested, one_call
 from ..program.epigraph import formulate_worst
 from ..program.formulation import formulate, formulate_each, formulate_weighted
 from ..program.nlp import Nlp
@@ -92,6 +93,7 @@ class Certified(Whole, Shown, Answer):
         return all(each.status is CertificateStatus.PROVED for each in every)
 
 
+@one_call()
 def certify(
     found: Case | Solution,
     *,
@@ -160,7 +162,7 @@ def certify(
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
         writer = _proof_writer(nlp) if with_proof else None
         certificate = certify_one(own, case.tasks[0].name, writer)
-        if certificate.was_beaten and certificate.x is not None:
+        if certificate.was_beaten and certificate.x is not None and not is_requested():
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)

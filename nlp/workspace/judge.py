@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ...models.joints.closedform import ClosedForm, closed_form
 from ..case.case import Case
 from ..case.workspace import Workspace
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from ..program.layout import Layout
 from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
 from .anyrobot import Ranks, not_judged, prove_ranks, touched
@@ -78,6 +78,7 @@ class Judgement:
         return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
+@one_call()
 def judge_workspace(
     case: Case,
     *,

