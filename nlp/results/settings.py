@@ -29,6 +29,10 @@ def robot_of(result: Result, source: str, case: Case) -> RobotData:
     if stated != (case.name, case.model.name):
         fault = f"is a result of the case {stated[0]!r} with the robot {stated[1]!r}"
         raise InputError(f"{source}: {fault}, not of {case.name!r} with {case.model.name!r}")
+    units = result.head.units
+    if (units.length, units.angle) != (case.units.length, case.units.angle):
+        own = f"{case.units.length!r} and {case.units.angle!r}"
+        raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, and the case {own}")
     if isinstance(result, CombinedResult):
         point = result.combined.method_point
         robot = None if point is None else point.robot
@@ -41,13 +45,19 @@ def robot_of(result: Result, source: str, case: Case) -> RobotData:
 
 def settings_of(robot: RobotData, case: Case) -> Settings:
     """Return the numbers of a robot by the names that they have in its case, in the case's units."""
-    found: dict[str, float | list[float]] = {}
-    for name, value in robot.parameters.items():
-        found[case.parameter_name(name)] = list(value) if isinstance(value, tuple) else value
+    found = dict(dimensions_of(robot, case))
     stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
     for prefix, pose, data in zip(case.pose_prefixes, case.poses, stated, strict=True):
         found |= _pose_settings(prefix, pose, data)
     return found
+
+
+def dimensions_of(robot: RobotData, case: Case) -> Settings:
+    """Return the dimensions of a robot by the names that they have in its case, in the case's units."""
+    return {
+        case.parameter_name(name): list(value) if isinstance(value, tuple) else value
+        for name, value in robot.parameters.items()
+    }
 
 
 def _pose_settings(prefix: str, pose: Pose, data: PoseData) -> Settings:
