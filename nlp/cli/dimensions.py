@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import typer
+
 if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..case.reader import CaseFile
@@ -25,14 +27,16 @@ def read_machine(name: str, settings: Settings, of: str | None) -> Machine:
         of: file of the result; None without one.
 
     Raises:
-        InputError: a file cannot be read or holds a fault, or the result is no answer of the case.
+        InputError: a file cannot be read or holds a fault, or the result is no answer for this robot in these units.
     """
     from ..case.reader import read_case
-    from ..results.reading import load_result
-    from ..results.settings import dimensions_of, robot_of
+    from ..errors import one_line
+    from ..results.settings import dimensions_of, load_answer, robot_of
 
     if of is None:
         return Machine(read_case(name, settings), settings)
-    case = read_case(name).case
-    chosen = {**dimensions_of(robot_of(load_result(of), f"--of {of}", case), case), **settings}
+    case, result = read_case(name).case, load_answer(of)
+    chosen = {**dimensions_of(robot_of(result, f"--of {of}", case, of_any_case=True), case), **settings}
+    if result.head.case != case.name:
+        typer.echo(f"--of {one_line(of)}: has the dimensions of the case {one_line(result.head.case)!r}", err=True)
     return Machine(read_case(name, chosen), chosen)

@@ -70,9 +70,11 @@ def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
+    from ...models import Dimension
     from ..certificate.paper.proof import ProofError
     from ..errors import one_line
     from ..workspace.paper.check import check_paper
+    from ..workspace.paper.expected import ERRORS
 
     try:
         checked = check_paper(proof, case, leg_error=leg_error)
@@ -80,17 +82,23 @@ def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
     count = len(checked.claims) + len(checked.unproved)
-    typer.echo(f"holds: {len(checked.claims)} of {count} claims about every pose of the workspace of {case.name}")
-    for line in _premises(case, leg_error, checked.numbers_at):
+    whose = f"the workspace of {one_line(case.name)}"
+    if case.joint_centre_tolerance:
+        off = case.units.text(case.joint_centre_tolerance, Dimension.LENGTH)
+        whose += f", for every machine whose joint centres are off by at most {off}"
+    typer.echo(f"holds: {len(checked.claims)} of {count} claims about {whose}")
+    for line in _premises(case, checked.numbers_at):
         typer.echo(f"  {one_line(line)}")
+    legs = "exact" if not leg_error else f"off by at most {case.units.text(leg_error, Dimension.LENGTH)}"
     for each in checked.claims:
-        typer.echo(f"  {one_line(each.name)}: {_words(each, case)}")
+        of = f", for lengths of legs that are {legs}" if each.name in ERRORS else ""
+        typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
     _echo_unproved(checked.unproved, err=False)
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 
-def _premises(case: Case, leg_error: float, numbers_at: str) -> Iterator[str]:
-    """Yield the poses, the machines and the assemblies that claims are about."""
+def _premises(case: Case, numbers_at: str) -> Iterator[str]:
+    """Yield the poses, the tasks and the assemblies that claims are about."""
     from ...models import Dimension
     from ..case.pose import Free
 
@@ -109,9 +117,6 @@ def _premises(case: Case, leg_error: float, numbers_at: str) -> Iterator[str]:
         f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
         f"{case.units.label(angle)}"
     )
-    errors = {"joint centres": case.joint_centre_tolerance or 0.0, "lengths of legs, for errors of the pose": leg_error}
-    off = [f"{name} off by at most {case.units.text(size, length)}" for name, size in errors.items() if size]
-    yield f"machines: {'every one with ' + ' and '.join(off) if off else 'the exact one'}"
     for task in case.tasks:
         yield f"{'F' if len(case.tasks) == 1 else f'F of {task.name}'}: of the task {task.name!r}"
     if numbers_at:

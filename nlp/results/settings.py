@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from ..case.case import Case
 from ..case.overrides import Settings
 from ..case.pose import Free, Pose
@@ -9,25 +11,38 @@ from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .parts import PoseData, RobotData
-from .reading import Result
+from .reading import load_result
+
+Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 
 
-def robot_of(result: Result, source: str, case: Case) -> RobotData:
+def load_answer(file: str) -> Answer:
+    """Read a result of ``solve`` or ``evaluate``.
+
+    Raises:
+        InputError: the file cannot be read, or holds no such result.
+    """
+    result = load_result(file)
+    if not isinstance(result, Answer):
+        raise InputError(f"--of {file}: is no result of solve or evaluate")
+    return result
+
+
+def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = False) -> RobotData:
     """Return the robot of a result of a case.
 
     Args:
         result: the result.
         source: name of its file, for messages.
         case: the case.
+        of_any_case: whether the result may be of another case with the same robot and units.
 
     Raises:
-        InputError: the result is of another kind, of another case, or no answer.
+        InputError: the result is of another case, in other units, or no answer.
     """
-    if not isinstance(result, SolveResult | CombinedResult | EvaluationResult):
-        raise InputError(f"{source}: is no result of solve or evaluate")
-    stated = result.head.case, result.head.model
-    if stated != (case.name, case.model.name):
-        fault = f"is a result of the case {stated[0]!r} with the robot {stated[1]!r}"
+    name, model = result.head.case, result.head.model
+    if model != case.model.name or (name != case.name and not of_any_case):
+        fault = f"is a result of the case {name!r} with the robot {model!r}"
         raise InputError(f"{source}: {fault}, not of {case.name!r} with {case.model.name!r}")
     units = result.head.units
     if (units.length, units.angle) != (case.units.length, case.units.angle):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....models import Dimension
 from ...case.case import Case
 from ...case.task import Sense
 from ...case.workspace import Workspace
@@ -35,8 +34,8 @@ def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error
     if workspace_numbers(workspace) != proof.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if proof.leg_error != leg_error:
-        stated, asked = (case.units.text(each, Dimension.LENGTH) for each in (proof.leg_error, leg_error))
-        raise ProofError(f"the proof is for legs that are off by at most {stated}, and not {asked}: see --leg-error")
+        stated = f"the proof is for legs that are off by at most {proof.leg_error:.17g} {case.units.length}"
+        raise ProofError(f"{stated}, and not {leg_error:.17g}: see --leg-error")
     _compare_legs(legs, proof)
     if (case.joint_centre_tolerance or 0.0) != proof.tolerance:
         raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
