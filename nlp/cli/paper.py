@@ -70,8 +70,8 @@ def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ...models import Dimension
     from ..certificate.paper.proof import ProofError
+    from ..certificate.paper.statement import exact
     from ..errors import one_line
     from ..workspace.paper.check import check_paper
     from ..workspace.paper.expected import ERRORS
@@ -84,16 +84,18 @@ def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
     count = len(checked.claims) + len(checked.unproved)
     whose = f"the workspace of {one_line(case.name)}"
     if case.joint_centre_tolerance:
-        off = case.units.text(case.joint_centre_tolerance, Dimension.LENGTH)
+        off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
         whose += f", for every machine whose joint centres are off by at most {off}"
     typer.echo(f"holds: {len(checked.claims)} of {count} claims about {whose}")
     for line in _premises(case, checked.numbers_at):
         typer.echo(f"  {one_line(line)}")
-    legs = "exact" if not leg_error else f"off by at most {case.units.text(leg_error, Dimension.LENGTH)}"
+    legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
         of = f", for lengths of legs that are {legs}" if each.name in ERRORS else ""
         typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
     _echo_unproved(checked.unproved, err=False)
+    if checked.unproved:
+        typer.echo("why claims are not on paper is what the file says, and not checked")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 
@@ -101,16 +103,17 @@ def _premises(case: Case, numbers_at: str) -> Iterator[str]:
     """Yield the poses, the tasks and the assemblies that claims are about."""
     from ...models import Dimension
     from ..case.pose import Free
+    from ..certificate.paper.statement import exact
 
     def span(value: Value, dimension: Dimension) -> str:
         ends = (value.lower, value.upper) if isinstance(value, Free) else (value,)
-        return " to ".join(f"{case.units.shown(each, dimension):.17g}" for each in ends)
+        return " to ".join(exact(case.units.shown(each, dimension)) for each in ends)
 
     workspace = case.workspace
     if workspace is None:
         return
     turns, length, angle = workspace.turns, Dimension.LENGTH, Dimension.ANGLE
-    about = f" {' '.join(f'{each:.17g}' for each in turns.axis)}" if turns.kind.value == "axis" else ""
+    about = f" {' '.join(map(exact, turns.axis))}" if turns.kind.value == "axis" else ""
     position = ", ".join(f"{name} {span(each, length)}" for name, each in zip("xyz", workspace.position, strict=True))
     rotation = ", ".join(span(each, angle) for each in turns.angles)
     yield (

@@ -71,15 +71,14 @@ def json_tree(content: str | bytes) -> object:
         raise ValueError("lists or objects are nested too deeply") from None
     level = [tree]
     for _ in range(_DEPTH):
-        level = [
-            part
-            for each in level
-            if isinstance(each, list | dict)
-            for part in (each.values() if isinstance(each, dict) else each)
-        ]
-        if not level:
+        level = [part for each in level if isinstance(each, list | dict) for part in _parts(each)]
+        if not any(isinstance(each, list | dict) for each in level):
             return tree
     raise ValueError("lists or objects are nested too deeply")
+
+
+def _parts(value: list[object] | dict[str, object]) -> Iterable[object]:
+    return value.values() if isinstance(value, dict) else value
 
 
 def _number(text: str) -> float:

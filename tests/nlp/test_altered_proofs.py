@@ -276,6 +276,7 @@ def alterations(content: dict[str, Any], rng: np.random.Generator, per_field: in
 
 BOUND = re.compile(r"at (most|least) ([^\s,]+)")
 BOXES = re.compile(r"[\d,]+ leaves, shown on .*\n")
+REASONS = re.compile(r"(?<=^not on paper: ).*?: .*", re.MULTILINE)
 LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\S+) \(F\('other'\) - (\S+)\)")
 
 
@@ -290,7 +291,7 @@ def least_loss(weight: float, best: float, other_weight: float, other_best: floa
 
 def is_true(before: str, after: str, reached: dict[tuple[str, str], float]) -> bool:
     """Whether an output says what another one said, but for bounds that are still beyond values that are reached."""
-    before, after = (BOXES.sub("", each) for each in (before, after))
+    before, after = (REASONS.sub("", BOXES.sub("", each)) for each in (before, after))
     if before.startswith("holds: there is no feasible point"):
         # Every claim about the points of an empty set is true.
         return before.partition(" within ")[2] in after or ", F being that of task 'one'" in after
@@ -347,7 +348,7 @@ PLATFORMS = ("task", "above", "weighted sum", "worst case", "worst loss")
 def test_an_altered_field_is_rejected_or_changes_nothing_but_a_true_bound(cli: Run, folder: Path, name: str) -> None:
     faults, tries, _ = faults_of(cli, folder, name, 1)
     assert not faults
-    assert tries > (40 if KINDS[name].writes[0] == "workspace" else 15)
+    assert tries > (25 if KINDS[name].writes[0] == "workspace" else 15)
 
 
 def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None:
@@ -359,7 +360,7 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")
-    assert "by at most 0.01 in, and not 0: see --leg-error" in err.replace("0.01000000000000000", "0.01")
+    assert "by at most 0.01 in, and not 0: see --leg-error" in err
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     code, out, _ = cli("verify-proof", proof, case, "--leg-error", "0.01")
     assert code == 0

@@ -134,7 +134,7 @@ def _objective_words(case: Case, statement: Statement) -> str:
     names = [f"F({task.name!r})" for task in case.tasks]
     if len(names) == 1:
         return f"that of task {case.tasks[0].name!r}"
-    weights = [f"{weight:.17g}" for weight in scaled_weights(case)]
+    weights = [exact(weight) for weight in scaled_weights(case)]
     if case.method is Method.WEIGHTED_SUM:
         both = has_both_senses(case)
         signs = ["-" if both and task.sense is Sense.MIN else "+" for task in case.tasks]
@@ -143,7 +143,7 @@ def _objective_words(case: Case, statement: Statement) -> str:
     if statement.best:
         maxima = [task.sense is Sense.MAX for task in case.tasks]
         pairs = zip(maxima, names, statement.best, strict=True)
-        names = [f"({best!r} - {name})" if is_max else f"({name} - {best!r})" for is_max, name, best in pairs]
+        names = [f"({exact(best)} - {name})" if is_max else f"({name} - {exact(best)})" for is_max, name, best in pairs]
     elif case.tasks[0].sense is Sense.MAX:
         return f"the least of {' and '.join(f'{name} / {w}' for name, w in zip(names, weights, strict=True))}"
     return f"the largest of {' and '.join(f'{w} {name}' for name, w in zip(names, weights, strict=True))}"
@@ -159,3 +159,8 @@ def outward(value: float, *, up: bool) -> str:
     """Return a proven bound as text, rounded to the side on which it holds."""
     context = Context(prec=_DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{float(context.create_decimal_from_float(value)):.{_DIGITS}g}"
+
+
+def exact(value: float) -> str:
+    """Return a number of a premise as text that is this double and no other."""
+    return repr(value).removesuffix(".0")

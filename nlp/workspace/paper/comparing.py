@@ -8,6 +8,7 @@ from ...case.case import Case
 from ...case.task import Sense
 from ...case.workspace import Workspace
 from ...certificate.paper.proof import ProofError
+from ...certificate.paper.statement import exact
 from ..machine import Legs
 from .document import PaperProof, workspace_numbers
 from .expected import ExpectedClaim
@@ -34,8 +35,8 @@ def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error
     if workspace_numbers(workspace) != proof.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if proof.leg_error != leg_error:
-        stated = f"the proof is for legs that are off by at most {proof.leg_error:.17g} {case.units.length}"
-        raise ProofError(f"{stated}, and not {leg_error:.17g}: see --leg-error")
+        stated = f"the proof is for legs that are off by at most {exact(proof.leg_error)} {case.units.length}"
+        raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
     _compare_legs(legs, proof)
     if (case.joint_centre_tolerance or 0.0) != proof.tolerance:
         raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
