@@ -24,6 +24,7 @@ from screwsynth.nlp.certificate.paper import proof as proof_file
 from screwsynth.nlp.certificate.paper.proof import Statement, fingerprint
 from screwsynth.nlp.certificate.paper.statement import program_of
 from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof
 
 Run = Callable[..., tuple[int, str, str]]
 Place = tuple[str | int, ...]
@@ -457,3 +458,74 @@ def test_a_tree_that_unpacks_to_too_much_is_refused(cli: Run, folder: Path, monk
     code, out, err = checked(cli, folder, "task", content)
     assert (code, out) == (2, "")
     assert "incomplete, or larger" in err
+
+
+def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Path) -> None:
+    free, fixed, proof = tmp_path / "free.toml", tmp_path / "fixed.toml", str(tmp_path / "proof.json")
+    fixed.write_text(MACHINE, encoding="utf-8")
+    free.write_text(MACHINE.replace("x2 = 11.543", "x2 = { min = 8, max = 15 }"), encoding="utf-8")
+    result = str(tmp_path / "result.json")
+    assert cli("evaluate", str(fixed), "--json", result)[0] in (0, 1)
+    code, _, err = cli("workspace", str(free), "--gap", "0.1", "--of", result, "--proof", proof)
+    assert (code, err) == (0, f"--of {result}: has the dimensions of the case 'fixed'\n")
+    assert "is free" in cli("verify-proof", proof, str(free))[2]
+    for options in (("--of", result), ("--set", "x2=11.543")):
+        code, out, err = cli("verify-proof", proof, str(free), *options)
+        assert code == 0, err
+        assert "F: of the task 'push'" in out
+        code, _, err = cli("verify-proof", proof, *options)
+        assert (code, "needs the CASE" in err) == (2, True)
+    code, _, err = cli("verify-proof", proof, str(free), "--set", "x2=11.6")
+    assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
+    for option in (("--above", "1"), ("--all-assemblies",)):
+        code, _, err = cli("verify-proof", proof, *option)
+        assert (code, "means nothing for this proof" in err) == (2, True)
+
+
+def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:
+    inches, result = tmp_path / "inches.toml", str(tmp_path / "result.json")
+    inches.write_text(MACHINE, encoding="utf-8")
+    cli("evaluate", str(inches), "--json", result)
+    for old, new, units in (
+        ('length = "in"', 'length = "mm"', "'mm' and 'deg'"),
+        ("x3 = 1,", "x3 = 0.1,", "'in' and 'rad'"),
+    ):
+        other = tmp_path / "other.toml"
+        angle = 'length = "in"\nangle = "rad"' if "rad" in units else 'length = "in"'
+        other.write_text(MACHINE.replace('length = "in"', angle).replace(old, new), encoding="utf-8")
+        code, out, err = cli("workspace", str(other), "--of", result)
+        assert (code, out) == (2, "")
+        assert f"has the units 'in' and 'deg', and the case {units}" in err
+    (tmp_path / "rps.toml").write_text(ROBOT, encoding="utf-8")
+    code, _, err = cli("workspace", str(tmp_path / "rps.toml"), "--of", result)
+    assert code == 2
+    assert "with the robot 'stewart-gough', not of 'rps' with '3-rps'" in err
+
+
+@pytest.mark.parametrize("command", ["workspace", "verify-proof"])
+def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folder: Path, command: str) -> None:
+    case, proof = folder / "legless.toml", folder / "legless.json"
+    case.write_text(CRANKS, encoding="utf-8")
+    claim = PaperClaim("regular", "", "regular", tree=b"\x02")
+    proof.write_text(PaperProof("", "legless", (), (), (), 0.01, (claim,), ()).as_text(), encoding="utf-8")
+    words = (str(proof), str(case)) if command == "verify-proof" else (str(case),)
+    code, out, err = cli(command, *words, "--leg-error", "0.01")
+    assert (code, out) == (2, "")
+    assert "--leg-error 0.01: is for six straight legs, which '6-rus' is not" in err
+
+
+def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:
+    """The least of several values is no smooth minimum; without its refusal the search began at a wrong level."""
+    case = tmp_path / "poses.toml"
+    pose = "[pose]\nposition = [0, 0, { min = 30, max = 31 }]\n"
+    text = PLATFORM.replace("rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }\n", "")
+    text = text.replace(
+        pose, "".join(f"[[pose]]\nposition = [0, 0, {{ min = {z}, max = {z + 1} }}]\n" for z in (30, 40))
+    )
+    case.write_text(text + '[combine]\nover_poses = "worst"\n', encoding="utf-8")
+    code, out, err = cli("certify", str(case), "--above", "1")
+    assert (code, out) == (2, "")
+    assert "--above: is not for the worst of several poses" in err
+    proof = str(tmp_path / "proof.json")
+    assert cli("certify", str(case), "--proof", proof)[0] == 0
+    assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]
