@@ -488,7 +488,7 @@ def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_pa
     cli("evaluate", str(inches), "--json", result)
     for old, new, units in (
         ('length = "in"', 'length = "mm"', "'mm' and 'deg'"),
-        ("x3 = 1,", "x3 = 0.1,", "'in' and 'rad'"),
+        ("x3 = 1, x4 = 5", "x3 = 0.1, x4 = 0.1", "'in' and 'rad'"),
     ):
         other = tmp_path / "other.toml"
         angle = 'length = "in"\nangle = "rad"' if "rad" in units else 'length = "in"'
