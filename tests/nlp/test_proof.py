@@ -353,6 +353,10 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
     assert "could not be shown" in rejected(replace(proof, tree=lower), case)
     assert "ends" in rejected(replace(proof, tree=proof.tree[:-1]), case)
     assert "goes on" in rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), case)
+    # Bounds whose sum is no number.
+    for huge in (np.finfo(float).max, np.inf, np.nan):
+        limb = struct.pack("<d", huge) + bytes([Node.BOUNDED])
+        assert "together" in rejected(replace(proof, tree=bytes([Node.LIMBS]) + 2 * limb), case)
 
 
 def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
