@@ -14,10 +14,9 @@ from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
 from ..errors import CaseError
-from ..program.formulation import formulate, formulate_weighted
+from ..program.formulation import formulate, formulate_weighted, scaled_weights
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
-from ..solver.compromise import scale_weights
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
@@ -54,7 +53,7 @@ def find_subject(case: Case) -> Subject:
     _check_pairs(formulate(case))
     if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
         several = len(case.tasks) > 1
-        nlp = formulate_weighted(case, scale_weights(case).values) if several else formulate(case)
+        nlp = formulate_weighted(case, scaled_weights(case)) if several else formulate(case)
         own = solve_program(nlp, case.search)
         return Subject(with_all_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
     combination = solve(case).combination

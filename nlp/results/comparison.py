@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 
 from ..case.task import Sense
 from ..solver.status import Status
+from ..system.strictjson import Size
 from ..workspace.verdict import Outcome
 from .data import CertificateData
-from .jsondata import Absent, JsonObject, Size
+from .jsondata import Absent, JsonObject
 from .parts import UnitsData, VersionsData
 
 

@@ -20,7 +20,7 @@ from .claims import Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
 from .looplimits import loop_extremes
-from .machine import Legs, legs_of, workspace_of_case
+from .machine import Legs, check_leg_error, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.ownsearches import own_searches, pose_errors
@@ -117,9 +117,11 @@ def judge_workspace(
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a name.
+        InputError: the robot has no measure of a name, or the error of legs is negative, or for a robot that is not six
+            straight legs.
     """
     own = workspace_of_case(case)
+    check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)

@@ -74,6 +74,7 @@ home = { position = [0, 0, 20] }
 position = [{ min = -2, max = 2 }, 0.5, { min = 18, max = 21 }]
 rotation = { roll = 3, pitch = { min = -5, max = 9 } }
 """
+LEG_ERROR = 0.008
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
 
 
@@ -85,13 +86,13 @@ def case_of(text: str = TEXT) -> Case:
 def judged() -> tuple[Judgement, PaperRecord]:
     record = PaperRecord()
     # Lengths of legs are asked for once more, without their limit.
-    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.008, paper=record)
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=LEG_ERROR, paper=record)
     return found, record
 
 
 @pytest.fixture(scope="module")
 def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
-    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.008)
+    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,7 @@ def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Genera
 
 def rejected(proof: PaperProof, case: Case | None = None) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_paper(proof, case_of() if case is None else case)
+        check.check_paper(proof, case_of() if case is None else case, leg_error=proof.leg_error)
     return str(caught.value)
 
 
@@ -143,7 +144,7 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple
     assert not proof.unproved
     again = read_paper(proof.as_text(), "again")
     assert again == proof
-    checked = check.check_paper(again, case_of())
+    checked = check.check_paper(again, case_of(), leg_error=LEG_ERROR)
     assert len(checked.claims) == len(proof.claims)
     assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}
     bounds = {(each.name, each.sense): each.bound for each in checked.claims}

@@ -25,11 +25,13 @@ class RobotClaims(NamedTuple):
             closed form, where all limbs reach every pose.
         model: the robot without these unknowns, over whose poses its ranks are claimed.
         more: claims about constraint wrenches and reach; none about six straight legs.
+        is_closed: whether the numbers are those of home's assembly, all of whose unknowns follow in closed form.
     """
 
     layout: Layout
     model: Model
     more: tuple[ExpectedClaim, ...]
+    is_closed: bool = False
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
@@ -54,7 +56,8 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         more += own
         if all(each.name in reached for each in own):
             layout = closed_layout(case, closed, workspace)
-    return RobotClaims(layout or posed_layout(case, workspace), closed.model, tuple(more))
+    is_closed = layout is not None and not closed.model.unknowns
+    return RobotClaims(layout or posed_layout(case, workspace), closed.model, tuple(more), is_closed)
 
 
 def has_constraints(model: Model) -> bool:
