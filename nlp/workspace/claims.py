@@ -12,7 +12,8 @@ from casadi import SX
 
 from ...models import Dimension
 from ..case.limits.constraint import SQUARED_LENGTH, BoundedConstraint, Reading
-from ..case.limits.legs import LegLength
+from ..case.limits.legs import Actuator, LegLength
+from ..case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ..case.task import Sense
 from ..errors import InputError, nearest
 from ..program.layout import Layout
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
 OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
+#: Names of the measures that are no quantities of a robot.
+SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +71,16 @@ def one_machine_name(claim: str) -> str:
     return f"{claim}, lengths of one machine"
 
 
+def asked_spectra(case: Case, names: Sequence[str]) -> list[str]:
+    """Return the measures of the singular values of J among names; not those that are limited with the same length."""
+    length = case.characteristic_length
+    same = [each for each in case.limits if isinstance(each, SmallestSingularValue | ConditionNumber)]
+    limited = {each.key for each in same if each.length == length}
+    return [name for name in dict.fromkeys(names) if name in SPECTRAL and name not in limited]
+
+
 def asked_name(case: Case, name: str) -> str:
-    """Return the name in proofs of a measure of the singular values of J that is asked for, and not limited.
+    """Return the name of a measure of the singular values of J that is asked for.
 
     A limit on it divides moments by a length of its own, and has the shorter name.
     """
@@ -88,7 +99,10 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = [*_of_limits(layout), *_of_legs(layout), *_of_quantities(layout, quantities)]
+    found = [*_of_limits(layout), *_of_legs(layout)]
+    # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
+    known = {(each.name, each.sense) for each in found}
+    found += [each for each in _of_quantities(layout, quantities) if (each.name, each.sense) not in known]
     if with_objective:
         found += _of_tasks(layout)
     return found
@@ -96,7 +110,8 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
 
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
-    own = (*OWN_SEARCHES, "leg_length") if layout.robots[0].legs else OWN_SEARCHES
+    # At one pose the limit on a leg's dead length says less than over all poses.
+    own = (*OWN_SEARCHES, "leg_length", Actuator.key) if layout.robots[0].legs else OWN_SEARCHES
     items = (*layout.constraints, *layout.constant_limits)
     yield from claims_of_items([item for item in items if not any(key.startswith(own) for key in item.constraint.keys)])
 
@@ -132,7 +147,7 @@ def _of_legs(layout: Layout) -> Iterator[Claim]:
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
     """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
-    for name in names:
+    for name in dict.fromkeys(names):
         if name not in known:
             raise InputError(f"--of-quantity {name}: no measure of this robot; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
