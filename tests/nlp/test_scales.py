@@ -1,4 +1,7 @@
-"""Enclosures of numbers from 1e-300 to 1e300 against 200-bit balls: in both engines, and in the checkers' arithmetics."""
+"""Enclosures of numbers from 1e-300 to 1e300 against 200-bit balls: of both engines, and of the checkers."""
+
+from collections import Counter
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
@@ -8,12 +11,9 @@ from casadi import SX
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
 from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
-from screwsynth.nlp.certificate.boxes.firstpass import value_tape
-from screwsynth.nlp.certificate.enclosing import enclosure
-from screwsynth.nlp.certificate.enclosing.enclosure import Enclosures, enclose, midpoints
+from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
-from screwsynth.nlp.certificate.enclosing.tape import Tape
+from screwsynth.nlp.certificate.enclosing.secondorder import enclose_second, monomials
 from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.certificate.paper.polynomials import middles, places
 from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
@@ -26,29 +26,29 @@ balls = pytest.importorskip("balls")
 N = 3
 #: Products, quotients, roots and others of numbers that may be very small or very large.
 GRAPHS = {
-    "product": lambda x, y, z: x * y,
-    "products": lambda x, y, z: x * y * z,
-    "square": lambda x, y, z: x**2,
-    "squares": lambda x, y, z: x * x + y * y - z * z,
-    "quotient": lambda x, y, z: x / y,
-    "quotients": lambda x, y, z: (x * y) / (y + z),
-    "inverse": lambda x, y, z: 1 / x,
-    "root": lambda x, y, z: ca.sqrt(x) * y,
-    "length": lambda x, y, z: ca.sqrt(x * x + y * y + z * z),
-    "unit": lambda x, y, z: x / ca.sqrt(x * x + y * y),
-    "work": lambda x, y, z: (x * y - z * z) ** 2 / (x * x + y * y),
-    "logarithm": lambda x, y, z: ca.log(x) * y,
-    "exponential": lambda x, y, z: ca.exp(x) - ca.exp(y),
-    "waves": lambda x, y, z: ca.sin(x) * y + ca.cos(z),
-    "angle": lambda x, y, z: ca.atan(x / y) * z,
-    "pieces": lambda x, y, z: ca.fmax(x, y) * ca.fabs(z),
-    "determinant": lambda x, y, z: (x * x - y * z) * (x * y - z * z) - (x * z - y * y) ** 2,
+    "product": lambda v: v[0] * v[1],
+    "products": lambda v: v[0] * v[1] * v[2],
+    "square": lambda v: v[0] ** 2,
+    "squares": lambda v: v[0] * v[0] + v[1] * v[1] - v[2] * v[2],
+    "quotient": lambda v: v[0] / v[1],
+    "quotients": lambda v: (v[0] * v[1]) / (v[1] + v[2]),
+    "inverse": lambda v: 1 / v[0],
+    "root": lambda v: ca.sqrt(v[0]) * v[1],
+    "length": ca.norm_2,
+    "unit": lambda v: v[0] / ca.norm_2(v[:2]),
+    "work": lambda v: (v[0] * v[1] - v[2] * v[2]) ** 2 / ca.sumsqr(v[:2]),
+    "logarithm": lambda v: ca.log(v[0]) * v[1],
+    "exponential": lambda v: ca.exp(v[0]) - ca.exp(v[1]),
+    "waves": lambda v: ca.sin(v[0]) * v[1] + ca.cos(v[2]),
+    "angle": lambda v: ca.atan(v[0] / v[1]) * v[2],
+    "pieces": lambda v: ca.fmax(v[0], v[1]) * ca.fabs(v[2]),
+    "determinant": lambda v: (v[0] ** 2 - v[1] * v[2]) * (v[0] * v[1] - v[2] ** 2) - (v[0] * v[2] - v[1] ** 2) ** 2,
 }
 
 
 def function_of(name: str) -> ca.Function:
     x = SX.sym("x", N)
-    return ca.Function("f", [x], [ca.densify(GRAPHS[name](*ca.vertsplit(x)))])
+    return ca.Function("f", [x], [ca.densify(GRAPHS[name](x))])
 
 
 def boxes(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -82,87 +82,115 @@ def steps(point: np.ndarray, centre: np.ndarray, radius: np.ndarray) -> list[obj
     return [(arb(x) - arb(c)) / arb(r) if r > 0 else arb(0) for x, c, r in zip(point, centre, radius, strict=True)]
 
 
-def first_order(forms: Enclosures, box: int, e: list[object]) -> tuple[object, object]:
-    t = max((abs(each) for each in e), key=lambda ball: float(ball.mid()))
-    value = sum((arb(a) * step for a, step in zip(forms.a[0, :, box], e, strict=True)), arb(forms.c[0, box]))
-    s = arb(forms.s[0, box])
-    return value + t * t * arb(forms.p[0, box]) - s, value + t * t * arb(forms.q[0, box]) + s
+def linear(c: float, a: np.ndarray, e: list[object]) -> object:
+    return sum((arb(each) * step for each, step in zip(a, e, strict=True)), arb(c))
 
 
-def second_order(forms: Forms, box: int, e: list[object]) -> tuple[object, object]:
-    at = monomials(N)
-    value = sum((arb(a) * step for a, step in zip(forms.a[0, :, box], e, strict=True)), arb(forms.c[0, box]))
-    value += sum((arb(q) * e[i] * e[j] for q, i, j in zip(forms.Q[0, :, box], at.first, at.second, strict=True)), arb(0))
-    s = arb(forms.s[0, box])
-    return value + arb(forms.p[0, box]) - s, value + arb(forms.q[0, box]) + s
+def ball(value: object, low: float, high: float, s: float) -> tuple[object, object]:
+    return value + arb(low) - arb(s), value + arb(high) + arb(s)
 
 
-def in_c(function: ca.Function, low: np.ndarray, high: np.ndarray) -> object:
-    """Middle, slopes and rest of the kernel's forms of first order."""
-    x = SX.sym("x", N)
-    return Encloser(x, function(x), "c")(low, high)
-
-
-def bounds(function: ca.Function, low: np.ndarray, high: np.ndarray, engine: type) -> np.ndarray:
+def bounds(function: ca.Function, low: np.ndarray, high: np.ndarray, engine: str) -> np.ndarray:
     """Lower and upper bounds (2, B) by the examination of boxes, with its models of second order."""
     x, ends = SX.sym("x", N), np.full(N, 1e308)
     nlp = formulate(load_case("paper-4.2-rotation"))
     found = []
     for sign in (-1.0, 1.0):
         form = StandardForm(nlp, x, -ends, ends, (sign * function(x),), (), (), 1.0, has_epigraph=False)
-        chosen = NumpyEngine(form) if engine is NumpyEngine else KernelEngine(form, kernel(), 1)
+        chosen = NumpyEngine(form) if engine == "numpy" else KernelEngine(form, kernel(), 1)
         found.append(sign * chosen.examine(low, high, -np.inf).bound)
     return np.array(found)
 
 
-def outside(ball: object, low: object, high: object) -> bool:
-    return bool(ball < low) or bool(ball > high)
+#: Returns the ends that hold the value at a point, from the number of its box and the point; None where there are none.
+Ends = Callable[[int, np.ndarray], tuple[object, object] | None]
+
+
+def of_search(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[str, Ends]:
+    """Enclosures of the search: forms of first and second order, and bounds of both engines."""
+    tape, x, at = compile_tape(function), SX.sym("x", N), monomials(N)
+    centre, radius = midpoints(low, high)
+    one, two, c = enclose(tape, low, high), enclose_second(tape, low, high), Encloser(x, function(x))(low, high)
+    numbers = {engine: bounds(function, low, high, engine) for engine in ("numpy", *["c"] * (kernel() is not None))}
+
+    def first(k: int, point: np.ndarray) -> tuple[object, object] | None:
+        if not np.isfinite(one.s[0, k]):
+            return None
+        e = steps(point, centre[:, k], radius[:, k])
+        t = max((abs(each) for each in e), key=lambda each: float(each.mid()))
+        low, high = arb(one.p[0, k]) * t * t, arb(one.q[0, k]) * t * t
+        value, s = linear(one.c[0, k], one.a[0, :, k], e), arb(one.s[0, k])
+        return value + low - s, value + high + s
+
+    def second(k: int, point: np.ndarray) -> tuple[object, object] | None:
+        if not np.isfinite(two.s[0, k]):
+            return None
+        e = steps(point, centre[:, k], radius[:, k])
+        value = linear(two.c[0, k], two.a[0, :, k], e)
+        value += linear(0.0, two.Q[0, :, k], [e[i] * e[j] for i, j in zip(at.first, at.second, strict=True)])
+        return ball(value, two.p[0, k], two.q[0, k], two.s[0, k])
+
+    def encloser(k: int, point: np.ndarray) -> tuple[object, object] | None:
+        value = linear(c.c[k, 0], c.a[k, 0], steps(point, centre[:, k], radius[:, k])) if c.r[k, 0] < np.inf else None
+        return None if value is None else ball(value, 0.0, 0.0, c.r[k, 0])
+
+    found: dict[str, Ends] = {"first order": first, "second order": second, "encloser": encloser}
+    for name, each in (("first", one), ("second", two)):
+        found[f"range of {name} order"] = lambda k, _, each=each: (arb(each.lo[0, k]), arb(each.hi[0, k]))
+    for name, ends in numbers.items():
+        found[f"bound in {name}"] = lambda k, _, ends=ends: (arb(ends[0, k]), arb(ends[1, k]))
+    return found
+
+
+def of_checkers(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[str, Ends]:
+    """Enclosures of the checkers: interval slopes, and polynomials with a ball; NaN proves nothing."""
+    slope, value = SlopeArithmetic(function)(low, high)[0], PolynomialArithmetic(function)(low, high)[0]
+    at, on, (centre, radius) = places(len(value.on)), list(value.on), middles(low, high)
+
+    def slopes(k: int, point: np.ndarray) -> tuple[object, object] | None:
+        """The value at the point from that at the centre."""
+        middle = np.clip(0.5 * (low[:, k] + high[:, k]), low[:, k], high[:, k])
+        (least, most), C = (each[:, k] for each in slope.S), [each[k] for each in slope.C]
+        if np.isnan([*C, *least, *most]).any():
+            return None
+        ends = [arb(each) for each in C]
+        for i in np.flatnonzero(point != middle):
+            S = (least[i], most[i]) if point[i] > middle[i] else (most[i], least[i])
+            ends = [each + arb(end) * (arb(point[i]) - arb(middle[i])) for each, end in zip(ends, S, strict=True)]
+        return ends[0], ends[1]
+
+    def polynomial(k: int, point: np.ndarray) -> tuple[object, object] | None:
+        if np.isnan(value.s[k]):
+            return None
+        e, P = steps(point[on], centre[on, k], radius[on, k]), value.P[:, k]
+        total = linear(P[0], P[at.linear], e) + linear(0.0, P[at.squares], [each * each for each in e])
+        total += linear(0.0, P[at.products], [e[i] * e[j] for i, j in zip(at.first, at.second, strict=True)])
+        return ball(total, 0.0, 0.0, value.s[k])
+
+    found: dict[str, Ends] = {"slopes": slopes, "polynomial": polynomial}
+    for name, (least, most) in (("slopes", slope.V), ("polynomial", value.V)):
+        found[f"range of {name}"] = lambda k, _, ends=(least, most): (
+            None if np.isnan([ends[0][k], ends[1][k]]).any() else (arb(ends[0][k]), arb(ends[1][k]))
+        )
+    return found
 
 
 @pytest.mark.parametrize("name", GRAPHS)
 def test_no_value_of_any_scale_is_outside(name: str) -> None:
     function = function_of(name)
     tape = compile_tape(function)
-    low, high = boxes(len(name), 160)
-    centre, radius = midpoints(low, high)
+    low, high = boxes(len(name), 120)
     with np.errstate(all="ignore"):
-        one, two, c = enclose(tape, low, high), enclose_second(tape, low, high), in_c(function, low, high)
-        numpy, kernels = (bounds(function, low, high, each) for each in (NumpyEngine, KernelEngine))
-        slope, polynomial = SlopeArithmetic(function)(low, high)[0], PolynomialArithmetic(function)(low, high)[0]
-    at, paper_centre, paper_radius = places(len(polynomial.on)), *middles(low, high)
-    bad: dict[str, int] = {}
-    finite: dict[str, int] = {}
-    for point in points_of(low, high, 6, 1):
-        for box in range(low.shape[1]):
-            (ball,), (is_sharp,) = balls.decided_balls(tape, point[:, box])
-            if not is_sharp or not ball.is_finite():
+        every = of_search(function, low, high) | of_checkers(function, low, high)
+    bad, held = Counter[str](), Counter[str]()
+    for point in points_of(low, high, 5, 1):
+        for k in range(low.shape[1]):
+            (exact,), (is_sharp,) = balls.decided_balls(tape, point[:, k])
+            if not is_sharp or not exact.is_finite():
                 continue
-            e = steps(point[:, box], centre[:, box], radius[:, box])
-            held: dict[str, tuple[object, object]] = {}
-            if np.isfinite(one.s[0, box]):
-                held["first"] = first_order(one, box, e)
-                held["range of first"] = arb(one.lo[0, box]), arb(one.hi[0, box])
-            if np.isfinite(two.s[0, box]):
-                held["second"] = second_order(two, box, e)
-                held["range of second"] = arb(two.lo[0, box]), arb(two.hi[0, box])
-            if np.isfinite(c.r[box, 0]):
-                value = sum((arb(a) * step for a, step in zip(c.a[box, 0], e, strict=True)), arb(c.c[box, 0]))
-                held["kernel"] = value - arb(c.r[box, 0]), value + arb(c.r[box, 0])
-            for key, each in (("NumPy's bound", numpy), ("kernel's bound", kernels)):
-                if np.isfinite(each[:, box]).all():
-                    held[key] = arb(each[0, box]), arb(each[1, box])
-            if not np.isnan(slope.V[0][box]) and not np.isnan(slope.V[1][box]):
-                held["slopes"] = arb(slope.V[0][box]), arb(slope.V[1][box])
-            if not np.isnan(polynomial.s[box]):
-                own = [steps(point[:, box], paper_centre[:, box], paper_radius[:, box])[i] for i in polynomial.on]
-                P, d = polynomial.P[:, box], len(polynomial.on)
-                value = sum((arb(P[1 + i]) * own[i] + arb(P[1 + d + i]) * own[i] ** 2 for i in range(d)), arb(P[0]))
-                for p, i, j in zip(P[1 + 2 * d :], at.first, at.second, strict=True):
-                    value += arb(p) * own[i] * own[j]
-                held["polynomial"] = value - arb(polynomial.s[box]), value + arb(polynomial.s[box])
-                held["range of polynomial"] = arb(polynomial.V[0][box]), arb(polynomial.V[1][box])
-            for key, ends in held.items():
-                finite[key] = finite.get(key, 0) + 1
-                bad[key] = bad.get(key, 0) + outside(ball, *ends)
-    wrong = {key: (count, finite[key]) for key, count in bad.items() if count}
-    assert not wrong, wrong
+            for key, each in every.items():
+                ends = each(k, point[:, k])
+                held[key] += ends is not None
+                bad[key] += ends is not None and (bool(exact < ends[0]) or bool(exact > ends[1]))
+    assert not +bad
+    assert min(held.values()) > 100, held
