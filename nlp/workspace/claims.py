@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -99,19 +99,29 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = [*_of_limits(layout), *_of_legs(layout)]
-    # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
-    known = {(each.name, each.sense) for each in found}
-    found += [each for each in _of_quantities(layout, quantities) if (each.name, each.sense) not in known]
+    found = with_limits(_of_quantities(layout, quantities), [*_of_limits(layout), *_of_legs(layout)])
     if with_objective:
         found += _of_tasks(layout)
     return found
 
 
+def with_limits(claims: Iterable[Claim], more: Sequence[Claim]) -> list[Claim]:
+    """Return claims after those on limits of theirs and after more; a measure with its limit is claimed once.
+
+    Args:
+        claims: among them measures that are asked for, which give way to claims of the same number.
+        more: further claims.
+    """
+    named = {(each.name, each.sense) for each in more}
+    kept = [each for each in claims if each.limit is not None or (each.name, each.sense) not in named]
+    place = next((k for k, each in enumerate(kept) if not each.key or each.leg is not None), len(kept))
+    return [*kept[:place], *more, *kept[place:]]
+
+
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
     # At one pose the limit on a leg's dead length says less than over all poses.
-    own = (*OWN_SEARCHES, "leg_length", Actuator.key) if layout.robots[0].legs else OWN_SEARCHES
+    own = (*OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else OWN_SEARCHES
     items = (*layout.constraints, *layout.constant_limits)
     yield from claims_of_items([item for item in items if not any(key.startswith(own) for key in item.constraint.keys)])
 

@@ -199,3 +199,18 @@ def test_the_rank_of_constraints_is_counted() -> None:
     refuted = changed(result.constraints, outcome=Outcome.REFUTED)
     lost = changed(result, proved=False, constraints=refuted)
     assert verdict_words(lost) == "not everything is proved: 1 refuted, 0 open, 1 proved"
+
+
+def test_actuators_keep_the_limit_on_their_rates(tmp_path: Path) -> None:
+    """Trap: it begins with the word of the limit on strokes, whose claims at one pose are left out."""
+    found = judged("actuator = { dead_length = 1 }\nactuator_rate = { max = 60 }", tmp_path, time_limit=0.2)
+    assert sum(each.key == "actuator_rate.max" for each in found.extremes) >= 1
+    assert sum(each.key == "actuator.dead_length" for each in found.extremes) == 6
+
+
+def test_a_measure_gives_way_to_its_limit_for_every_machine_too(tmp_path: Path) -> None:
+    text = "base_joint_angle = { max = 80, about = 'home' }\nhome = { position = [0, 0, 20] }\n"
+    found = judged(f"{text}[tolerance]\njoint_centre = 0.01", tmp_path, time_limit=0.2, quantities=["base_joint_angle"])
+    names = Counter((each.name, each.sense) for each in found.extremes)
+    assert set(names.values()) == {1}
+    assert sum(each.key == "base_joint_angle.max" for each in found.extremes) == 6
