@@ -85,7 +85,7 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
 
 def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     """Return the claim that fails, a pose of it, and whether it is refuted: a refuted one before an open one."""
-    faults = []
+    faults: list[tuple[Outcome, str, PoseNumbers | None]] = []
     for name, found in zip(("regular", "constraints regular"), judged.ranks, strict=False):
         if found.outcome is not Outcome.PROVED:
             faults.append((found.outcome, name, None if found.y is None else found.box.pose(found.y)))
