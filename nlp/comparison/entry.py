@@ -194,12 +194,10 @@ def driven_wrenches(contender: Contender) -> int:
 
 
 def outcome_of(judgement: Judgement) -> Outcome:
-    """Return the verdict on a design over its workspace, which is open where regular poses are not proved."""
+    """Return the verdict on a design over its workspace."""
     if judgement.is_refuted:
         return Outcome.REFUTED
-    is_regular = judgement.regularity is not None and judgement.regularity.outcome is Outcome.PROVED
-    held = all(each.outcome is Outcome.PROVED for each in judgement.extremes if each.limit is not None)
-    return Outcome.PROVED if is_regular and held else Outcome.OPEN
+    return Outcome.PROVED if judgement.is_proved else Outcome.OPEN
 
 
 def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: tuple[str, ...]) -> dict[str, Stroke]:

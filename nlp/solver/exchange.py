@@ -191,7 +191,7 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         faults.append(None)
     by_name = {(each.name, each.sense): each for each in judged.extremes}
     for each in judged.extremes:
-        if each.limit is None or each.outcome is Outcome.PROVED:
+        if not each.fails:
             continue
         if each.pose is None:
             faults.append(None)

@@ -13,15 +13,15 @@ from ..case.case import Case
 from ..case.workspace import Workspace
 from ..interruption import is_requested, one_call
 from ..program.layout import Layout
-from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
+from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
 from .anyrobot import Ranks, not_judged, prove_ranks, touched
 from .builtlegs import as_built, refined
-from .claims import Claim, claims_of
+from .claims import SPECTRAL, Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
 from .looplimits import loop_extremes
 from .machine import Legs, check_leg_error, legs_of, workspace_of_case
-from .numbers.askedvalues import SPECTRAL, spectral_extremes
+from .numbers.askedvalues import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.ownsearches import own_searches, pose_errors
 from .numbers.robotlimits import limited_spectrum
@@ -69,8 +69,8 @@ class Judgement:
 
     @property
     def is_proved(self) -> bool:
-        """Whether all ranks are proved to be full, every limit holds, and every other number is bounded to the gap."""
-        return self.is_regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
+        """Whether all ranks are proved to be full, and every limit holds; a number without a limit is information."""
+        return self.is_regular and not any(each.fails for each in self.extremes)
 
     @property
     def is_refuted(self) -> bool:
@@ -110,7 +110,7 @@ def judge_workspace(
         with_objective: whether F of each task is bounded.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
             the errors of the platform's pose are bounded, where F is.
-        until_fault: whether the work ends at the first claim that is not proved.
+        until_fault: whether the work ends at the first rank or limit that is not proved.
         rank_progress: called during the search for singular poses.
         progress: called before each number with its name, the number of those done, and of all.
         paper: records the searches for a proof.
@@ -136,8 +136,8 @@ def judge_workspace(
         return judged
     numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
     found: list[Extreme] = []
-    for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
-        if until_fault and outcome is not Outcome.PROVED:
+    for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+        if until_fault and each.fails:
             break
     return replace(judged, extremes=tuple(found))
 
@@ -201,8 +201,8 @@ class _Numbers:
 
     def add(
         self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
-    ) -> Iterator[Outcome]:
-        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks; yield each outcome.
+    ) -> Iterator[Extreme]:
+        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks, and yield each.
 
         Args:
             found: gets the extremes; lengths that a stroke needs more finely take the place of those found before.
@@ -215,7 +215,6 @@ class _Numbers:
         """
         case, box, legs = self.case, pose_box(self.workspace), self.legs
         names = [name for name in quantities if name not in SPECTRAL]
-        asked = [name for name in quantities if name in SPECTRAL]
         family = None if self.machines is None else self.machines.family
         spectral = partial(
             spectral_extremes,
@@ -229,37 +228,42 @@ class _Numbers:
         if self.machines is not None:
             effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
             yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
-            yield from self._add_others(found, spectral(case, self.closed.model, box, asked))
+            yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
             return
         layout = posed_layout(case, self.workspace)
-        claims = claims_of(layout, names, with_objective=with_objective)
+        claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
         if self.closed.reaches:
             reach = reach_claims(case, self.closed, self.workspace)
             place, reaches = reach.layout, [replace(each, uncovered=self.unknown) for each in reach.claims]
             yield from self._add_proved(found, place, reaches)
-            if all(each.outcome is Outcome.PROVED for each in found):
+            is_reached = not any(each.fails for each in found)
+            if is_reached:
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
                 layout = closed_layout(case, self.closed, self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
-        prove = self._prove(layout)
+        prove, shown = self._prove(layout), list[Extreme]()
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         if legs is None and self.paper is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             own = search(case, self.closed, box)
             yield from _add(found, own)
-            known = {(each.name, each.sense) for each in own}
-            claims = [each for each in claims if each.limit is None or (each.name, each.sense) not in known]
+            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+            if is_reached:
+                shown = list(shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective))
+            known = {(each.name, each.sense, each.key) for each in (*own, *shown)}
+            claims = [each for each in claims if (each.name, each.sense, each.key) not in known]
         yield from self._add_proved(found, layout, claims)
+        yield from _add(found, shown)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
             refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
-            yield from (each.outcome for each in found[before:])
+            yield from found[before:]
             others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
-        yield from self._add_others(found, spectral(case, self.closed.model, box, asked, shortest=shortest))
+        yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
@@ -267,7 +271,7 @@ class _Numbers:
             errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
             yield from _add(found, errors(legs, box, eps, shortest))
 
-    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Outcome]:
+    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
         """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
         if self.legs is None:
             family = None if self.machines is None else self.machines.family
@@ -287,8 +291,8 @@ class _Numbers:
             legs=self.legs,
         )
 
-    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Outcome]:
-        """Add the extremes of claims, and yield their outcomes."""
+    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Extreme]:
+        """Add the extremes of claims, and yield them."""
         prove = self._prove(layout)
         for done, claim in enumerate(claims):
             if self.progress is not None:
@@ -296,8 +300,8 @@ class _Numbers:
             yield from _add(found, [prove(claim, gap=self.gap, paper=self.paper)])
 
 
-def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Outcome]:
-    """Add extremes one by one, and yield the outcome of each."""
+def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:
+    """Add extremes one by one, and yield each."""
     for each in more:
         found.append(each)
-        yield each.outcome
+        yield each

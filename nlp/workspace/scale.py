@@ -64,7 +64,7 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
             with_objective=False,
             until_fault=True,
         )
-        if judged_holds(judged):
+        if judged.is_proved:
             proved = factor
         elif is_requested() and not judged.is_refuted:  # an interrupted search shows no fault
             break
@@ -86,24 +86,13 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
     return Scale(proved, failed, refuted, claim, pose)
 
 
-def judged_holds(judged: Judgement) -> bool:
-    """Return whether J is regular and every limit holds; numbers without a limit do not count."""
-    return judged.is_regular and all(
-        each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None
-    )
-
-
 def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     """Return the claim that fails, a pose of it, and whether it is refuted: a refuted one before an open one."""
-    faults = []
+    faults: list[tuple[Outcome, str, PoseNumbers | None]] = []
     for name, found in zip(("regular", "constraints regular"), judged.ranks, strict=False):
         if found.outcome is not Outcome.PROVED:
             faults.append((found.outcome, name, None if found.y is None else found.box.pose(found.y)))
-    faults += [
-        (each.outcome, f"{each.name}: {each.key}", each.pose)
-        for each in judged.extremes
-        if each.limit is not None and each.outcome is not Outcome.PROVED
-    ]
+    faults += [(each.outcome, f"{each.name}: {each.key}", each.pose) for each in judged.extremes if each.fails]
     if not faults:
         return "regular poses", None, False
     outcome, name, pose = min(faults, key=lambda each: each[0] is not Outcome.REFUTED)
