@@ -116,15 +116,15 @@ def start_of(robot: PosedRobot) -> FloatArray:
     # Numbers of the pose move only where the unknowns alone do not close the loops.
     for moving in [range(count, n)] * (n > count) + [range(n)]:
         found = points.from_home(robot.centre, moving)
-        if found is not None and _is_home(robot, found):
+        if found is not None and is_home(robot, found):
             return found
     raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
 
 
-def _is_home(robot: PosedRobot, z: FloatArray) -> bool:
-    """Return whether a closed point (n,) fulfils all loop equations, with the joints in home's working mode."""
+def is_home(robot: PosedRobot, z: FloatArray) -> bool:
+    """Return whether a closed point (n,) fulfils all loop equations, in home's working mode; not where it is NaN."""
     loops, signs = (each.full() for each in ca.Function("mode", [robot.z], [robot.loops, robot.signs])(z))
-    return bool((np.abs(loops) <= _OTHER).all() and (signs > 0).all())
+    return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
 
 
 def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
