@@ -19,6 +19,7 @@ from .builtlegs import as_built, refined
 from .claims import Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
+from .homeposes import Homes
 from .looplimits import loop_extremes
 from .machine import Legs, legs_of, workspace_of_case
 from .numbers.askedvalues import SPECTRAL, spectral_extremes
@@ -123,10 +124,11 @@ def judge_workspace(
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
     machines, unknown = _machines(case, closed, box, legs)
+    homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
     ranks = (
         Ranks(not_judged(box, unknown), None)
         if unknown
-        else _ranks(case, closed, box, legs, machines, engine, time_limit, rank_progress, paper)
+        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
     )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
@@ -136,7 +138,7 @@ def judge_workspace(
     for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
         if until_fault and outcome is not Outcome.PROVED:
             break
-    return replace(judged, extremes=tuple(found))
+    return replace(judged, extremes=tuple(homes.shown(each) for each in found))
 
 
 def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
@@ -150,24 +152,21 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -
 
 
 def _ranks(
-    case: Case,
     closed: ClosedForm,
-    box: PoseBox,
+    homes: Homes,
     legs: Legs | None,
-    machines: Machines | None,
     engine: str | None,
     time_limit: float | None,
     progress: RankProgress | None,
     paper: PaperRecord | None,
 ) -> Ranks:
     """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
+    case, box = homes.case, homes.box
     if legs is not None:
         recorder = None if paper is None else paper.rank
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
-    family = None if machines is None else machines.family
-    searched = partial(prove_ranks, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
-    return searched(case, closed.model, box, family=family)
+    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,13 +240,11 @@ class _Numbers:
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
-        if legs is None and self.paper is None and not case.joint_centre_tolerance:
+        decided: list[Extreme] = []
+        if legs is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            own = search(case, self.closed, box)
-            yield from _add(found, own)
-            known = {(each.name, each.sense) for each in own}
-            claims = [each for each in claims if each.limit is None or (each.name, each.sense) not in known]
-        yield from self._add_proved(found, layout, claims)
+            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
+        yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
             refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
@@ -284,13 +281,22 @@ class _Numbers:
             legs=self.legs,
         )
 
-    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Outcome]:
-        """Add the extremes of claims, and yield their outcomes."""
-        prove = self._prove(layout)
+    def _add_proved(
+        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+    ) -> Iterator[Outcome]:
+        """Add the extremes of claims, and yield their outcomes; those that are decided are proved for the paper alone.
+
+        Of two claims of one name, such as a limit and a measure that is asked for, the first one is decided.
+        """
+        prove, known = self._prove(layout), {(each.name, each.sense): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
-            yield from _add(found, [prove(claim, gap=self.gap, paper=self.paper)])
+            own = known.pop((claim.name, claim.sense), None)
+            if own is None or (self.paper is not None and own.outcome is Outcome.PROVED):
+                again = prove(claim, gap=self.gap, paper=self.paper)
+                own = own or again
+            yield from _add(found, [own])
 
 
 def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Outcome]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...certificate.paper.proof import fingerprint
-from ..claims import asked_name, exact_length_name, one_machine_name
+from ..claims import REACH, asked_name, exact_length_name, one_machine_name
 from ..machine import Legs, legs_of
 from ..verdict import Outcome, Regularity
 from .anyrobot.robotclaims import RobotClaims, robot_claims
@@ -133,7 +133,7 @@ class _Robot(NamedTuple):
 
 def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     """Return the claims about the robot of a judgement, with the symbols in which its numbers were bounded."""
-    reaches = [each for each in judged.extremes if each.key == "reach"]
+    reaches = [each for each in judged.extremes if each.key == REACH]
     proved = {each.name for each in reaches if each.outcome is Outcome.PROVED}
     on_paper = {each for each in proved if (found := record.programs.get((each, "min"))) and found.tree is not None}
     # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.

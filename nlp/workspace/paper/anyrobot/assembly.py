@@ -84,8 +84,9 @@ class Assembly:
         self.dependent = dependent_coordinates(self.points, robot, start, self._count) if self._count else []
         self.independent = [k for k in range(len(start)) if k not in self.dependent]
         # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
-        middle = self.points.moved(start[None], robot.centre[None][:, self.independent], self.independent, self.dependent)
-        self.start = middle[0] if is_home(robot, middle[0]) else start
+        to = robot.centre[None][:, self.independent]
+        (middle,) = self.points.moved(start[None], to, self.independent, self.dependent)
+        self.start = middle if is_home(robot, middle) else start
         columns = ca.jacobian(equations, robot.z)
         slopes = [ca.densify(columns[:, j]) for j in self.dependent]
         vector = ca.vertcat(SX(0, 1), equations, *slopes)
