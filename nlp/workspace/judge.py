@@ -295,6 +295,8 @@ class _Numbers:
             own = known.pop((claim.name, claim.sense), None)
             if own is None or (self.paper is not None and own.outcome is Outcome.PROVED):
                 again = prove(claim, gap=self.gap, paper=self.paper)
+                if own is not None and self.paper is not None and again.outcome is not Outcome.PROVED:
+                    self.paper.elsewhere.add((claim.name, claim.sense.value))
                 own = own or again
             yield from _add(found, [own])
 

@@ -29,6 +29,7 @@ _AS_BUILT = "it is about every machine within the tolerance of joint centres, wh
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
 _NO_BOUND = "its search has no bound"
+_ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"
 #: Reasons of claims about other robots than six straight legs.
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
@@ -200,6 +201,8 @@ def _number(
 def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
     """Return a claim with a tree of the search of ``certify``, or why there is none."""
     program = record.programs.get(each.key)
+    if each.key in record.elsewhere:
+        return _ONE_ASSEMBLY
     if program is None or program.tree is None:
         return _NO_BOUND
     return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
