@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
+#: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
+_AS_NEEDED = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +296,7 @@ class _Numbers:
                 self.progress(claim.name, done, len(claims))
             own = known.pop((claim.name, claim.sense), None)
             if own is None or (self.paper is not None and own.outcome is Outcome.PROVED):
-                again = prove(claim, gap=self.gap, paper=self.paper)
+                again = prove(claim, gap=self.gap if own is None else _AS_NEEDED, paper=self.paper)
                 if own is not None and self.paper is not None and again.outcome is not Outcome.PROVED:
                     self.paper.elsewhere.add((claim.name, claim.sense.value))
                 own = own or again
