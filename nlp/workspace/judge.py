@@ -19,6 +19,7 @@ from .builtlegs import as_built, refined
 from .claims import SPECTRAL, Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
+from .homeposes import Homes
 from .looplimits import loop_extremes
 from .machine import Legs, check_leg_error, legs_of, workspace_of_case
 from .numbers.askedvalues import spectral_extremes
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
+#: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
+_AS_NEEDED = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +129,11 @@ def judge_workspace(
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
     machines, unknown = _machines(case, closed, box, legs)
+    homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
     ranks = (
         Ranks(not_judged(box, unknown), None)
         if unknown
-        else _ranks(case, closed, box, legs, machines, engine, time_limit, rank_progress, paper)
+        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
     )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
@@ -139,7 +143,7 @@ def judge_workspace(
     for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
         if until_fault and each.fails:
             break
-    return replace(judged, extremes=tuple(found))
+    return replace(judged, extremes=tuple(homes.shown(each) for each in found))
 
 
 def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
@@ -153,24 +157,21 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -
 
 
 def _ranks(
-    case: Case,
     closed: ClosedForm,
-    box: PoseBox,
+    homes: Homes,
     legs: Legs | None,
-    machines: Machines | None,
     engine: str | None,
     time_limit: float | None,
     progress: RankProgress | None,
     paper: PaperRecord | None,
 ) -> Ranks:
     """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
+    case, box = homes.case, homes.box
     if legs is not None:
         recorder = None if paper is None else paper.rank
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
-    family = None if machines is None else machines.family
-    searched = partial(prove_ranks, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
-    return searched(case, closed.model, box, family=family)
+    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,20 +242,17 @@ class _Numbers:
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
                 layout = closed_layout(case, self.closed, self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
-        prove, shown = self._prove(layout), list[Extreme]()
+        prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
-        if legs is None and self.paper is None and not case.joint_centre_tolerance:
+        decided: list[Extreme] = []
+        if legs is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            own = search(case, self.closed, box)
-            yield from _add(found, own)
-            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
             if is_reached:
-                shown = list(shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective))
-            known = {(each.name, each.sense, each.key) for each in (*own, *shown)}
-            claims = [each for each in claims if (each.name, each.sense, each.key) not in known]
-        yield from self._add_proved(found, layout, claims)
-        yield from _add(found, shown)
+                effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
+        yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
             refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
@@ -291,13 +289,22 @@ class _Numbers:
             legs=self.legs,
         )
 
-    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Extreme]:
-        """Add the extremes of claims, and yield them."""
-        prove = self._prove(layout)
+    def _add_proved(
+        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+    ) -> Iterator[Extreme]:
+        """Add the extremes of claims, and yield them; those that are decided are searched again for the paper alone."""
+        prove, known = self._prove(layout), {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
-            yield from _add(found, [prove(claim, gap=self.gap, paper=self.paper)])
+            own = known.get((claim.name, claim.sense, claim.key))
+            is_limit = own is not None and own.limit is not None
+            if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
+                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap, paper=self.paper)
+                if is_limit and self.paper is not None and again.outcome is not Outcome.PROVED:
+                    self.paper.elsewhere.add((claim.name, claim.sense.value))
+                own = own or again
+            yield from _add(found, [own])
 
 
 def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:

@@ -20,7 +20,7 @@ from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..errors import UncoveredError
 from ..interruption import reason_of, reason_to_stop
-from .general.cells import Cells, Examiner, joined
+from .general.cells import Cells, Examiner, are_between, joined
 from .general.connected import is_connected
 from .general.covering import coordinates_to_split, in_workspace, whole_workspace, widths_of
 from .general.limitvalues import Enclosed, LimitValues
@@ -183,6 +183,7 @@ class _Search:
         own = [k for k in self._independent if k < count]
         z[:, own] = inside[:, own]
         z = self._examiner.loops.all_closed(z.T, self._dependent).T
+        z[~are_between(z, cells.some(rows), self._dependent)] = np.nan
         numbers = self._values.values(z)
         y = self._problem.pose_of(np.nan_to_num(z))
         held = np.array([self._problem.box.holds(each) for each in y]) & np.isfinite(z).all(axis=1)

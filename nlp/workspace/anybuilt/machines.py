@@ -17,7 +17,7 @@ from ...case.limits.constraint import Reading
 from ...case.task import Sense
 from ...errors import UncoveredError
 from ...program.layout import Layout
-from ..claims import Claim, claims_of
+from ..claims import REACH, Claim, claims_of
 from ..general.family import BuiltModel, Family, built_model, family_of
 from ..general.machinenumber import MachineMinimum, smallest_of_machines
 from ..general.problem import NotJudgedError, build_problem
@@ -170,7 +170,7 @@ def _reach_claims(machines: Machines, layout: Layout) -> list[Claim]:
     values = ca.Function("reach", own.all, [each.value for each in reaches]).call(given.all)
     reading = Reading(Dimension.NUMBER)
     return [
-        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, "reach", 0.0)
+        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
         for each, value in zip(reaches, values, strict=True)
     ]
 

@@ -145,8 +145,13 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         raise NotJudgedError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
     needed = _needed(loops, start, count, posed)
     equations = posed.closure[needed] if needed else SX(0, 1)
-    dependent = _dependent(Loops(posed.z, equations, posed.every, posed.signs, posed.size), start, count)
+    counted = Loops(posed.z, equations, posed.every, posed.signs, posed.size)
+    dependent = _dependent(counted, start, count)
     independent = tuple(k for k in range(posed.z.numel()) if k not in dependent)
+    # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
+    middle[list(dependent)] = start[list(dependent)]
+    moved = counted.all_closed(middle[:, None], list(dependent))[:, 0]
+    start = moved if counted.is_closed(moved) else start
     length = _length(posed, start, case, model)
     columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.members)
     limbs = posed.limbs.reduced(columns, length)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -50,6 +51,7 @@ def prove_rank(
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
+    is_shown: Callable[[FloatArray], bool] = lambda _: True,
 ) -> Regularity:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -62,11 +64,12 @@ def prove_rank(
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
+        is_shown: whether a singular point (n,), or (n + 3 m,) of another machine, is one in home's assembly.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, family, engine, recorder)
+    search = _Search(problem, matrix, family, engine, recorder, is_shown)
     return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
 
 
@@ -92,10 +95,11 @@ class _Search:
         matrix: RankMatrix,
         family: Family | None,
         engine: str | None,
-        recorder: TreeRecord | None = None,
+        recorder: TreeRecord | None,
+        is_shown: Callable[[FloatArray], bool],
     ) -> None:
         self._began = time.perf_counter()
-        self._problem, self._family, self._recorder = problem, family, recorder
+        self._problem, self._family, self._recorder, self._is_shown = problem, family, recorder, is_shown
         self._newton, self._machine = (
             SingularPose(problem, matrix),
             None if family is None else SingularMachine(family, family.matrix(matrix)),
@@ -175,15 +179,21 @@ class _Search:
             if not values[k] < self._last or self._attempts >= _MOST:
                 break
             self._attempts += 1
-            self._last = _SMALLER * float(values[k])
-            self._singular = self._newton.search(self._middle(found.cells, k))
+            near = self._newton.search(self._middle(found.cells, k))
+            self._singular = self._if_shown(near)
             if self._singular is not None:
                 return True
+            # A singular pose of another assembly says nothing about where one of home's is.
+            self._last = _SMALLER * float(values[k]) if near is None else self._last
         if self._machine is None or boxes < self._due or not np.isfinite(values[order[0]]):
             return False
         self._due = 2 * boxes
-        self._singular = self._machine.search(self._middle(found.cells, order[0]))
+        self._singular = self._if_shown(self._machine.search(self._middle(found.cells, order[0])))
         return self._singular is not None
+
+    def _if_shown(self, z: FloatArray | None) -> FloatArray | None:
+        """Return a singular point if it is one in home's assembly: Newton's method may end in another one."""
+        return z if z is not None and self._is_shown(z) else None
 
     def _middle(self, cells: Cells, k: np.int64) -> FloatArray:
         """Return a point (n,) in the middle of a box, with closed loops or near them."""

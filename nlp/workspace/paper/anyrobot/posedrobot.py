@@ -25,6 +25,8 @@ class PosedRobot:
         middle: (6,) the middle of the workspace: the values of the others.
         size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
         equations: (k, 1) that are 0 where the loops are closed, of order 1.
+        loops: (l, 1) further equations of the same loops, which other assemblies of the joints do not fulfil.
+        signs: (s, 1) numbers that are positive in home's working mode.
         rows: rows of limbs, one wrench each.
         members: members of limbs.
         actuators: (6, 1) screws of actuators as twists with the world's origin as reference, by name of the limb.
@@ -37,6 +39,8 @@ class PosedRobot:
     middle: FloatArray
     size: FloatArray
     equations: SX
+    loops: SX
+    signs: SX
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
     actuators: tuple[tuple[str, SX], ...]
@@ -73,7 +77,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         *[part for row in model.wrenches for part in (row.force, row.moment)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *[each.screw for each in model.actuators],
-        *[each.scaled for each in model.closure],
+        *[each.scaled for each in (*model.closure, *model.loops)],
+        *[each.value for each in model.signs],
         *[each.size for each in model.unknowns],
     ]
     following = iter(ca.Function("robot", Substitution.identity(model).all, outputs).call(given.all))
@@ -88,6 +93,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         ),
         actuators=tuple((each.limb, next(following)) for each in model.actuators),
         equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
+        loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
+        signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
         position=position,
         length=case.characteristic_length,
     )
