@@ -160,9 +160,7 @@ class _Checker:
         self._root: PoseRoot = pose_root(workspace)
         self._tolerance = case.joint_centre_tolerance or 0.0
         self._eps = leg_error_of(case, leg_error)
-        self.numbers_at = ""
-        if case.model.unknowns:
-            self.numbers_at = "the assembly of home" if robot.is_closed else "every assembly"
+        self.numbers_at = robot.numbers_at
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
