@@ -83,7 +83,8 @@ def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
             name=row.name,
             value=units.shown(row.value, row.dimension),
             unit=units.label(row.dimension),
-            derivative=units.per_unit(row.derivative, row.dimension),
+            derivative=None if row.derivative is None else units.per_unit(row.derivative, row.dimension),
+            hindrance=None if row.hindrance is None else row.hindrance.value,
         )
         for row in sensitivities(nlp, x)
     )

@@ -89,6 +89,8 @@ class _Reasons:
             place = _Place.ACTIVE
             cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
             why = f"{side.bound}, {cost:.4g} F/{label or 'unit'}"
+        elif fixed is not None and fixed.derivative is None:
+            why = f"fixed: {fixed.hindrance}"
         elif fixed is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))

@@ -272,13 +272,15 @@ class SensitivityData(JsonObject):
         name: of the number.
         value: of the number.
         unit: of the value.
-        derivative: of the optimal F by the number.
+        derivative: of the optimal F by the number; absent where there is none.
+        hindrance: why there is none, in words.
     """
 
     name: str
     value: float
     unit: str
-    derivative: float
+    derivative: Absent[float]
+    hindrance: Absent[str]
 
 
 class JointGradientData(JsonObject):
