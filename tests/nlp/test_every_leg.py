@@ -7,6 +7,7 @@ import itertools
 import math
 import shutil
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -15,8 +16,19 @@ import pytest
 from casadi import SX
 from numpy.typing import NDArray
 
-from screwsynth.nlp import Case, Nlp, case_from_tables, formulate, generate_c, load_case, load_compiled, solve
+from screwsynth.nlp import (
+    Case,
+    Nlp,
+    case_from_tables,
+    formulate,
+    generate_c,
+    load_case,
+    load_compiled,
+    sensitivities,
+    solve,
+)
 from screwsynth.nlp.case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.program.places import FreeRotation
 from screwsynth.nlp.program.repeated import without_repeated
 from screwsynth.nlp.program.sampling import starting_points
@@ -242,3 +254,19 @@ def test_no_c_with_random_limits_answers_a_wrong_design(name: str, tmp_path: Pat
         for key, number in limits.items():
             over = number[k] - values[key] if key.endswith("min") else values[key] - number[k]
             assert over <= 1e-6 * max(1.0, number[k]), (key, k)
+
+
+def test_a_limit_that_binds_on_all_legs_alike_gives_a_corner_and_no_slope() -> None:
+    case = load_case("free-wrist")
+    own = solve(case)
+    rows = {row.name: row for row in sensitivities(own.nlp, own.x)}
+    assert {name: row.hindrance for name, row in rows.items()} == dict.fromkeys(rows, Hindrance.CORNER)
+    assert all(row.derivative is None for row in rows.values())
+
+    def moved(step: float) -> float:
+        position = (step, *case.position[1:])
+        return solve(replace(case, position=position)).F
+
+    # The least F grows with a step to either side: the slopes on both sides have one sign.
+    slopes = [(moved(step) - own.F) / abs(step) for step in (-0.5, 0.5)]
+    assert min(slopes) > 1e-3
