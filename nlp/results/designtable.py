@@ -11,15 +11,13 @@ from ...models import Dimension, component_names
 from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..units import Units
-from .rounding import STATED, listed, number, robot_size, settled, size_of_F
+from .rounding import STATED, TURNED, listed, number, robot_size, settled, size_of_F
 from .text import FEWEST_FOLDED, TextTable
 
 if TYPE_CHECKING:
     from .data import ActiveData, CombinedData, SolveResult
     from .parts import PoseData, RobotData, SensitivityData
 
-#: A rotation by less than this, radians, has no axis that means anything.
-_TURNED = 1e-9
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
 
@@ -151,7 +149,7 @@ def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_
         for name, value, given in zip(component_names("p", 3), found.position, pose.position, strict=True)
     ]
     angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
-    turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > _TURNED
+    turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > TURNED
     if not is_held and isinstance(angle, Free):
         # The sign of the angle means nothing then: its size is limited.
         angle = Free(*sizes_of_turn(angle))
