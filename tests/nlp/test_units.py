@@ -156,6 +156,9 @@ def test_a_workspace_is_the_same_in_every_unit(name: str, half: float, angle: fl
         found = workspace_of(judge_workspace(held))
         assert found.regular.outcome.name == "PROVED"
         data = json_data(found)
+        for each in data["extremes"]:
+            # Of poses that are images of each other, rounding chooses one.
+            each.pop("pose", None)
         return data, workspace_summary(held, found)
 
     # Bounds are proved up to a gap, within which the boxes' rounding chooses.
