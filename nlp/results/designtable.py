@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...models import Dimension, component_names
 from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
-from ..units import Units
+from ..units import Units, slope_unit
 from .rounding import STATED, TURNED, listed, number, robot_size, settled, size_of_F
 from .text import FEWEST_FOLDED, TextTable
 
@@ -86,14 +86,14 @@ class _Reasons:
         if side is not None:
             place = _Place.ACTIVE
             cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
-            why = f"{side.bound}, {cost:.4g} F/{label or 'unit'}"
+            why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
         elif fixed is not None and fixed.derivative is None:
             why = f"fixed: {fixed.hindrance}"
         elif fixed is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
             slope = settled(fixed.derivative, self._F / size)
-            why = f"fixed, {f'{slope:+.4g}' if slope else '0'} F/{label or 'unit'}"
+            why = f"fixed, {f'{slope:+.4g}' if slope else '0'} {slope_unit(label)}"
             felt = abs(slope) * size
         return _Row(place, (name, shown, label, between, *((why,) if self.any else ())), felt)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
-from ..units import Units
+from ..units import Units, slope_unit
 from .data import CombinedData
 from .motionwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
@@ -60,7 +60,7 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0) -> TextTable:
         where = [_place(name) for name in row.violated or row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
         slope = settled(row.cost or 0.0, abs(F) / (abs(row.limit) or 1.0))
-        cost = f"{slope:+.4g} F/{row.unit or 'unit'}" if row.active and slope else ""
+        cost = f"{slope:+.4g} {slope_unit(row.unit)}" if row.active and slope else ""
         beside = abs(row.limit) or 1.0
         word = "violated" if row.violated else "active" if row.active else ""
         shown = ", ".join(where[:_PLACES]) + more
@@ -140,7 +140,7 @@ def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: boo
     for side in active:
         slope = number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4)
         state = "violated" if side.name in violated else "active"
-        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} F/{side.unit or 'unit'}")
+        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} {slope_unit(side.unit)}")
         rows.append(cells if is_answer else cells[:-1])
     return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
 
