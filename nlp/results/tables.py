@@ -15,11 +15,13 @@ from .wording import SET, counted
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from ..case.case import Case
     from ..case.settings import Search
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
     from .evaluation import PrincipalMotionsData
     from .parts import LimitData, MarginData, RobotData, VersionsData
+    from .workspace import WorkspaceProofData
 
 #: So many places where a limit is active are named.
 _PLACES = 3
@@ -48,12 +50,28 @@ def principal_table(motions: PrincipalMotionsData, units: Units, size: float) ->
     return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
 
 
-def limit_table(limits: Sequence[LimitData], F: float = 0.0) -> TextTable:
+def limits_title(case: Case, proof: WorkspaceProofData | None = None) -> str:
+    """Return at which poses the rows of the limits hold, where a case has limits over a workspace; else nothing.
+
+    Args:
+        case: the case.
+        proof: of a solved design over the workspace, in which some of its poses became constraints.
+    """
+    if case.workspace is None or not case.workspace.has_limits:
+        return ""
+    stated = "limits at the stated pose" if case.pose_count == 1 else "limits at the stated poses"
+    if proof is None or not proof.poses:
+        return f"{stated}, not over the workspace"
+    return f"{stated}, and where a pose of the workspace became a constraint of its limit"
+
+
+def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") -> TextTable:
     """Return every limit of the case: how near the design comes to it, its cost, and where; violated and active first.
 
     Args:
         limits: of the case.
         F: size of F, of which costs have their error.
+        title: of the table; empty for none.
     """
     rows = []
     for row in sorted(limits, key=lambda each: (not each.violated, not each.active)):
@@ -66,7 +84,9 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0) -> TextTable:
         shown = ", ".join(where[:_PLACES]) + more
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
-    return TextTable(("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits")
+    return TextTable(
+        ("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits", title
+    )
 
 
 def _text(value: float | None, size: float) -> str:
