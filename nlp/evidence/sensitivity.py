@@ -94,7 +94,7 @@ def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> NDArray[np.
         by_argument: (m, k) derivatives by the arguments.
     """
     if not by_variable.size:
-        return ~by_argument.any(axis=0)
+        return np.asarray(~by_argument.any(axis=0), dtype=np.bool_)
     steps = np.linalg.lstsq(by_variable, by_argument, rcond=_OUTSIDE)[0]
     left, whole = (np.linalg.norm(each, axis=0) for each in (by_argument - by_variable @ steps, by_argument))
     return np.asarray(left <= np.maximum(_OUTSIDE * whole, _ZERO * whole.max(initial=0.0)), dtype=np.bool_)

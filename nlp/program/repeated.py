@@ -145,9 +145,9 @@ class _NormalForms:
             return _constant(math.sin(constant) if op == ca.OP_SIN else math.cos(constant))
         sign = math.copysign(1.0, rest[min(rest)].value)
         rest = _sum({}, rest, sign)
-        cosine = {(self._atom(ca.OP_COS, [rest]),): _Coefficient(1.0, 1.0)}
+        cosine: _Polynomial = {(self._atom(ca.OP_COS, [rest]),): _Coefficient(1.0, 1.0)}
         place = self._atom(ca.OP_SIN, [rest])
-        sine = {(place,): _Coefficient(sign, 1.0)}
+        sine: _Polynomial = {(place,): _Coefficient(sign, 1.0)}
         if place not in self._squares:
             self._squares[place] = _sum(_constant(1.0), self._product(cosine, cosine), -1.0)
         s, c = math.sin(constant), math.cos(constant)
