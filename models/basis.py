@@ -2,7 +2,9 @@
 
 Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
 characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
-then forces through the centre, then the others. Behind them are those by which the actuators drive the platform.
+then forces through the centre, then the others. Behind them are those by which the actuators drive the platform. Each
+of these spaces has a basis that follows from the space alone: another one would follow from rounding, and differ from
+one unit of length to another.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, first_largest
 from .model import Model
 from .wrench import WrenchKind
 
@@ -42,7 +44,7 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     works = driven @ actuation
     if works.size:
         # A wrench of actuation does positive work in the joint that it drives most.
-        most = np.take_along_axis(works, np.argmax(np.abs(works), axis=1)[:, None], axis=1)
+        most = np.take_along_axis(works, first_largest(np.abs(works))[:, None], axis=1)
         driven = driven * np.where(most < 0, -1.0, 1.0)
     constraints = space - (space @ driven.T) @ driven
     constraints = np.linalg.svd(constraints)[2][: dimension - len(driven)]
@@ -50,7 +52,7 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     forces, others = _split(rest, slice(3, None)) if space.shape[1] > 3 else (rest, rest[:0])
     if space.shape[1] == 3:
         couples, forces = constraints[:0], constraints
-    rows = np.vstack([couples, forces, others, driven])
+    rows = np.vstack([*(settled_basis(each) for each in (couples, forces, others)), driven])
     return Basis(rows, tuple(_kind(row) for row in rows))
 
 
@@ -115,7 +117,21 @@ def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
 def _span(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the span of rows."""
     _, values, right = np.linalg.svd(rows)
-    return np.asarray(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+    return settled_basis(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+
+
+def settled_basis(rows: FloatArray) -> FloatArray:
+    """Return the orthonormal basis (k, n) that follows from the space of orthonormal rows (k, n) alone.
+
+    Each vector is the coordinate axis nearest to the rest of the space, projected into it: the first of equally near
+    ones.
+    """
+    projector, found = rows.T @ rows, np.zeros(rows.shape)
+    for vector in found:
+        k = int(first_largest(np.diag(projector)[None])[0])
+        vector[:] = projector[k] / np.linalg.norm(projector[k])
+        projector = projector - np.outer(vector, vector)
+    return found
 
 
 def _kind(row: FloatArray) -> WrenchKind:

@@ -262,12 +262,14 @@ def part_of(entry: Entry) -> Part:
 
 
 def _in_order(entries: Sequence[Entry]) -> tuple[Entry, ...]:
-    """Return robots in the order of a table; those without a common value stay in the order in which they are given."""
+    """Return robots in the order of a table: with fewer limits left out first, then by F.
 
-    def key(entry: Entry) -> tuple[int, float]:
-        value = entry.value
-        if value is None:
-            return _PARTS.index(part_of(entry)), 0.0
-        return _PARTS.index(part_of(entry)), -value if entry.sense is Sense.MAX else value
+    Robots without a common value stay in the order in which they are given.
+    """
+
+    def key(entry: Entry) -> tuple[int, int, float]:
+        value = entry.value or 0.0
+        left_out = 0 if entry.placed is None else len(entry.placed.left_out)
+        return _PARTS.index(part_of(entry)), left_out, -value if entry.sense is Sense.MAX else value
 
     return tuple(sorted(entries, key=key))

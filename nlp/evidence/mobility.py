@@ -69,7 +69,7 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
     constraints = constraint_rows(model, J, screws)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
-    rates, parts = _actuator_rates(model, J, screws, numbers.rates[:, 0])
+    rates, parts = _actuator_rates(model, J, screws, numbers.rates[:, 0], reach)
     left = sum(part.constraint for part in parts.values())
     is_feasible = left <= _FEASIBLE * state.size
     if is_feasible:  # what is left is rounding
@@ -92,7 +92,7 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
 
 
 def _actuator_rates(
-    model: Model, J: FloatArray, screws: FloatArray, rates: FloatArray
+    model: Model, J: FloatArray, screws: FloatArray, rates: FloatArray, reach: float
 ) -> tuple[dict[str, float], dict[str, LimbPart]]:
     """Return the rate of each actuator by name, and the parts of F of each limb."""
     found: dict[str, float] = {}
@@ -103,7 +103,7 @@ def _actuator_rates(
         driven = J[rows] @ np.vstack([screws[3:, own], screws[:3, own]])
         values: FloatArray = np.zeros(len(own))
         residual, resisted = rates[rows], np.linalg.norm(driven, axis=0)
-        zero = DEPENDENT * float(np.abs(J[rows]).max())
+        zero = DEPENDENT * float(np.abs(J[rows] / ([1.0] * 3 + [reach] * 3)).max())
         if own and float(np.linalg.norm(driven)) > zero:
             values = np.asarray(np.linalg.lstsq(driven, rates[rows], rcond=DEPENDENT)[0], dtype=np.float64)
             residual = rates[rows] - driven @ values

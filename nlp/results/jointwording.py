@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ...models import Dimension
 from ..case.case import Case
 from ..units import Units, objective_unit, rate_unit
 from .motionwording import motion_words, wrench_words
@@ -24,14 +25,13 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
     """Yield the rates of the actuators, whether the motion is possible, the freedoms, singularities and assembly."""
     task = robot.task
     if joints.actuators and task is not None:
-        length = rate_unit(task.motion.twist, units)
-        angle = f"rad{length.removeprefix(units.length)}"
         largest = max((abs(each.rate) for each in joints.actuators if each.rate is not None), default=1.0)
         # Where the task moves no actuator, all rates are rounding of the platform's velocity.
         reach = robot_size(robot)
         speed = math.hypot(*task.motion.twist[3:]) + reach * math.hypot(*task.motion.twist[:3])
         sizes = {"length": max(largest, speed), "angle": max(largest, speed / reach)}
-        units_of = {"length": length, "angle": angle}
+        kinds = (Dimension.LENGTH, Dimension.ANGLE)
+        units_of = {kind.value: rate_unit(task.motion.twist, units, kind) for kind in kinds}
         rates = (
             f"{each.name}: none"
             if each.rate is None
