@@ -171,8 +171,9 @@ def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
     """Yield a note for each singularity that a mechanism is in where it stands."""
     try:
         generic = generic_ranks(mechanism)
-    except MechanismError as error:
-        yield f"no configuration near the stated one was found: {error}"
+    except MechanismError:
+        fault = "its loops close nowhere else near where the model stands"
+        yield f"{fault}: the robot cannot move, or its numbers contradict each other"
         return
     for each in singularities_of(wrenches_of(mechanism, size).ranks, generic):
         where = "the robot" if each.member is None else f"member {each.member + 1}"

@@ -145,9 +145,11 @@ def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
         point = meeting_point(one, two)
         off = [np.linalg.norm(np.cross(each.axis, point - each.point)) for each in run]
         if max(off) < SAME_POINT * size:
+            common = common_name([each.name for each in run])
+            is_own = common and not any(each.name.startswith(common) for each in given.joints if each not in run)
             ball = replace(
                 one,
-                name=common_name([each.name for each in run]) or run[0].name,
+                name=common if is_own else run[0].name,
                 kind="S",
                 point=point,
                 axis=np.zeros(3),

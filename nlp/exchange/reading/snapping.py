@@ -29,6 +29,8 @@ _HOLDS = 1e-14
 #: part of the largest one, and below this share in any case, count as zero.
 _DEPENDENT = 10.0
 _RANK = 1e-6
+#: Relations that are off by less, in parts of the size, are meant to be exact: decimals of CAD files are nearer.
+_DECIMALS = 1e-5
 #: Joints may move this many times farther than the tolerance: beyond it the relations contradict each other.
 _FARTHEST = 10.0
 
@@ -81,19 +83,19 @@ def near_misses(given: Mechanism, size: float) -> Iterator[str]:
         size: of the robot.
     """
     joints = [each for each in given.joints if each.kind != "weld"]
-    found: dict[Kind, list[Relation]] = {}
+    found: dict[tuple[Kind, bool], list[Relation]] = {}
     for each in relations_of(joints, size, ALMOST * size):
         ends = [{joints[k].inner, joints[k].outer} for k in (each.one, each.other)]
         if each.off >= SAME_POINT * size and ends[0] & ends[1]:
-            found.setdefault(each.kind, []).append(each)
-    for kind, misses in found.items():
+            found.setdefault((each.kind, each.off < _DECIMALS * size), []).append(each)
+    for (kind, is_rounding), misses in found.items():
         sizes = sorted(each.off for each in misses)
         first, second = (joints[k].name for k in (misses[0].one, misses[0].other))
         more = f" and {len(misses) - 1} more pairs" if len(misses) > 1 else ""
         by = f"{sizes[0]:.1g}" if len(misses) == 1 else f"{sizes[0]:.1g} to {sizes[-1]:.1g}"
-        words = f"the axes of {first} and {second}{more} nearly {kind.value}: they miss this by {by}"
-        words += f", {sizes[-1] / size:.1g} of the robot's size, and stay as they are"
-        yield f"{words}; --snap {_rounded_up(sizes[-1]):g} makes them exact"
+        words = f"the axes of {first} and {second}{more} nearly {kind.value}: off by {by}"
+        words += f", {sizes[-1] / size:.1g} of the robot's size, they stay as they are"
+        yield f"{words}; --snap {_rounded_up(sizes[-1]):g} makes them exact" if is_rounding else words
 
 
 def _rounded_up(value: float) -> float:

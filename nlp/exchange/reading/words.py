@@ -51,7 +51,7 @@ def _loops(found: Imported) -> str:
     share = gap_share(worst, found.size)
     if share <= CLOSED:
         return "closed in the file, to rounding"
-    return f"open in the file by up to {gap_words(worst)} ({share:.2g} of the size), and closed here"
+    return f"open in the file by up to {gap_words(worst)} ({share:.2g} of the size)"
 
 
 def offer_lines(offers: Offers, size: float) -> Iterator[tuple[str, str]]:
