@@ -46,7 +46,9 @@ def import_(
     snap: Annotated[
         float,
         typer.Option(
-            parser=Number("--snap"), metavar="LENGTH", help="Move axes by up to this, so that they meet or are parallel."
+            parser=Number("--snap"),
+            metavar="LENGTH",
+            help="Move axes by up to this, so that they meet or are parallel.",
         ),
     ] = 0.0,
     loops: Annotated[

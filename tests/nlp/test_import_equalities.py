@@ -1,5 +1,7 @@
 """Equalities of MJCF as MuJoCo itself computes them: open at random configurations, closed by Newton's method."""
 
+# ruff: noqa: ANN401, E501 - MuJoCo has no stubs; XML in one line an element
+
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -83,7 +85,9 @@ def equalities(rng: np.random.Generator, scalar: list[str]) -> str:
         first = "site1" if ends == "site" else "body1"
         found += f'<{tag} name="{name}" {first}="{one}" {second} {own}/>'
     first, second = rng.choice(scalar, 2, replace=False)
-    found += f'<joint name="gear" joint1="{first}" joint2="{second}" polycoef="{rng.normal()!r} {rng.normal()!r} 0 0 0"/>'
+    found += (
+        f'<joint name="gear" joint1="{first}" joint2="{second}" polycoef="{rng.normal()!r} {rng.normal()!r} 0 0 0"/>'
+    )
     return found + f'<joint name="held" joint1="{second}" polycoef="{rng.normal()!r} 0 0 0 0"/>'
 
 
@@ -107,7 +111,9 @@ def residuals(model: Any, data: Any) -> dict[str, Array]:
 def read(folder: Path, model_text: str, qpos: Array) -> tuple[Description, Any, Any]:
     """A model read at a keyframe, and MuJoCo's model and data there."""
     path = folder / "m.xml"
-    path.write_text(model_text.replace("</mujoco>", f'<keyframe><key name="k" qpos="{text(qpos)}"/></keyframe></mujoco>'))
+    path.write_text(
+        model_text.replace("</mujoco>", f'<keyframe><key name="k" qpos="{text(qpos)}"/></keyframe></mujoco>')
+    )
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -277,7 +283,9 @@ def platform_on_legs(rng: np.random.Generator, is_plain: bool) -> str:
     )
     motors = "".join(f'<motor joint="q{k}"/>' for k in range(6))
     top = f'<body name="top" pos="0 0 1"><freejoint/>{INERTIA}{sites}</body>'
-    return f"<mujoco><worldbody>{legs}{top}</worldbody><equality>{ties}</equality><actuator>{motors}</actuator></mujoco>"
+    return (
+        f"<mujoco><worldbody>{legs}{top}</worldbody><equality>{ties}</equality><actuator>{motors}</actuator></mujoco>"
+    )
 
 
 def test_a_platform_is_one_robot_by_connects_and_by_welds(tmp_path: Path) -> None:
@@ -288,7 +296,9 @@ def test_a_platform_is_one_robot_by_connects_and_by_welds(tmp_path: Path) -> Non
         path.write_text(model_text)
         found = import_robot(Request(path, Ends("top")))
         assert not any("open" in note for note in found.notes)
-        assert all(limb["joints"][0]["type"] == "U" and limb["joints"][2]["type"] == "S" for limb in found.tables["limb"])
+        assert all(
+            limb["joints"][0]["type"] == "U" and limb["joints"][2]["type"] == "S" for limb in found.tables["limb"]
+        )
         J = wrenches_of(found.mechanism, 1.0).jacobian
         return np.asarray(J.T @ J)
 
@@ -306,7 +316,9 @@ def test_keyframes_mocap_bodies_and_tendons(tmp_path: Path) -> None:
     )
     tendons = '<tendon><fixed name="rope"><joint joint="q0" coef="1"/></fixed></tendon>'
     more = '<weld name="grip" body1="hand" body2="top"/><tendon name="knot" tendon1="rope"/></equality>' + tendons
-    model_text = model_text.replace("</equality>", more).replace("</actuator>", '<motor name="winch" tendon="rope"/></actuator>')
+    model_text = model_text.replace("</equality>", more).replace(
+        "</actuator>", '<motor name="winch" tendon="rope"/></actuator>'
+    )
     model = mujoco.MjModel.from_xml_string(model_text)
     qpos = np.array(model.qpos0)
     qpos[2:18:3] += 0.1

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -24,7 +23,7 @@ from screwsynth.nlp.certificate.limbs.sharedcuts import LeftOwn
 from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.standardform import standard_form
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
@@ -260,9 +259,9 @@ def test_the_time_limit_ends_the_preparation_of_limbs(monkeypatch: pytest.Monkey
     built: list[object] = []
     engine_for = sharedsearch.limb_engine_for
 
-    def counted(*args: Any) -> Any:
-        built.append(args)
-        return engine_for(*args)
+    def counted(form: StandardForm, shared: int, engine: str | None, jobs: int) -> LimbEngine:
+        built.append(form)
+        return engine_for(form, shared, engine, jobs)
 
     monkeypatch.setattr(sharedsearch, "limb_engine_for", counted)
     nlp = formulate(machine(2.0, pose_is_free=True))

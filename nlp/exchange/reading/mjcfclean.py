@@ -92,7 +92,9 @@ def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:
             else:
                 on = next((f"{words} {each.get(key)!r}" for key, words in _TRANSMISSIONS.items() if each.get(key)), "")
                 fault = f"acts on {on}, which is not read" if on else "acts on nothing that is read"
-                notes.append(f"the actuator {each.get('name', 'without a name')!r} {fault}; --actuated names what it drives")
+                notes.append(
+                    f"the actuator {each.get('name', 'without a name')!r} {fault}; --actuated names what it drives"
+                )
     return tuple(dict.fromkeys(driven))
 
 

@@ -19,8 +19,8 @@ CLOSED = 1e-12
 _MOST_STEPS = 60
 #: Shortest part of a step that is tried.
 _SHORTEST = 2.0**-12
-#: Singular values below this share of the largest count as zero, in the order in which they are tried. Dependent equations
-#: of an overconstrained robot are independent by its decimals, which no motion of its joints is to make up for.
+#: Singular values below this share of the largest count as zero, in the order in which they are tried. By its decimals,
+#: dependent equations of an overconstrained robot are independent, which no motion of its joints is to make up for.
 _RANKS = (1e-5, 1e-9)
 #: Largest equation that least squares may leave of loops that do not close, in parts of the size: typed decimals.
 LEAST = 1e-4
@@ -191,9 +191,9 @@ class _Mover:
             for name, factor in coupling.factors:
                 body = next(joint.body for joint in self.given.joints if joint.name == name)
                 row[self.index[body]] = factor
-            value = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
+            moved = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
             unit = self.size if _is_length(self.given, coupling) else 1.0
-            values.append(np.array([value + self.given.offsets.get(coupling.name, 0.0)]) / unit)
+            values.append(np.array([moved + self.given.offsets.get(coupling.name, 0.0)]) / unit)
             rows.append(row[None] / unit)
         return np.concatenate([np.zeros(0), *values]), np.vstack([np.zeros((0, self.count)), *rows])
 

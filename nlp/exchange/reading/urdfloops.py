@@ -7,8 +7,8 @@
   (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
 - elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the same for ``child``, as
   github.com/ros/urdfdom/pull/264 proposes (open: which types there are is not agreed),
-- elements ``<loop_joint>`` with ``link1`` and ``link2``, each with ``link``, ``xyz`` and ``rpy``, as Isaac Sim reads and
-  writes them, and Drake once did, which has an ``axis`` as well.
+- elements ``<loop_joint>`` with ``link1`` and ``link2``, each with ``link``, ``xyz`` and ``rpy``, as in Isaac
+  Sim, and with an ``axis`` in both, as Drake had.
 """
 
 from __future__ import annotations
@@ -210,14 +210,21 @@ def closures_of_loop_joints(root: Element, links: set[str], taken: set[str], sou
         frames = [origin_of(element, side, place) for side in ("link1", "link2")]
         closing = _CONSTRAINTS[kind]
         if closing not in (Closing.BALL, Closing.WELD) and element.find("axis") is None:
-            raise InputError(f"{place}, axis: is missing; a joint of the type {kind} needs it, in the frame of each link")
+            raise InputError(
+                f"{place}, axis: is missing; a joint of the type {kind} needs it, in the frame of each link"
+            )
         axes = [axis_of(element, "axis", place)] * 2
         found.append(_closure(closing, name, sides, frames, axes, taken | {each.name for each in found}))
     return found
 
 
 def _closure(
-    closing: Closing, name: str, sides: Sequence[str], frames: Sequence[Frame], axes: Sequence[FloatArray], taken: set[str]
+    closing: Closing,
+    name: str,
+    sides: Sequence[str],
+    frames: Sequence[Frame],
+    axes: Sequence[FloatArray],
+    taken: set[str],
 ) -> LoopClosure:
     """Return a closure between two links, given a frame on each and the joint's axis in that frame."""
     if closing is not Closing.WELD:
