@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ....models.mechanism import (
     Mechanism,
     MechanismError,
+    SingularityType,
     generic_ranks,
     robot_tables,
     singularities_of,
@@ -176,8 +177,9 @@ def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
         yield f"{fault}: the robot cannot move, or its numbers contradict each other"
         return
     for each in singularities_of(wrenches_of(mechanism, size).ranks, generic):
-        where = "the robot" if each.member is None else f"member {each.member + 1}"
-        yield f"the model is singular as it stands: {where}: {each.type.value}"
+        where = "" if each.type is SingularityType.ARCHITECTURE else " where it stands"
+        whose = "the robot" if each.member is None else f"member {each.member + 1}"
+        yield f"{whose} is singular{where}: {each.type.value}"
 
 
 def gap_words(gap: Gap) -> str:
