@@ -307,5 +307,6 @@ def test_a_singular_model_is_told(tmp_path: Path) -> None:
     path.write_text(text.replace("0.3 -0.1", "0 -0.1").replace("0.3 0.1", "0 0.1"))
     found = import_robot(Request(path, Ends("d")))
     assert any(
-        "the robot is singular where it stands: the platform can move with every actuator locked" in n for n in found.notes
+        "the robot is singular where it stands: the platform can move with every actuator locked" in n
+        for n in found.notes
     )

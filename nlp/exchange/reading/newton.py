@@ -191,9 +191,9 @@ class _Mover:
             for name, factor in coupling.factors:
                 body = next(joint.body for joint in self.given.joints if joint.name == name)
                 row[self.index[body]] = factor
-            moved = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
+            change = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
             unit = self.size if _is_length(self.given, coupling) else 1.0
-            values.append(np.array([moved + self.given.offsets.get(coupling.name, 0.0)]) / unit)
+            values.append(np.array([change + self.given.offsets.get(coupling.name, 0.0)]) / unit)
             rows.append(row[None] / unit)
         return np.concatenate([np.zeros(0), *values]), np.vstack([np.zeros((0, self.count)), *rows])
 

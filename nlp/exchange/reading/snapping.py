@@ -114,9 +114,9 @@ def _parallelograms(given: Mechanism, joints: Sequence[MechanismJoint], within: 
         if len(own) == 2 and all(each.kind == "R" for _, each in own):
             ends = sorted((each.outer if each.inner == link.name else each.inner, k) for k, each in own)
             rods.setdefault(tuple(name for name, _ in ends), []).append((ends[0][1], ends[1][1]))
-    for ends, pairs in rods.items():
+    for sides, pairs in rods.items():
         for number, (i, j) in enumerate(pairs):
-            for k, m in pairs[:number] if ends[0] != ends[1] else []:
+            for k, m in pairs[:number] if sides[0] != sides[1] else []:
                 axis, span, other = joints[i].axis, joints[j].point - joints[i].point, joints[m].point - joints[k].point
                 off = [*(span - other), axis @ span, axis @ (joints[k].point - joints[i].point)]
                 if np.linalg.norm(off[:3]) < within and max(map(abs, off[3:])) < within < np.linalg.norm(span):
