@@ -75,12 +75,13 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
     """
     symbols = [item.symbol for item in model.unknowns]
+    depends = [_depends_on(equation.expression, symbols) for equation in model.closure] if symbols else []
     found: dict[int, Solved] = {}
     dropped: set[int] = set()
     reaches: list[Reach] = []
     for k, unknown in enumerate(model.unknowns):
         for e, equation in enumerate(model.closure):
-            if e in dropped or _depends_on(equation.expression, symbols) != [k]:
+            if e in dropped or depends[e] != [k]:
                 continue
             solved = _solved(model, unknown, equation, extended)
             if solved is not None:

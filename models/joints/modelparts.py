@@ -14,7 +14,7 @@ from ..instance import Substitution, jacobian
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import Actuator, Dimension, GenericRanks, Parameter, Quantity
-from .chain import HomeRobot
+from .chain import HomeRobot, Joint, Limb
 from .loops import ClosedPoint
 
 
@@ -36,6 +36,20 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
             ranks.append([rank_of_rows(each, point.position, reach) for each in (J, constraints)])
     most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
     return GenericRanks(int(most[0]), int(most[1]))
+
+
+def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> str:
+    """Return the name of one of a limb's several actuators: its joint's, unless another limb or actuator has it.
+
+    Args:
+        robot: at home.
+        limb: the limb.
+        joint: the actuated joint.
+        number: of the actuator in the limb, from 1 on.
+    """
+    taken = {each.name for each in robot.limbs if each is not limb}
+    taken |= {each.name for each in robot.joints if each.actuated and each is not joint}
+    return joint.name if joint.name and joint.name not in taken else f"{limb.name}.{number}"
 
 
 def with_kinds(

@@ -128,7 +128,7 @@ def resisting(
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     actuated = [k for k in network.joints if network.joint(k).actuated and k in screws]
     for k in actuated:
-        name = network.graph.joints[k].name if len(actuated) > 1 else limb.name
+        name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
         dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
         found.actuators.append(Actuator(name, limb.name, screws[k], dimension))

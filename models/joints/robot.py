@@ -34,7 +34,7 @@ from .generic import sampled_dimensions
 from .graphwords import read_robot
 from .linkgraph import home_of
 from .loops import PoseOf, examine_loops
-from .modelparts import generic_ranks, parameters, quantities, with_kinds
+from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_kinds
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
@@ -182,7 +182,7 @@ class _Builder:
         self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
         several = len(driven) > 1
         for k, (joint, path, j) in enumerate(driven.values()):
-            name = f"{limb.name}.{k + 1}" if several else limb.name
+            name = actuator_name(self.robot, limb, joint, k + 1) if several else limb.name
             (axis,) = joint.axes
             is_angle = axis.kind is AxisKind.ROTATION
             dimension = Dimension.ANGLE if is_angle else Dimension.LENGTH

@@ -21,7 +21,7 @@ from ..boxes.openboxes import BoundedSearch
 from ..boxes.threads import Threads
 from ..enclosing.enclosure import midpoints
 from ..enclosing.quadratic import GradientModel, ranges
-from .limbmodels import LimbModels
+from .limbmodels import LimbEngine, LimbModels
 from .limbsums import LimbBound, bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
@@ -85,12 +85,8 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         m = self._m = len(separation.shared)
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
-        self._engines = [limb_engine_for(limb.form, m, engine, 1) for limb in separation.limbs]
-        # Minus a limb's function, for lower models.
-        self._opposites = [
-            limb_engine_for(replace(limb.form, functions=(-limb.form.functions[0],)), m, engine, 1)
-            for limb in separation.limbs
-        ]
+        # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
+        self._engine, self._engines, self._opposites = engine, list[LimbEngine](), list[LimbEngine]()
         own = tuple(
             OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64))
             for limb in separation.limbs
@@ -119,7 +115,18 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         self._threads.close()
 
     def _step(self, threshold: float) -> None:
-        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
+        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold.
+
+        The first steps prepare one limb each.
+        """
+        if len(self._engines) < len(self._separation.limbs):
+            form = self._separation.limbs[len(self._engines)].form
+            # Minus a limb's function, for lower models.
+            self._opposites.append(
+                limb_engine_for(replace(form, functions=(-form.functions[0],)), self._m, self._engine, 1)
+            )
+            self._engines.append(limb_engine_for(form, self._m, self._engine, 1))
+            return
         current = self._opened.pop(_BLOCK if self._turn else 1)
         self._turn += 1
         before = self._incumbent.value
