@@ -38,9 +38,17 @@ static double slack(const screwsynth_QP_data *q, int side, const double *d, cons
     return q->row_upper[j] - along[j];
 }
 
+/* An equation counts as the lower one of its two sides. */
 static int is_equation(const screwsynth_QP_data *q, int side) {
     int j = side - 2 * q->n;
+    if (side < q->n) return q->lower[side] == q->upper[side];
     return j >= 0 && j < q->c && q->row_lower[j] == q->row_upper[j];
+}
+
+/* The upper side of an equation, which never enters. */
+static int is_double(const screwsynth_QP_data *q, int side) {
+    if (side >= q->n && side < 2 * q->n) return is_equation(q, side - q->n);
+    return side >= 2 * q->n + q->c && is_equation(q, side - q->c);
 }
 
 /* t = J' times the inward normal of a side. */
@@ -129,8 +137,9 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
         int entering = -1;
         double worst = -VIOLATED, sign = 1.0, fresh = 0.0;
         for (k = 0; k < q->c; ++k) products[k] = screwsynth_QP_dot(q->rows + k * n, d, n);
-        /* The entering side: equations first, then the side with the largest violation. */
-        for (side = 2 * n; side < 2 * n + q->c && entering < 0; ++side) {
+        /* The entering side: equations first, those of fixed variables before all others, because rows that these variables
+         * determine then hold but for rounding; then the side with the largest violation. */
+        for (side = 0; side < 2 * n + q->c && entering < 0; ++side) {
             if (held[side] || !is_equation(q, side)) continue;
             entering = side;
             worst = slack(q, side, d, products);
@@ -141,7 +150,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
         }
         for (side = 0; side < sides && (entering < 0 || !is_equation(q, entering)); ++side) {
             double room;
-            if (held[side] || (side >= 2 * n + q->c && is_equation(q, side - q->c))) continue;
+            if (held[side] || is_double(q, side)) continue;
             room = slack(q, side, d, products);
             if (room < worst) {
                 worst = room;
@@ -149,7 +158,13 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
             }
         }
         if (entering < 0) {
-            for (k = 0; k < count; ++k) multipliers[active[k]] = held[active[k]] * u[k];
+            for (k = 0; k < count; ++k) {
+                const double own = held[active[k]] * u[k];
+                if (active[k] < n && own < 0.0)
+                    multipliers[n + active[k]] = -own; /* a fixed variable: its upper bound */
+                else
+                    multipliers[active[k]] = own;
+            }
             return 0;
         }
         for (;; ++pass) {
