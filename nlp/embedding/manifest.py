@@ -13,6 +13,7 @@ import numpy as np
 from .. import __version__
 from ..program.nlp import Nlp
 from .runtimelimits import RunTimeLimit
+from .subject import bounds_in_c
 
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
@@ -32,6 +33,7 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         files: text of every other file of the folder by name.
     """
     case, program, prefix = nlp.case, nlp.program, names["id"]
+    bounds = bounds_in_c(nlp)
     unit_of = replace(case.units, angle="rad").label
     header = files[f"{prefix}.h"]
     statuses = _STATUS.findall(header[header.index("typedef enum") : header.index("} screwsynth_status;")])
@@ -46,7 +48,7 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "variables": [
             {"name": each.name, "unit": unit_of(each.dimension), "lower": lower, "upper": upper, "start": start}
             for each, lower, upper, start in zip(
-                program.variables, nlp.lower.tolist(), nlp.upper.tolist(), nlp.start.tolist(), strict=True
+                program.variables, bounds.lower.tolist(), bounds.upper.tolist(), nlp.start.tolist(), strict=True
             )
         ],
         "parameters": [

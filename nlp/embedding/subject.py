@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import frozen_vector
+from ...models import FloatArray, frozen_vector
 from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
@@ -27,6 +27,8 @@ _MOST_SHOWN = 8
 
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
+#: Size of a bound that is none, in tables of C.
+NO_BOUND = 1e300
 #: Digits of numbers that come from a solve: few enough to be the same on every machine.
 _DIGITS = 9
 
@@ -36,6 +38,21 @@ class Subject(NamedTuple):
 
     nlp: Nlp
     optimum: float | None
+
+
+class Bounds(NamedTuple):
+    """Bounds (n,) of variables."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+
+def bounds_in_c(nlp: Nlp) -> Bounds:
+    """Return the bounds of a program's variables in C, where a level has none: it follows from the task, which may change."""
+    lower, upper, epigraph = np.array(nlp.lower), np.array(nlp.upper), nlp.program.places.epigraph
+    if epigraph is not None:
+        lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND
+    return Bounds(lower, upper)
 
 
 def find_subject(case: Case) -> Subject:
