@@ -13,6 +13,7 @@ from ...models import FloatArray, frozen_vector
 from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
+from ..certificate.standardform import is_in_home_mode
 from ..errors import CaseError
 from ..program.formulation import formulate, formulate_weighted
 from ..program.nlp import Nlp
@@ -34,7 +35,7 @@ _DIGITS = 9
 
 
 class Subject(NamedTuple):
-    """A program, and its optimal value; None where the search ended at no optimum."""
+    """A program, and its optimal value; None where the search ended at no optimum, or in another working mode than home's."""
 
     nlp: Nlp
     optimum: float | None
@@ -73,7 +74,8 @@ def find_subject(case: Case) -> Subject:
         several = len(case.tasks) > 1
         nlp = formulate_weighted(case, scale_weights(case).values) if several else formulate(case)
         own = solve_program(nlp, case.search)
-        return Subject(with_all_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
+        is_known = own.status is Status.OPTIMAL and is_in_home_mode(own.nlp, own.x) is not False
+        return Subject(with_all_pairs(own.nlp), own.F if is_known else None)
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:
