@@ -68,12 +68,16 @@ class Robot:
         with np.errstate(all="ignore"):
             return FORMULAS[self.compiled.name](numbers)
 
-    def objective(self, state: State, p: Array) -> Array:
-        """Return F (m,) as the case has it: of its task, or the worst one, in parts of the tasks' weights."""
+    def values(self, state: State, p: Array) -> Array:
+        """Return F (m, k) of each task at each pose, in parts of the tasks' weights."""
         names = [name for name in self.parameter_names if name.startswith("weight")]
         weights = p[:, [self.parameter_names.index(name) for name in names]] if names else 1.0
         with np.errstate(all="ignore"):
-            values = (state.F / np.asarray(weights).reshape(-1, 1, len(names) or 1)).reshape(len(state.F), -1)
+            return (state.F / np.asarray(weights).reshape(-1, 1, len(names) or 1)).reshape(len(state.F), -1)
+
+    def objective(self, state: State, p: Array) -> Array:
+        """Return F (m,) as the case has it: of its task, or the worst one."""
+        values = self.values(state, p)
         return values[:, 0] if values.shape[1] == 1 else (values.min(axis=1) if self.sense > 0 else values.max(axis=1))
 
     def excess(self, state: State, limits: Array) -> Array:

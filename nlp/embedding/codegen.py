@@ -30,7 +30,7 @@ from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from .apitexts import index_macros, version_texts
 from .casaditext import for_controllers
-from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_literal, string_table
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
@@ -38,6 +38,7 @@ from .measured import header_texts
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
+from .unitdata import UnitData
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -92,8 +93,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     nlp, prefix = subject.nlp, identifier(case.name)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI")
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
-    names = _substitutions(subject, staged)
-    names |= limit_texts(limits, prefix, replace(case.units, angle="rad").label)
+    names, units = _substitutions(subject, staged), UnitData(nlp)
+    names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
     parts = dict(_PARTS)
     if staged.loops:
         parts["-loops.c"] = "loops.c"
@@ -238,7 +239,7 @@ class _References(NamedTuple):
 def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
-    units = {Dimension.LENGTH: case.units.length, Dimension.ANGLE: "rad", Dimension.NUMBER: ""}
+    units = UnitData(nlp)
     lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
     bounds = bounds_in_c(nlp)
@@ -248,7 +249,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     blocks = [
         "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
         string_table(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
-        string_table(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
+        string_table(f"{prefix}_variable_units", N, units.variables),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
         integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
         number_table(f"{prefix}_variable_lower", N, bounds.lower),
@@ -256,8 +257,12 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         number_table(f"{prefix}_variable_starts", N, nlp.start),
         "/* Fixed numbers: names, units, and the case's values. */",
         string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
-        string_table(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
+        string_table(f"{prefix}_parameter_units", P, units.parameters),
         number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
+        "/* Units of F, of the rates of each task, and of the multipliers of the variables' bounds, for the case's own twists. */",
+        f"static const char *const {prefix}_F_unit = {string_literal(units.F)};",
+        string_table(f"{prefix}_rate_units", T, units.rates),
+        string_table(f"{prefix}_multiplier_units", N, units.variable_multipliers),
         "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
         string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.frame_rows]),
         string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.frame_rows]),
