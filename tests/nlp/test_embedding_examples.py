@@ -87,8 +87,11 @@ int main() {
     if (!small || !large || !(small.angle <= 0.1 + 1e-7) || !(large.angle > 0.29)) return 6;
     copy.start_at(small.point());
     copy.set_seeds(0);
+    const robot::Result last = copy.solve();
     copy.p()[SCREWSYNTH_PAPER_4_1_HELICAL_p_x1] = std::nan("");
-    return copy.solve().status == SCREWSYNTH_BAD_INPUT ? 0 : 7;
+    const robot::Result refused = copy.solve(); /* the last answer, and the status */
+    if (refused.status != SCREWSYNTH_BAD_INPUT || refused || !last) return 7;
+    return refused.F == last.F && refused.point() == last.point() ? 0 : 8;
 }
 """
 
