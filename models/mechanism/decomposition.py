@@ -174,6 +174,8 @@ def _limb(
         return LimbPaths((), (tuple(stem),))
     branches = []
     for k in following:
+        if k not in left:  # the branch before has come back to the node by it
+            return "its links form a loop of their own"
         left.remove(k)
         branch = [Step(k, ends[k][0] == node)]
         end, _ = walk(ends[k][1] if ends[k][0] == node else ends[k][0], branch)
