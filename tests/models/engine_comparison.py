@@ -88,11 +88,12 @@ def unknowns_at(model: Model, home: Mechanism, there: Mechanism) -> Array:
     residual = ca.vertcat(SX0, *rows) - ca.DM(wanted)
     function = ca.Function("at", symbols.all, [ca.densify(residual), ca.densify(ca.jacobian(residual, symbols.unknowns))])
     found = np.zeros(len(model.unknowns))
-    for _ in range(30):
+    for _ in range(100):
         values, slopes = (each.full() for each in function([], found, plate.rotation, plate.position))
         if np.abs(values).max(initial=0.0) < 1e-14:
             break
-        found = found - np.linalg.lstsq(slopes, values.ravel(), rcond=1e-9)[0]
+        step = np.linalg.lstsq(slopes, values.ravel(), rcond=1e-9)[0]
+        found = found - step * min(1.0, 0.2 / float(np.abs(step).max()))
     assert np.abs(values).max(initial=0.0) < 1e-10
     return found
 
@@ -100,20 +101,26 @@ def unknowns_at(model: Model, home: Mechanism, there: Mechanism) -> Array:
 SX0 = ca.SX(0, 1)
 
 
-def program_at(model: Model, home: Mechanism, there: Mechanism, twist: Array) -> tuple[Nlp, Array]:
+def program_at(model: Model, home: Mechanism, there: Mechanism) -> tuple[Nlp, Array]:
+    """A program at a configuration, and the point of it, for the twist ``CHI``."""
     (plate,) = (each for each in there.links if each.name == there.platform)
     axis, angle = axis_angle_from_matrix(plate.rotation)
-    case = Case(model, {}, plate.position, [Task(twist)], Rotation(axis, angle), characteristic_length=LENGTH)
-    nlp = formulate(case)
-    return nlp, unknowns_at(model, home, there)
+    case = Case(model, {}, plate.position, [Task(CHI)], Rotation(axis, angle), characteristic_length=LENGTH)
+    return formulate(case), unknowns_at(model, home, there)
 
 
-def objective(mechanism: Mechanism, centres: list[Array], chi: Array) -> float:
+def with_twist(nlp: Nlp, twist: Array) -> Nlp:
+    arguments = np.array(nlp.arguments)
+    arguments[nlp.program.places.twists[0]] = twist
+    return replace(nlp, arguments=arguments)
+
+
+def objective(mechanism: Mechanism, centres: dict[tuple[str, ...], Array], chi: Array) -> float:
     """F: of each part that is left of the locked mechanism, the engine's twists give the projector.
 
     Args:
         mechanism: with closed loops.
-        centres: of its members, in the order of their first joints: a convention that the engine does not know.
+        centres: of its members, by the names of joints: a convention that the engine does not know.
         chi: (6,) twist.
     """
     names = {each.name for each in mechanism.joints if each.kind == "weld" or each.actuated}
@@ -123,33 +130,46 @@ def objective(mechanism: Mechanism, centres: list[Array], chi: Array) -> float:
         if not held:
             break
         names |= held
-    bodies = [{each.name} for each in mechanism.links]
-    for each in mechanism.joints:
-        if each.name in names:
-            bodies = joined(bodies, [{each.inner, each.outer}])
-    body = {link: number for number, links in enumerate(bodies) for link in links}
+    still = {each.name for each in mechanism.joints if each.kind == "weld"}
+    if not are_joined(mechanism, names):
+        still = names
+    # Where locked actuators alone join base and platform, each limb is one member.
+    body = {link: number for number, links in enumerate(bodies_of(mechanism, still)) for link in links}
     ends = {body[mechanism.base], body[mechanism.platform]}
-    groups = [{each.name} for each in mechanism.joints if each.name not in names and body[each.inner] != body[each.outer]]
-    for number in set(range(len(bodies))) - ends:
-        own = {each.name for each in mechanism.joints if number in (body[each.inner], body[each.outer])} - names
-        groups = joined(groups, [own])
-    groups = joined(groups, [{name for name, _ in each.factors} - names for each in mechanism.couplings])
-    total = 0.0
+    moving = [each for each in mechanism.joints if each.name not in still and body[each.inner] != body[each.outer]]
+    groups = [{each.name} for each in moving]
+    for number in set(body.values()) - ends:
+        groups = joined(groups, [{each.name for each in moving if number in (body[each.inner], body[each.outer])}])
+    groups = joined(groups, [{name for name, _ in each.factors} - still for each in mechanism.couplings])
     members = []
     for group in groups:
         touched = {body[link] for each in mechanism.joints if each.name in group for link in (each.inner, each.outer)}
         if ends <= touched:
             members.append([each.name for each in mechanism.joints if each.name in group])
+    total = 0.0
     assert len(members) == len(centres)
-    order = {each.name: k for k, each in enumerate(mechanism.joints)}
-    for own, centre in zip(sorted(members, key=lambda each: order[each[0]]), centres, strict=True):
-        kept = names | set(own)
+    for own in members:
+        (centre,) = (centre for names, centre in centres.items() if set(names) <= set(own))
+        kept = still | set(own)
         joints = tuple(each for each in mechanism.joints if each.name in kept)
         couplings = tuple(each for each in mechanism.couplings if {name for name, _ in each.factors} <= kept)
-        engine = Engine(replace(mechanism, joints=joints, couplings=couplings))
+        used = {mechanism.base, mechanism.platform, *(link for each in joints for link in (each.inner, each.outer))}
+        links = tuple(each for each in mechanism.links if each.name in used)
+        engine = Engine(replace(mechanism, links=links, joints=joints, couplings=couplings))
         P = projector(engine.platform_twists(locked=True), centre, LENGTH)
         total += float(np.sum((P @ np.concatenate([chi[3:] + np.cross(chi[:3], centre), LENGTH * chi[:3]])) ** 2))
     return total
+
+
+def bodies_of(mechanism: Mechanism, names: set[str]) -> list[set[str]]:
+    """Links in sets that joints of these names join."""
+    ends = [{each.inner, each.outer} for each in mechanism.joints if each.name in names]
+    return joined([{each.name} for each in mechanism.links], ends)
+
+
+def are_joined(mechanism: Mechanism, names: set[str]) -> bool:
+    """Whether joints of these names alone join base and platform."""
+    return any({mechanism.base, mechanism.platform} <= each for each in bodies_of(mechanism, names))
 
 
 def joined(sets: list[set[str]], more: list[set[str]]) -> list[set[str]]:
@@ -169,16 +189,16 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
     """
     model, home = robot(**tables), mechanism_of(tables)
     worst, count = np.zeros(3), 0
-    order = {each.name: k for k, each in enumerate(home.joints)}
     for there in (home, *closed_configurations(home, count=driven)):
         engine = Engine(there)
         if not is_regular(engine):
             continue
         count += 1
         free, locked = (engine.platform_twists(locked=each) for each in (False, True))
-        chi = free @ (free.T @ CHI)
-        nlp, x = program_at(model, home, there, chi)
-        of_F = program_at(model, home, there, CHI)[0].evaluate(x)[0]
+        chi = free @ (free.T @ CHI) if free.shape[1] else CHI
+        nlp, x = program_at(model, home, there)
+        of_F = nlp.evaluate(x)[0]
+        nlp = with_twist(nlp, chi)
         state = evaluate(nlp, x)
         mobility = mobility_of(nlp, x, state)
         assert mobility is not None
@@ -186,8 +206,14 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
         constraints = constraint_rows(model, numbers.velocities, state.position)
         assert mobility.freedoms == free.shape[1], (mobility.freedoms, free.shape[1])
         assert state.rank == 6 - locked.shape[1], (state.rank, locked.shape[1])
-        assert mobility.constrained == 0.0
-        spaces = [onto(null_space(work(constraints))) - onto(free), onto(state.free_twists.T) - onto(locked)]
+        spaces = [np.eye(6) - onto(work(constraints).T) - onto(free), onto(state.free_twists.T) - onto(locked)]
+        centres = {each.joints or each.actuators: each.centre for each in wrenches_of(there, LENGTH).members}
+        F = objective(there, centres, CHI)
+        of_F = abs(of_F - F) / max(1.0, abs(F))
+        worst = np.maximum(worst, [of_F, 0.0, max(np.abs(each).max(initial=0.0) for each in spaces)])
+        assert (mobility.constrained == 0.0) == bool(free.shape[1])
+        if not free.shape[1]:
+            continue
         expected = engine.rates(chi)
         names = [each.name for each in there.joints if each.actuated]
         found = np.array(list(mobility.actuator_rates.values()))
@@ -195,8 +221,5 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
         assert np.array_equal(np.isfinite(found), np.isfinite(expected)), (found, expected)
         known = np.isfinite(expected)
         rates = np.abs(found - expected)[known].max(initial=0.0) / max(1.0, np.abs(expected[known]).max(initial=0.0))
-        members = sorted(wrenches_of(there, LENGTH).members, key=lambda each: order[each.joints[0]])
-        F = objective(there, [each.centre for each in members], CHI)
-        of_F = abs(of_F - F) / max(1.0, abs(F))
-        worst = np.maximum(worst, [of_F, rates, max(np.abs(each).max(initial=0.0) for each in spaces)])
+        worst[1] = max(worst[1], rates)
     return Differences(*map(float, worst), count)

@@ -147,9 +147,10 @@ class Builder:
         hand = at + 0.9 * z
         self.joint("S", (middle, end), hand)
         self.chain(middle, end, [("S", at + 0.5 * x, [], False), ("S", hand + 0.4 * x, [], False)])
-        for side in (0.5 * y, -0.5 * y - 0.2 * x):
-            steps = [("U", at + side, [x, y], False), ("P", at + side, [hand - at + 0.6 * side], True)]
-            self.chain(start, end, [*steps, ("S", hand + 0.6 * side, [], False)])
+        for side in (0.5 * y + 0.3 * x, -0.5 * y - 0.2 * x):
+            foot, top = at + side + 0.2 * self.rng.normal(size=3), hand + 0.6 * side
+            steps = [("U", foot, [x, y], False), ("P", foot, [top - foot], True)]
+            self.chain(start, end, [*steps, ("S", top, [], False)])
 
     def graph(self, start: str, end: str, at: Array) -> None:
         """Any links in any loops with any joints."""
@@ -175,7 +176,8 @@ class Builder:
             self.joint(kinds[k], (one, other), point, *axes, actuated=k in driven, pitch=0.3)
 
 
-STAGES = ("hinge", "planar", "ankle", "delta", "tripod", "geared", "crossed", "graph")
+#: Freedoms of a stage, about: more than six in a row leave actuators idle.
+STAGES = {"hinge": 1, "planar": 2, "ankle": 2, "delta": 3, "tripod": 3, "geared": 2, "crossed": 3, "graph": 2}
 
 
 def random_mechanism(seed: int) -> Table:
@@ -187,7 +189,9 @@ def random_mechanism(seed: int) -> Table:
     else:
         rows = 2 if rng.random() < 0.25 else 1
         for _ in range(rows):
-            stages = [str(each) for each in rng.choice(STAGES, int(rng.integers(1, 4)))]
+            stages = [str(each) for each in rng.choice(list(STAGES), int(rng.integers(1, 4)))]
+            while seed % 8 != 1 and sum(STAGES[each] for each in stages) > 6:
+                stages.pop()
             if stages == ["hinge"] * len(stages):
                 stages[0] = "planar"
             if stages.count("delta") > 1:
