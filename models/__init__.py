@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .actuation import Velocities, limb_drive, rates_expression
+from .actuation import LimbDrive, Velocities, limb_drive, rates_expression
 from .arrays import FloatArray, frozen_array, frozen_vector
 from .basis import constraint_rows, rank_of_rows, reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
@@ -84,6 +84,7 @@ __all__ = [
     "Leg",
     "LegInstance",
     "LeggedPlatform",
+    "LimbDrive",
     "Link",
     "LinkKind",
     "Mark",

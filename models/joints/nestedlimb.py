@@ -83,10 +83,10 @@ def nested_limb(
         variables: of the axes of joints.
         frame: values that all parts of the robot share.
     """
-    made: set[tuple[int, int]] = set()
+    made: set[tuple[Joint, int]] = set()
 
     def counted(joint: Joint, axis: int) -> SX:
-        made.add((id(joint), axis))
+        made.add((joint, axis))
         return variables(joint, axis)
 
     network = open_network(robot, joints, counted, frame)

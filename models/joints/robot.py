@@ -150,7 +150,7 @@ class _Builder:
         if len(limb.branches) > 1 and passive:
             fault = "is passive and before the branches of its limb; only actuated joints may stand there"
             raise RobotError(passive[0].place, fault)
-        known: dict[tuple[int, int], SX] = {}
+        known: dict[tuple[Joint, int], SX] = {}
         driven: dict[int, list[tuple[Joint, OpenedPath, int, str]]] = {}
         labels: dict[int, str] = {}
         count, opened = len(self.unknowns), []
@@ -181,16 +181,15 @@ class _Builder:
             )
             raise RobotError(limb.place, fault)
         self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
-        several = len(driven) > 1
         for k, places in enumerate(driven.values()):
-            name = f"{limb.name}.{k + 1}" if several else limb.name
+            name = f"{limb.name}.{k + 1}" if len(driven) > 1 else limb.name
             joint, path, j, _ = places[0]
             members = tuple(member for *_, member in places)
             (axis,) = joint.axes
             dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
             screws = ca.repmat(path.screws[j][0], 1, len(members))
             self.actuators.append(Actuator(name, limb.name, members, screws, dimension))
-            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[id(joint), 0])
+            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
 
     @property
@@ -236,11 +235,11 @@ class _Builder:
         self.screws += [] if screws is None else [screws]
         return path
 
-    def _variables(self, limb: str, known: dict[tuple[int, int], SX]) -> Variables:
+    def _variables(self, limb: str, known: dict[tuple[Joint, int], SX]) -> Variables:
         """Return the function that gives the variable of a joint's axis, as a new unknown at its first use."""
 
         def variable(joint: Joint, axis: int) -> SX:
-            key = id(joint), axis
+            key = joint, axis
             if key not in known:
                 name = f"q{limb}_{len(known) + 1}"
                 symbol = SX.sym(name)

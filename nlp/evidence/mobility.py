@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models import FloatArray, Model, constraint_rows, limb_drive, rank_of_rows
+from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ..program.nlp import Nlp
-from ..program.program import RobotNumbers
 from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities
 from .state import RobotState
 
@@ -70,12 +69,23 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
     constraints = constraint_rows(model, numbers.velocities, state.position)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
-    rates, parts = _actuator_rates(model, numbers, state.position)
+    drives = {limb: limb_drive(model, numbers.velocities, state.position, limb) for limb in model.limbs}
+    rates = dict.fromkeys([each.name for each in model.actuators], float("inf"))
+    parts: dict[str, LimbPart] = {}
+    for limb, (rows, actuators, drive) in drives.items():
+        resisted = numbers.rates[rows, 0]
+        moved = drive.driven_part(resisted)
+        parts[limb] = LimbPart(float(moved @ moved), float(np.sum((resisted - moved) ** 2)))
+        rates |= {
+            model.actuators[k].name: float(rate) for k, rate in zip(actuators, drive.rates(resisted), strict=True)
+        }
     left = sum(part.constraint for part in parts.values())
     is_feasible = left <= _FEASIBLE * state.size
     if is_feasible:  # what is left is rounding
         parts = {limb: LimbPart(part.actuation, 0.0) for limb, part in parts.items()}
     found = limb_singularities(nlp, x, state, pose)
+    if not found:
+        found = _idle_limb(drives, model.generic)
     # The wrenches of a limb whose passive joints are dependent are not those of its model, so J says nothing.
     if all(each.kind is not SingularityKind.PASSIVE for each in found):
         generic = model.generic.constraints, model.generic.jacobian
@@ -92,18 +102,12 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     )
 
 
-def _actuator_rates(
-    model: Model, numbers: RobotNumbers, position: FloatArray
-) -> tuple[dict[str, float], dict[str, LimbPart]]:
-    """Return the rate of each actuator by name, and the parts of F of each limb."""
-    found = {each.name: float("inf") for each in model.actuators}
-    parts: dict[str, LimbPart] = {}
-    for limb in model.limbs:
-        rows, actuators, drive = limb_drive(model, numbers.velocities, position, limb)
-        resisted = numbers.rates[rows, 0]
-        moved = drive.driven_part(resisted)
-        left = resisted - moved
-        parts[limb] = LimbPart(float(moved @ moved), float(left @ left))
-        for k, rate in zip(actuators, drive.rates(resisted), strict=True):
-            found[model.actuators[k].name] = float(rate)
-    return found, parts
+def _idle_limb(drives: Mapping[str, LimbDrive], generic: GenericRanks) -> list[Singularity]:
+    """Return the serial singularity of a limb whose actuators have more rates without a motion than elsewhere.
+
+    The joints of each of its members alone may be independent.
+    """
+    idle = {limb: each.drive.idle.shape[1] for limb, each in drives.items() if each.drive.idle.shape[1]}
+    if sum(idle.values()) <= generic.idle:
+        return []
+    return [Singularity(SingularityKind.SERIAL, next(iter(idle)) if len(idle) == 1 else None)]

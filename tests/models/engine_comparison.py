@@ -16,7 +16,7 @@ from screwsynth.models.mechanism import Mechanism, mechanism_of, wrenches_of
 from screwsynth.models.mechanism.singularities import closed_configurations
 from screwsynth.nlp import Case, Nlp, Task, evaluate, formulate
 from screwsynth.nlp.case.pose import Rotation
-from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
+from screwsynth.nlp.evidence.mobility import mobility_of
 
 Array = NDArray[np.float64]
 CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
@@ -86,7 +86,9 @@ def unknowns_at(model: Model, home: Mechanism, there: Mechanism) -> Array:
             rows.append(each.coordinates[0].value)
             wanted.append(coordinate(home, there, each.name))
     residual = ca.vertcat(SX0, *rows) - ca.DM(wanted)
-    function = ca.Function("at", symbols.all, [ca.densify(residual), ca.densify(ca.jacobian(residual, symbols.unknowns))])
+    function = ca.Function(
+        "at", symbols.all, [ca.densify(residual), ca.densify(ca.jacobian(residual, symbols.unknowns))]
+    )
     found = np.zeros(len(model.unknowns))
     for _ in range(100):
         values, slopes = (each.full() for each in function([], found, plate.rotation, plate.position))

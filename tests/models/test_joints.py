@@ -193,7 +193,9 @@ class Robot:
 
     def at(self, pose: Array, twist: Array = CHI) -> Numbers:
         F, rates, J, driven, relations, loops, quantities = (each.full() for each in self._numbers(pose, twist))
-        return Numbers(float(F.item()), rates.ravel(), J, driven, relations, loops.ravel(), quantities.ravel(), pose[3:6])
+        return Numbers(
+            float(F.item()), rates.ravel(), J, driven, relations, loops.ravel(), quantities.ravel(), pose[3:6]
+        )
 
     def driven(self, target: Array) -> Array:
         """Return the closed pose near home at which the actuators are away from home by so much."""
