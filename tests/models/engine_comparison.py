@@ -184,7 +184,7 @@ def joined(sets: list[set[str]], more: list[set[str]]) -> list[set[str]]:
 
 
 def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
-    """Compare a robot with the engine at home and at random closed configurations.
+    """Compare a robot's model, and its numbers as a mechanism, with the engine at home and at random configurations.
 
     Raises:
         AssertionError: ranks, freedoms, or which rates are determined, differ.
@@ -204,12 +204,14 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
         state = evaluate(nlp, x)
         mobility = mobility_of(nlp, x, state)
         assert mobility is not None
-        numbers = nlp.program.kernels.robot_state(x, nlp.arguments)
-        constraints = constraint_rows(model, numbers.velocities, state.position)
+        velocities = nlp.program.kernels.robot_state(x, nlp.arguments).velocities
+        constraints = constraint_rows(model, velocities, state.position)
         assert mobility.freedoms == free.shape[1], (mobility.freedoms, free.shape[1])
         assert state.rank == 6 - locked.shape[1], (state.rank, locked.shape[1])
         spaces = [np.eye(6) - onto(work(constraints).T) - onto(free), onto(state.free_twists.T) - onto(locked)]
-        centres = {each.joints or each.actuators: each.centre for each in wrenches_of(there, LENGTH).members}
+        numbers = wrenches_of(there, LENGTH)
+        assert (numbers.ranks.freedoms, numbers.ranks.locked) == (free.shape[1], locked.shape[1])
+        centres = {each.joints or each.actuators: each.centre for each in numbers.members}
         F = objective(there, centres, CHI)
         of_F = abs(of_F - F) / max(1.0, abs(F))
         worst = np.maximum(worst, [of_F, 0.0, max(np.abs(each).max(initial=0.0) for each in spaces)])
@@ -224,4 +226,12 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
         known = np.isfinite(expected)
         rates = np.abs(found - expected)[known].max(initial=0.0) / max(1.0, np.abs(expected[known]).max(initial=0.0))
         worst[1] = max(worst[1], rates)
+        # The numbers of the mechanism, which import goes by, are those of the model.
+        by_name = numbers.rates(chi)
+        again = np.array([by_name[each.name] for each in model.joints if each.name in names])
+        assert np.array_equal(np.isfinite(again), known)
+        worst[1] = max(
+            worst[1],
+            np.abs(again - expected)[known].max(initial=0.0) / max(1.0, np.abs(expected[known]).max(initial=0.0)),
+        )
     return Differences(*map(float, worst), count)
