@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
+import numpy as np
 import pytest
 from casadi import SX
 from engine_comparison import Differences, compare
-from random_mechanisms import random_mechanism
+from random_mechanisms import Builder, random_mechanism
 
 from screwsynth.models import GenericRanks, robot
 from screwsynth.models.joints import RobotError
@@ -44,6 +45,37 @@ def test_many_random_mechanisms_have_the_numbers_of_the_engine() -> None:
         assert_equal(found)
         done += 1
     assert done > 40
+
+
+@pytest.mark.parametrize(
+    ("stages", "freedoms"),
+    [
+        (("delta", "hinge", "hinge", "hinge"), 6),  # a Delta with a wrist of three axes
+        # A leg: hip and ankle of two struts or cranks each, and a knee.
+        pytest.param(("ankle", "four_bar", "ankle"), 5, marks=pytest.mark.slow),
+        (("five_bar", "hinge"), 3),
+        (("overdriven",), 1),  # a four-bar with two motors
+    ],
+)
+def test_stages_one_after_another_have_all_their_freedoms(stages: Sequence[str], freedoms: int) -> None:
+    builder = Builder(np.random.default_rng(3))
+    links = ["base", *(builder.link() for _ in stages[1:]), "platform"]
+    x, y, z = np.eye(3)
+    for k, (stage, one, other) in enumerate(zip(stages, links, links[1:], strict=False)):
+        at = 0.7 * k * z
+        if stage in ("four_bar", "five_bar", "overdriven"):
+            arms = ("R", at - 0.5 * y, [x], True), ("R", at + 0.5 * y, [x], stage != "four_bar")
+            ends = ("R", at - 0.6 * y + 0.6 * z, [x], False), ("R", at + 0.8 * y + 0.5 * z, [x], False)
+            knee = [("R", at + 0.9 * z, [x], False)] if stage == "five_bar" else []
+            builder.chain(one, other, [arms[0], ends[0]])
+            builder.chain(one, other, [arms[1], ends[1], *knee])
+        else:
+            getattr(builder, stage)(one, other, at)
+    tables = {"name": "stages", "links": [*builder.links, "platform"], "joint": builder.joints, "home": [0.1, 0.2, 1.0]}
+    model = robot(**tables)
+    assert model.generic is not None
+    assert (6 - model.generic.constraints, model.generic.idle) == (freedoms, 0)
+    assert_equal(compare(tables, driven=1))
 
 
 def table(name: str, kind: str, between: tuple[str, str], at: Sequence[float], **more: Any) -> dict[str, Any]:  # noqa: ANN401

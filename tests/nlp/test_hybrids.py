@@ -121,7 +121,7 @@ def overdriven(*, driven: bool) -> Model:
 
 @pytest.mark.parametrize("driven", [True, False])
 def test_more_motors_than_freedoms_have_rates_that_fit(driven: bool) -> None:
-    """The coupler turns about the pole, where its cranks meet: a turn of 1 is q1 = (e1 - pole).(e1 - a) / |e1 - a|^2."""
+    """The coupler turns about the pole, where its cranks meet: a unit turn is (e1 - pole).(e1 - a) / |e1 - a|^2."""
     model = overdriven(driven=driven)
     a, b, c, d = (np.array(each) for each in ((0.0, 0), (1.0, 0), (0.1, 0.5), (1.3, 0.8)))
     s, _ = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)
