@@ -29,7 +29,8 @@ class Rate(NamedTuple):
     Attributes:
         actuator: name of the actuator, or of the leg that is driven along its axis.
         dimension: of its coordinate.
-        value: rate, radians or length per unit of the task's motion; infinite where it cannot drive the platform.
+        value: rate, radians or length per unit of the task's motion; infinite where it cannot drive the platform, and
+            not a number where the motion does not determine it.
     """
 
     actuator: str
@@ -64,8 +65,8 @@ class TaskFit(NamedTuple):
 
     @property
     def largest_rate(self) -> Rate | None:
-        """The rate that is largest in size; None where no rate is known."""
-        return max(self.rates, key=lambda each: abs(each.value), default=None)
+        """The rate that is largest in size, one that is no number first; None where no rate is known."""
+        return max(self.rates, key=lambda each: (math.isnan(each.value), abs(each.value)), default=None)
 
 
 @dataclass(frozen=True, eq=False)

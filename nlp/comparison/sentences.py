@@ -64,7 +64,9 @@ def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
     elif fit.can_move is None:
         found.append(f"Whether the platform can make the motion of {fit.name} is not known for this robot's rows.")
     largest = fit.largest_rate
-    if largest is not None and math.isinf(largest.value):
+    if largest is not None and math.isnan(largest.value):
+        found.append(f"The motion of the platform does not determine the rate of actuator {largest.actuator}.")
+    elif largest is not None and math.isinf(largest.value):
         found.append(f"Actuator {largest.actuator} cannot drive the platform at this design.")
     return found
 

@@ -118,7 +118,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
     if not all(np.isfinite(each).all() for each in (numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
-    reporting = reporting_matrix(model, numbers.jacobian, numbers.actuators)
+    reporting = reporting_matrix(model, numbers.velocities, position)
     jacobian, rates = reporting @ numbers.jacobian, reporting @ numbers.rates
     axis, angle = axis_angle_from_matrix(rotation)
     stated, step = _pose_displacements(case)[pose]

@@ -18,7 +18,8 @@ class ComparedRateData(JsonObject):
     Attributes:
         actuator: its name.
         unit: of the rate, per unit of the task's motion.
-        rate: for the task's motion; null where the actuator cannot drive the platform.
+        rate: for the task's motion; null where the motion does not determine it, because the actuator can move while
+            the platform stands still.
     """
 
     actuator: str

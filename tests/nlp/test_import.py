@@ -55,7 +55,7 @@ def test_motor_rates_of_reachy_mini_are_its_makers() -> None:
     closure = ca.vertcat(*[each.expression for each in model.closure])
     length = ca.SX.sym("length")
     rows = ca.densify(jacobian(model.wrenches, length, model.members))
-    screws = ca.densify(ca.horzcat(*[each.screw for each in model.actuators]))
+    screws = ca.densify(ca.horzcat(*[each.screws for each in model.actuators]))
     unknowns = own.all[1]
     function = ca.Function("head", [*own.all, length], [closure, ca.jacobian(closure, unknowns), rows, screws])
     typical = ca.DM([value for each in model.parameters for value in each.typical])

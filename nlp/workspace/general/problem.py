@@ -199,7 +199,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
         *[part for member in model.members for part in (member.centre, member.screws)],
-        *[each.screw for each in model.actuators],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
@@ -208,7 +208,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
     ]
     members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-    actuators = [(each.limb, next(following)) for each in model.actuators]
+    actuators = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
     sizes = sizes_at(
         model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
@@ -324,7 +324,7 @@ def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMat
         return None
     values = np.linalg.svd(ca.Function("free", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
     rank = int(np.count_nonzero(values > _ZERO * values[0]))
-    nullity = matrix.shape[1] - rank
+    freedoms, idle = matrix.shape[1] - rank, 0
     if model.generic is not None:
-        nullity = 6 - model.generic.constraints
-    return RankMatrix(matrix, nullity) if 0 < nullity < 6 else None
+        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
+    return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Member, Model, Substitution, Wrench
+from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
@@ -29,7 +29,7 @@ class PosedRobot:
         signs: (s, 1) numbers that are positive in home's working mode.
         rows: rows of limbs, one wrench each.
         members: members of limbs.
-        actuators: (6, 1) screws of actuators as twists with the world's origin as reference, by name of the limb.
+        actuators: actuated joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length: any positive number.
     """
@@ -43,7 +43,7 @@ class PosedRobot:
     signs: SX
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
-    actuators: tuple[tuple[str, SX], ...]
+    actuators: tuple[Actuator, ...]
     position: SX
     length: float
 
@@ -76,7 +76,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment)],
         *[part for member in model.members for part in (member.centre, member.screws)],
-        *[each.screw for each in model.actuators],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
         *[each.scaled for each in (*model.closure, *model.loops)],
         *[each.value for each in model.signs],
         *[each.size for each in model.unknowns],
@@ -91,7 +91,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         members=tuple(
             replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
         ),
-        actuators=tuple((each.limb, next(following)) for each in model.actuators),
+        actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
         equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
         loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
         signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
