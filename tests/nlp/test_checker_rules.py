@@ -204,3 +204,23 @@ def test_a_function_rises_where_its_box_is_claimed_to_be_monotone(seed: int, is_
             assert not (shown.holds & ~rises & some.feasible.any(axis=0)).any()
             holds += int(shown.holds.sum())
     assert holds > 30
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_gradient_of_a_limb_is_between_its_ends(sign: float) -> None:
+    """A limb is collapsed to an end where its function rises, by these ends alone."""
+    x, rng = SX.sym("x", N), np.random.default_rng(5)
+    square = (x[0] * x[1] + x[2] + 0.5) ** 2 / (x[0] ** 2 + x[1] * x[2] + 3)
+    function = sign * square + 0.3 * x[0] * x[2]
+    nlp = formulate(load_case("paper-4.2-rotation"))
+    form = StandardForm(nlp, x, -np.ones(N), np.ones(N), (function,), (), (), 1.0, has_epigraph=False)
+    width = 10.0 ** rng.uniform(-3, -0.5, (N, BOXES))
+    lower = rng.uniform(-1, 1 - 2 * width)
+    share = rng.random((POINTS, N, BOXES))
+    share[::2] = np.round(share[::2])
+    points = np.moveaxis(lower + 2 * share * width, 1, 0).reshape(N, -1)
+    slopes = np.array(ca.Function("slopes", [x], [ca.gradient(function, x)])(points)).reshape(N, POINTS, BOXES)
+    found = TiltedForm(form).slopes(lower, lower + 2 * width)
+    assert (found.rises_low[:, None] <= slopes).all()
+    assert (slopes <= found.rises_high[:, None]).all()
+    assert np.median((found.rises_high - found.rises_low) / np.ptp(slopes, axis=1)) < 8
