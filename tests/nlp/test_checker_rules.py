@@ -12,7 +12,7 @@ from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
 from screwsynth.nlp.certificate.paper.proof import Node
 from screwsynth.nlp.certificate.paper.showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
 from screwsynth.nlp.certificate.standardform import Condition, StandardForm
-from screwsynth.nlp.workspace.paper.ballrows import AFTER, BEFORE, Joints, ball_rows
+from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
 from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
 from screwsynth.nlp.workspace.paper.poseroot import pose_root
 from screwsynth.nlp.workspace.posebox import pose_box
@@ -66,7 +66,11 @@ def test_the_change_of_the_rows_is_nearly_reached(seed: int) -> None:
         assert (change[:, 3 + k] <= 1.001 * np.abs(moment[:, k])).all()
     assert (change[:, :3] >= 2 * s * t).all()
     assert (change[:, :3] <= 1.001 * 2 * s * t).all()
-    assert AFTER != BEFORE
+    # Over a box it is that of the worst pose.
+    half = np.array([0.5, 0.5, 0.5, 0.02, 0.02, 0.02])
+    whole = change_of_rows(ball_rows(pose_root(space), joints, y - half, y + half), joints, t)[0]
+    points = y + half * np.round(rng.uniform(-1, 1, (64, 6)))
+    assert (change_of_rows(ball_rows(pose_root(space), joints, points, points), joints, t) <= whole).all()
 
 
 @pytest.mark.parametrize(
