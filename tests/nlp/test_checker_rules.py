@@ -12,7 +12,7 @@ from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
 from screwsynth.nlp.certificate.paper.proof import Node
 from screwsynth.nlp.certificate.paper.showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
 from screwsynth.nlp.certificate.standardform import Condition, StandardForm
-from screwsynth.nlp.workspace.paper.ballrows import AFTER, BEFORE, Joints, ball_rows
+from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
 from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
 from screwsynth.nlp.workspace.paper.poseroot import pose_root
 from screwsynth.nlp.workspace.posebox import pose_box
@@ -66,7 +66,11 @@ def test_the_change_of_the_rows_is_nearly_reached(seed: int) -> None:
         assert (change[:, 3 + k] <= 1.001 * np.abs(moment[:, k])).all()
     assert (change[:, :3] >= 2 * s * t).all()
     assert (change[:, :3] <= 1.001 * 2 * s * t).all()
-    assert AFTER != BEFORE
+    # Over a box it is that of the worst pose.
+    half = np.array([0.5, 0.5, 0.5, 0.02, 0.02, 0.02])
+    whole = change_of_rows(ball_rows(pose_root(space), joints, y - half, y + half), joints, t)[0]
+    points = y + half * np.round(rng.uniform(-1, 1, (64, 6)))
+    assert (change_of_rows(ball_rows(pose_root(space), joints, points, points), joints, t) <= whole).all()
 
 
 @pytest.mark.parametrize(
@@ -204,3 +208,23 @@ def test_a_function_rises_where_its_box_is_claimed_to_be_monotone(seed: int, is_
             assert not (shown.holds & ~rises & some.feasible.any(axis=0)).any()
             holds += int(shown.holds.sum())
     assert holds > 30
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_gradient_of_a_limb_is_between_its_ends(sign: float) -> None:
+    """A limb is collapsed to an end where its function rises, by these ends alone."""
+    x, rng = SX.sym("x", N), np.random.default_rng(5)
+    square = (x[0] * x[1] + x[2] + 0.5) ** 2 / (x[0] ** 2 + x[1] * x[2] + 3)
+    function = sign * square + 0.3 * x[0] * x[2]
+    nlp = formulate(load_case("paper-4.2-rotation"))
+    form = StandardForm(nlp, x, -np.ones(N), np.ones(N), (function,), (), (), 1.0, has_epigraph=False)
+    width = 10.0 ** rng.uniform(-3, -0.5, (N, BOXES))
+    lower = rng.uniform(-1, 1 - 2 * width)
+    share = rng.random((POINTS, N, BOXES))
+    share[::2] = np.round(share[::2])
+    points = np.moveaxis(lower + 2 * share * width, 1, 0).reshape(N, -1)
+    slopes = np.array(ca.Function("slopes", [x], [ca.gradient(function, x)])(points)).reshape(N, POINTS, BOXES)
+    found = TiltedForm(form).slopes(lower, lower + 2 * width)
+    assert (found.rises_low[:, None] <= slopes).all()
+    assert (slopes <= found.rises_high[:, None]).all()
+    assert np.median((found.rises_high - found.rises_low) / np.ptp(slopes, axis=1)) < 8
