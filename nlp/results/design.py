@@ -15,6 +15,7 @@ from ..program.relaxation import RelaxedLimit
 from ..units import rate_unit
 from .jsondata import finite_or_none, vector
 from .parts import JointGradientData, LimitData, MarginData, RelaxationData, SensitivityData, ToleranceData
+from .rounding import NOISE
 
 #: Beginning of the names of constraints on the rates of actuators.
 _RATE = "actuator_rate actuator "
@@ -66,7 +67,10 @@ def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
 
 def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
     """Return one limiting number from all its margins."""
-    least = min(margins, key=lambda row: -math.inf if row.margin is None else row.margin)
+    sizes = [-math.inf if row.margin is None else row.margin for row in margins]
+    # The first of equally near ones: rounding must not choose among legs that are images of each other.
+    near = min(sizes) + NOISE * max(abs(margins[0].limit), abs(margins[0].value or 0.0))
+    least = next(row for row, size in zip(margins, sizes, strict=True) if size <= near)
     costs = [row.cost for row in margins if row.cost is not None]
     return LimitData(
         key=key,

@@ -89,7 +89,7 @@ class _Reasons:
             why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
         elif fixed is not None and fixed.derivative is None:
             why = f"fixed: {fixed.hindrance}"
-        elif fixed is not None:
+        elif fixed is not None and fixed.derivative is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
             slope = settled(fixed.derivative, self._F / size)
