@@ -203,7 +203,9 @@ static double advance(search *of) {
 static void compare_with_last(search *of, double residual, double violation) {
     const int is_little = violation > GOOD * of->last;
     of->poor = is_little && of->part < 1.0 && !of->is_feasible ? of->poor + 1 : 0;
-    of->idle = is_little && residual > GOOD * of->residual && residual <= ENOUGH && of->is_feasible ? of->idle + 1 : 0;
+    /* A residual within its aim is rounding error, and may fall again and again. */
+    const int is_still = is_little && (residual > GOOD * of->residual || residual <= AIM);
+    of->idle = is_still && residual <= ENOUGH && of->is_feasible ? of->idle + 1 : 0;
     of->residual = residual;
     of->last = violation;
 }
