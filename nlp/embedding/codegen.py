@@ -11,7 +11,6 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -259,7 +258,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
         string_table(f"{prefix}_parameter_units", P, units.parameters),
         number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
-        "/* Units of F, of the rates of each task, and of the multipliers of the variables' bounds, for the case's own twists. */",
+        "/* Units of F, of each task's rates, and of the multipliers of the variables' bounds, for the case's twists. */",
         f"static const char *const {prefix}_F_unit = {string_literal(units.F)};",
         string_table(f"{prefix}_rate_units", T, units.rates),
         string_table(f"{prefix}_multiplier_units", N, units.variable_multipliers),
