@@ -81,8 +81,8 @@ def multipliers(A: Array, b: Array) -> Array:
 def searched(robot: Robot, p: Array, rng: np.random.Generator, starts: int, rounds: int) -> Array:
     """Return the best F (m,) that a random search finds for m tasks.
 
-    From the best of many points a step is longer after a success and shorter after a failure (Rechenberg's rule). A third
-    of the steps changes one number alone.
+    From the best of many points a step is longer after a success and shorter after a failure (Rechenberg's rule).
+    A third of the steps changes one number alone.
     """
     m, n = len(p), len(robot.names)
     lower, upper, limits = robot.lower[robot.free], robot.upper[robot.free], np.tile(robot.limits, (m, 1))

@@ -3,8 +3,8 @@
     .venv/bin/python -P bench/soak/soak.py [--ticks N] [--seed N] [--tasks N] [CASE ...]
 
 Tasks, limits, ranges (down to equal bounds), budgets and odd numbers change from tick to tick. Cases are shipped ones,
-and starters of robots with loops. Worst cases are solved for random tasks too, beside a random search of many points. The
-command ends with status 1 where there is a fault.
+and starters of robots with loops. Worst cases are solved for random tasks too, beside a random search of many points.
+The command ends with status 1 where there is a fault.
 """
 
 from __future__ import annotations

@@ -258,7 +258,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
         string_table(f"{prefix}_parameter_units", P, units.parameters),
         number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
-        "/* Units of F, of each task's rates, and of the multipliers of the variables' bounds, for the case's twists. */",
+        "/* Units of F, of each task's rates, and of multipliers of variables' bounds, for the case's twists. */",
         f"static const char *const {prefix}_F_unit = {string_literal(units.F)};",
         string_table(f"{prefix}_rate_units", T, units.rates),
         string_table(f"{prefix}_multiplier_units", N, units.variable_multipliers),

@@ -97,7 +97,7 @@ def _rows(figures: Sequence[Figures]) -> str:
     """Return a table for the README; a line says what is not measured."""
     rows = [
         (
-            "| machine | flash, bytes | bound of the stack, bytes | with room for other compilers | stack measured, bytes "
+            "| machine | flash, bytes | bound of the stack, bytes | with room for others | stack measured, bytes "
             "| compiler and flags |"
         ),
         "|---|---|---|---|---|---|",
