@@ -210,7 +210,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1),
+        **worst_case_texts(n, c, _SEEDS + 1, level >= 0),
         **header_texts(),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
