@@ -176,7 +176,9 @@ def delta(numbers: Mapping[str, Array]) -> State:
             gaps.append(length - rod)
             rates = [np.sum(span * velocity(twist, at), axis=-1) / length for twist in twists_of(numbers)]
             F = F + np.stack(rates, axis=-1) ** 2
-            bend = bend + np.sum(np.cross(turned(turn, reach), span) * turned(turn, np.array([[0.0, 1.0, 0.0]])), axis=-1)
+            bend = bend + np.sum(
+                np.cross(turned(turn, reach), span) * turned(turn, np.array([[0.0, 1.0, 0.0]])), axis=-1
+            )
         bends.append(bend)
     # At home the rods hang from the ends of the arms, on one side of them.
     is_home = np.all(np.stack(bends) > 0, axis=0)

@@ -1,4 +1,4 @@
-"""Whether answers are optima, by formulas that are not the program's: multipliers from differences, and random searches."""
+"""Whether answers are optima, by formulas that are not the program's: KKT residuals by differences, random searches."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _STEP = 1e-6
 def stationarity(robot: Robot, tick: Tick, x: Array, row: int) -> float:
     """Return the KKT residual at an answer to one problem of a tick, over the sum of the gradient's sizes.
 
-    Gradients are central differences. Multipliers are those that fit best, not negative for inequalities. The worst of several
-    F is a level t, in parts of F, that each F bounds.
+    Gradients are central differences. Multipliers are those that fit best, not negative for inequalities. The worst of
+    several F is a level t, in parts of F, that each F bounds.
     """
     n, point = len(robot.names), x[row]
     half = np.where(np.arange(n) == robot.level, 0.0, 0.5 * (robot.upper - robot.lower))
@@ -35,8 +35,8 @@ def stationarity(robot: Robot, tick: Tick, x: Array, row: int) -> float:
         gradient = -robot.sense * np.eye(n)[robot.level]
         values, (own,) = robot.values(state, p), robot.values(here, p[:1])
         worst = robot.objective(here, p[:1])[0]
-        for k in np.flatnonzero(np.abs(own - worst) <= _ACTIVE * abs(worst)):
-            inequalities.append(robot.sense * (slopes(values[:, k]) / abs(worst) - np.eye(n)[robot.level]))
+        active = np.flatnonzero(np.abs(own - worst) <= _ACTIVE * abs(worst))
+        inequalities += [robot.sense * (slopes(values[:, k]) / abs(worst) - np.eye(n)[robot.level]) for k in active]
     for key, limit in zip(robot.keys, tick.limits[row], strict=True):
         sign = 1.0 if key.endswith(".min") else -1.0
         for k, value in enumerate(here.limits[key][0]):
@@ -81,8 +81,8 @@ def multipliers(A: Array, b: Array) -> Array:
 def searched(robot: Robot, p: Array, rng: np.random.Generator, starts: int, rounds: int) -> Array:
     """Return the best F (m,) that a random search finds for m tasks.
 
-    From the best of many points a step is longer after a success and shorter after a failure (Rechenberg's rule). A third of
-    the steps changes one number alone.
+    From the best of many points a step is longer after a success and shorter after a failure (Rechenberg's rule).
+    A third of the steps changes one number alone.
     """
     m, n = len(p), len(robot.names)
     lower, upper, limits = robot.lower[robot.free], robot.upper[robot.free], np.tile(robot.limits, (m, 1))
@@ -104,7 +104,7 @@ def searched(robot: Robot, p: Array, rng: np.random.Generator, starts: int, roun
 
 
 def compared(robot: Robot, p: Array, rng: np.random.Generator) -> tuple[Any, Array]:
-    """Return the answers of the C to m tasks, and by how much those of three random searches are better, in parts of F."""
+    """Return the answers of the C to m tasks, and by how much three random searches are better, in parts of F."""
     found = robot.compiled.solve(p=p, threads=1)
     best = robot.sense * np.max([robot.sense * searched(robot, p, rng, 1000, 2000) for _ in range(3)], axis=0)
     return found, robot.sense * (best - found.F) / np.abs(found.F)

@@ -2,9 +2,9 @@
 
     .venv/bin/python -P bench/soak/soak.py [--ticks N] [--seed N] [--tasks N] [CASE ...]
 
-Tasks, limits, ranges (down to equal bounds), budgets and odd numbers change from tick to tick. Cases are shipped ones, and
-starters of robots with loops. Worst cases are solved for random tasks too, beside a random search of many points. The
-command ends with status 1 where there is a fault.
+Tasks, limits, ranges (down to equal bounds), budgets and odd numbers change from tick to tick. Cases are shipped ones,
+and starters of robots with loops. Worst cases are solved for random tasks too, beside a random search of many points.
+The command ends with status 1 where there is a fault.
 """
 
 from __future__ import annotations
@@ -77,19 +77,22 @@ def main() -> int:
             off = residuals(robot, given.seed, max(1, given.ticks // 1000))
             bad = sum(each > _STATIONARY for each in off)
             wrong += bad
-            print(f"  KKT residual by differences of {len(off)} optima: at most {max(off):.1e}; {bad} faults", flush=True)
+            print(
+                f"  KKT residual by differences of {len(off)} optima: at most {max(off):.1e}; {bad} faults", flush=True
+            )
             if name in WORST and given.tasks:
                 rng = np.random.default_rng(given.seed)
                 p = np.tile(robot.defaults, (given.tasks, 1))
                 p[:, robot.twists] = rng.normal(size=(given.tasks, len(robot.twists)))
                 p[:, robot.twists] *= 10 ** rng.uniform(-2, 2, (given.tasks, 1))
                 found, better = compared(robot, p, rng)
-                # An optimum is local: a better one that no seed reached is told, and is a fault where it is much better.
+                # An optimum is local: a better one that no seed reached is a fault where it is much better.
                 bad = int(np.sum((better > _MUCH) | (found.status != OK)))
                 wrong += bad
                 print(
                     f"  {given.tasks} tasks: {int((found.status == OK).sum())} OK; a random search is better in "
-                    f"{int((better > _BETTER).sum())} (by {max(better.max(), 0.0):.1e} of F at most), and misses {np.median(-better):.1e} of F in the median, "
+                    f"{int((better > _BETTER).sum())} (by {max(better.max(), 0.0):.1e} of F at most), "
+                    f"and misses {np.median(-better):.1e} of F in the median, "
                     f"{np.quantile(-better, 0.99):.1e} in 1 of 100, {np.max(-better):.1e} at most",
                     flush=True,
                 )

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from formulas import Array, State, delta, planar, platform_of_legs, tripod
 
+from screwsynth.nlp import CompiledSolutions
+
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET, OTHER_ASSEMBLY, RANGE_END = range(7)
 WORDS = ("ok", "not converged", "infeasible", "bad input", "budget", "other assembly", "range end")
 #: Half widths of narrowed bounds, in half ranges; the box of the first one is a point.
@@ -89,7 +91,9 @@ class Robot:
             values = state.limits[key]
             with np.errstate(all="ignore"):
                 off = column[:, None] - values if key.endswith(".min") else values - column[:, None]
-            size = np.where(np.abs(column) > 1e-3, np.abs(column), 1e-3)
+            # A limit of the angle is one of its sine, which is kept to 1e-9 of its range however small the limit is.
+            least = 0.1 if key == "angle.max" else 1e-3
+            size = np.where(np.abs(column) > least, np.abs(column), least)
             with np.errstate(all="ignore"):
                 most = np.fmax(most, off.max(axis=1) / size)
             most[np.isnan(off).any(axis=1)] = np.inf
@@ -143,7 +147,11 @@ def next_tick(robot: Robot, x: Array, p: Array, rng: np.random.Generator) -> Tic
             wanted = np.clip(here * factor, own.above + 1e-3 * abs(robot.limits[j]), most)
         change = (rng.random(m) < 0.15) & np.isfinite(wanted) & (np.abs(wanted) < 10 * np.abs(robot.limits[j]))
         limits[change, j] = wanted[change]
-    for low, high in ((k, robot.keys.index(f"{key[:-3]}max")) for k, key in enumerate(robot.keys) if f"{key[:-3]}max" in robot.keys and key.endswith(".min")):
+    for low, high in (
+        (k, robot.keys.index(f"{key[:-3]}max"))
+        for k, key in enumerate(robot.keys)
+        if f"{key[:-3]}max" in robot.keys and key.endswith(".min")
+    ):
         crossed = limits[:, low] > limits[:, high]
         limits[crossed, low] = robot.limits[low]
         limits[crossed, high] = robot.limits[high]
@@ -164,7 +172,7 @@ def next_tick(robot: Robot, x: Array, p: Array, rng: np.random.Generator) -> Tic
     return tick
 
 
-def solved(robot: Robot, tick: Tick) -> Any:
+def solved(robot: Robot, tick: Tick) -> CompiledSolutions:
     """Return the answers of the C: numbers go to it as they are, not by the checks of the Python function."""
     own = robot.compiled
     arrays = {"x0": tick.x0, "p": tick.p, "lower": tick.lower, "upper": tick.upper, "limits": tick.limits}
@@ -175,7 +183,7 @@ def solved(robot: Robot, tick: Tick) -> Any:
     return answers
 
 
-def judged(robot: Robot, tick: Tick, found: Any) -> dict[str, Array]:
+def judged(robot: Robot, tick: Tick, found: CompiledSolutions) -> dict[str, Array]:
     """Return the rows with each fault."""
     status, x = found.status, found.x
     state, start = robot.state(x, tick.p), robot.state(tick.x0, tick.p)
@@ -189,9 +197,7 @@ def judged(robot: Robot, tick: Tick, found: Any) -> dict[str, Array]:
     F, own = found.F, robot.objective(state, tick.p)
     with np.errstate(all="ignore"):
         wrong_F = ~(np.abs(F - own) <= CLOSE * robot.size(x, tick.p))
-        in_box = np.all(
-            ((tick.x0 >= tick.lower) & (tick.x0 <= tick.upper))[:, robot.free], axis=1
-        )
+        in_box = np.all(((tick.x0 >= tick.lower) & (tick.x0 <= tick.upper))[:, robot.free], axis=1)
         feasible = in_box & (robot.excess(start, tick.limits) <= SURE) & ~is_odd
         before = robot.objective(start, tick.p)
         point = np.all((tick.lower == tick.upper)[:, robot.free], axis=1)
@@ -214,12 +220,16 @@ def judged(robot: Robot, tick: Tick, found: Any) -> dict[str, Array]:
         "odd number not refused": (status != BAD_INPUT) & none,
         "budget without one": (status == BUDGET) & (tick.most == 0),
         "worse than a feasible start": (good | (status == NOT_CONVERGED) | (status == BUDGET))
-        & feasible & worse & (start.is_home | ~state.is_home),
+        & feasible
+        & worse
+        & (start.is_home | ~state.is_home),
         "budget left a feasible start": (status == BUDGET) & feasible & ~keeps,
     }
 
 
-def soak(robot: Robot, ticks: int, tracks: int, seed: int) -> tuple[Counter[str], Counter[str], list[tuple[str, int, int]]]:
+def soak(
+    robot: Robot, ticks: int, tracks: int, seed: int
+) -> tuple[Counter[str], Counter[str], list[tuple[str, int, int]]]:
     """Run ticks of many tracks. Returns the counts of statuses, those of faults, and where the first faults are."""
     rng = np.random.default_rng(seed)
     first = robot.compiled.solve(threads=1)

@@ -79,10 +79,14 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
         if each.stack is not None:
             painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
             lines += [
-                f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} "
-                f"/* bound of a solve by that compiler, without functions of math.h{painted} */",
-                f"#define {prefix}_STACK_BYTES_{name} {with_room(each.stack)} "
-                "/* with room for other compilers, and for functions of math.h */",
+                (
+                    f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} "
+                    f"/* bound of a solve by that compiler, without functions of math.h{painted} */"
+                ),
+                (
+                    f"#define {prefix}_STACK_BYTES_{name} {with_room(each.stack)} "
+                    "/* with room for other compilers, and for functions of math.h */"
+                ),
             ]
         if each.fault:
             lines.append(f"/* {each.target.name}: not measured: {comment_text(each.fault)} */")
@@ -92,8 +96,10 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 def _rows(figures: Sequence[Figures]) -> str:
     """Return a table for the README; a line says what is not measured."""
     rows = [
-        "| machine | flash, bytes | bound of the stack, bytes | with room for other compilers | stack measured, bytes "
-        "| compiler and flags |",
+        (
+            "| machine | flash, bytes | bound of the stack, bytes | with room for others | stack measured, bytes "
+            "| compiler and flags |"
+        ),
         "|---|---|---|---|---|---|",
         *(
             f"| {each.target.name} | {_cell(each.flash)} | {_cell(each.stack)} "

@@ -34,7 +34,7 @@ _DIGITS = 9
 
 
 class Subject(NamedTuple):
-    """A program, and its optimal value; None where the search ended at no optimum, or in another working mode than home's."""
+    """A program, and its optimal value; None where the search ended at no optimum, or not in home's working mode."""
 
     nlp: Nlp
     optimum: float | None
@@ -48,7 +48,7 @@ class Bounds(NamedTuple):
 
 
 def bounds_in_c(nlp: Nlp) -> Bounds:
-    """Return the bounds of a program's variables in C, where a level has none: it follows from the task, which may change."""
+    """Return the bounds of a program's variables in C. A level has none: it follows from the task, which may change."""
     lower, upper, epigraph = np.array(nlp.lower), np.array(nlp.upper), nlp.program.places.epigraph
     if epigraph is not None:
         lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND

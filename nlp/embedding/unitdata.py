@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from ..program.nlp import Nlp
 from ..units import Units, objective_unit, rate_unit, twist_units
 from .runtimelimits import RunTimeLimit
@@ -27,14 +29,18 @@ class UnitData:
         return replace(self.nlp.case.units, angle="rad")
 
     @property
-    def F(self) -> str:
+    def _twists(self) -> list[list[float]]:
+        return [np.asarray(task.twist, dtype=np.float64).tolist() for task in self.nlp.case.tasks]
+
+    @property
+    def F(self) -> str:  # noqa: N802 - as everywhere
         """Unit of F; empty where the tasks do not agree in it."""
-        return objective_unit([task.twist for task in self.nlp.case.tasks], self.of_case)
+        return objective_unit(self._twists, self.of_case)
 
     @property
     def rates(self) -> tuple[str, ...]:
         """Unit of the rates of each task."""
-        return tuple(rate_unit(task.twist, self.of_case) for task in self.nlp.case.tasks)
+        return tuple(rate_unit(twist, self.of_case) for twist in self._twists)
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -50,8 +56,8 @@ class UnitData:
         """Unit of each fixed number."""
         program = self.nlp.program
         found = [self.of_case.label(each.dimension) for each in program.arguments]
-        for task, places in zip(self.nlp.case.tasks, program.places.twists, strict=False):
-            found[places.start : places.stop] = twist_units(task.twist, self.of_case)
+        for twist, places in zip(self._twists, program.places.twists, strict=False):
+            found[places.start : places.stop] = twist_units(twist, self.of_case)
         epigraph = program.places.epigraph
         for index in () if epigraph is None else (epigraph.ceiling, *epigraph.best):
             found[index] = self.F

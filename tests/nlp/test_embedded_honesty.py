@@ -11,7 +11,6 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -98,7 +97,7 @@ def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, 
     found = own.solve(p=p)
     assert found.status.tolist() == [OK] * 60
     state = robot.state(found.x, p)
-    assert found.F == pytest.approx(robot.objective(state, p), rel=1e-9)
+    assert pytest.approx(robot.objective(state, p), rel=1e-9) == found.F
     assert robot.excess(state, np.tile(robot.limits, (60, 1))).max() <= 1e-7
     # No random point, however near, is better.
     lower, upper = (each[robot.free] for each in ranges(own))
@@ -129,7 +128,7 @@ def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ti
     p[:, robot.twists] *= 10
     found = own.solve(p=p)
     assert found.status.tolist() == [OK] * 40
-    assert found.F == pytest.approx(robot.objective(robot.state(found.x, p), p), rel=1e-9)
+    assert pytest.approx(robot.objective(robot.state(found.x, p), p), rel=1e-9) == found.F
 
 
 def test_a_delta_held_at_its_last_answer_is_there(compiled: Compiled) -> None:
