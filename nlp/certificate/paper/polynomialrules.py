@@ -135,9 +135,9 @@ class _Boxes(Composed[Polynomial]):
         """Return u plus a number."""
         P, number = u.P.copy(), np.array([by])
         P[0] += by
-        centre = np.abs(P[0])
-        size = np.maximum(u.size - np.abs(u.P[0]), 0.0) + centre + _ONCE * u.size
-        s = u.s * (1 + _ONCE) + _ONCE * centre
+        s = u.s * (1 + _ONCE) + _ONCE * np.abs(P[0])
+        # Taken from u.size, a large constant would leave its rounding, in which small coefficients are lost.
+        size = np.abs(P).sum(axis=0)
         return Polynomial(u.on, P, s, ends.add(u.V, (number, number)), u.rad, u.curved, size)
 
     def mul(self, u: Polynomial, v: Polynomial) -> Polynomial:

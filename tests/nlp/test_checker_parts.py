@@ -1,0 +1,123 @@
+"""Parts of the checkers by themselves: rounding, steps, signs and orders of boxes, on which few whole proofs depend."""
+
+from fractions import Fraction
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from screwsynth.nlp import formulate, load_case
+from screwsynth.nlp.certificate.paper.limbs.limbpart import LimbPartChecker
+from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.certificate.paper.proof import Node, ProofError
+from screwsynth.nlp.certificate.paper.prooftree import Claim
+from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
+from screwsynth.nlp.certificate.standardform import StandardForm
+from screwsynth.nlp.workspace.paper.anyrobot.assembly import Assembly
+from screwsynth.nlp.workspace.paper.anyrobot.motionclaim import MotionClaim
+from screwsynth.nlp.workspace.paper.anyrobot.motions import Motions
+from screwsynth.nlp.workspace.paper.anyrobot.posedrobot import PosedRobot
+
+
+def test_small_coefficients_next_to_a_constant_are_not_lost() -> None:
+    """``((1 + sum x) y - 1) z^3`` with every x below the rounding of 1: all of it is left when 1 is taken off."""
+    m, r = 20, 1.1e-16
+    x = SX.sym("x", m + 2)
+    turned = (1 + ca.sum1(x[:m])) * x[m] - 1
+    function = ca.Function("f", [x], [turned * (x[m + 1] * x[m + 1] * x[m + 1]), turned])
+    radius = np.repeat([[r]] * m + [[0.0], [1.0]], 3, axis=1)
+    centre = np.repeat([[0.0]] * m + [[1.0], [0.0]], 3, axis=1)
+    product, factor = PolynomialArithmetic(function)(centre - radius, centre + radius)
+    assert (product.V[0] <= -m * r).all()
+    assert (product.V[1] >= m * r).all()
+    np.testing.assert_allclose(factor.size, m * r)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_size_of_a_polynomial_is_that_of_its_coefficients(seed: int) -> None:
+    rng, x = np.random.default_rng(seed), SX.sym("x", 3)
+    Q, b = (ca.DM(rng.normal(size=shape)) for shape in ((3, 3), (3, 1)))
+    polynomial = ca.bilin(Q, x, x) + ca.dot(b, x)
+    outputs = [polynomial, polynomial + 1e8, (polynomial + 1e8) * x[0] - 1e8, (polynomial - 0.7) / (x[1] + 3) + 0.3]
+    width = 10.0 ** rng.uniform(-9, -1, (3, 40))
+    lower = np.array([[1.0], [0.3], [-0.5]]) - width * rng.random((3, 40))
+    for value in PolynomialArithmetic(ca.Function("f", [x], outputs))(lower, lower + width):
+        for k, size in enumerate(value.size):
+            exact = sum(abs(Fraction(float(each))) for each in value.P[:, k])
+            assert abs(Fraction(float(size)) - exact) <= exact * Fraction(1e-12)
+
+
+def test_a_step_is_known_where_its_argument_has_one_sign() -> None:
+    rng, x = np.random.default_rng(3), SX.sym("x", 2)
+    # Quarters, of which differences are exact and never 0.
+    lower = rng.integers(-6, 6, (2, 300)) / 4 + np.array([[0.125], [0.0]])
+    upper = lower + rng.integers(0, 4, (2, 300)) / 4
+    least, most = lower[1] - upper[0], upper[1] - lower[0]
+    expected = np.where(least > 0, 1.0, 0.0), np.where(most < 0, 0.0, 1.0)
+    known = expected[0] == expected[1]
+    assert 50 < known.sum() < 250
+    for expression, low, high in ((x[0] <= x[1], 0.0, 1.0), (ca.sign(x[1] - x[0]), -1.0, 1.0)):
+        function = ca.Function("f", [x], [expression])
+        slope, value = SlopeArithmetic(function)(lower, upper)[0], PolynomialArithmetic(function)(lower, upper)[0]
+        for end, of_slope, of_value in zip(expected, slope.V, value.V, strict=True):
+            np.testing.assert_allclose(of_slope, low + (high - low) * end, atol=1e-14)
+            np.testing.assert_allclose(of_value, low + (high - low) * end, atol=1e-14)
+        for side in slope.S:
+            np.testing.assert_array_equal(np.isnan(side), np.broadcast_to(~known, side.shape))
+            assert (np.abs(side[:, known]) < 1e-300).all()
+
+
+class Nothing:
+    """What shows no claim."""
+
+    def show(self, kind: Node, index: int, claims: list[Claim]) -> int:
+        raise ProofError(f"{len(claims)} claims {kind} {index} are left")
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int) -> None:
+    """As many boxes as variables, too: along both the square rises, or falls, and a box has its bound at a corner."""
+    x, rng = SX.sym("x", 2), np.random.default_rng(count)
+    function = (5 + side * (x[0] + 2 * x[1])) ** 2 / (4 - side * x[0])
+    nlp = formulate(load_case("paper-4.2-rotation"))
+    form = StandardForm(nlp, x, -np.ones(2), np.ones(2), (function,), (), (), 1.0, has_epigraph=False)
+    for _ in range(5):
+        lower = rng.uniform(-1, 0.8, (count, 2))
+        upper = lower + rng.uniform(0.01, 0.2, (count, 2))
+        corner = upper if side > 0 else -lower
+        highest = float(((5 + corner[:, 0] + 2 * corner[:, 1]) ** 2 / (4 - corner[:, 0])).max())
+        claims = [Claim(Node.BOUNDED, 0, *ends) for ends in zip(lower, upper, strict=True)]
+        assert LimbPartChecker(form, highest + 1e-6, Nothing()).show(Node.BOUNDED, 0, claims) >= count
+        with pytest.raises(ProofError, match="are left"):
+            LimbPartChecker(form, highest - 1e-6, Nothing()).show(Node.BOUNDED, 0, claims)
+
+
+def sign_of(block: np.ndarray) -> int:
+    """The sign of the determinant of a matrix (2, 2), in fractions."""
+    a, b, c, d = (Fraction(float(each)) for each in block.ravel())
+    return (a * d > b * c) - (a * d < b * c)
+
+
+@pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])
+def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -> None:
+    """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
+    rng, y, nothing, more = np.random.default_rng(1), SX.sym("y"), SX(0, 1), (np.zeros(6), np.ones(1))
+    robot = PosedRobot(y, (0,), *more, nothing, (), (), (), SX(3, 1), 1.0)
+    assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
+
+    def shown(block: np.ndarray) -> int:
+        M = np.eye(6)
+        M[4:, 4:] = block
+        return MotionClaim(robot, Motions(SX(ca.DM(size * M)), 0), assembly).signs_at(at)[0]
+
+    row, factor = rng.normal(size=(4000, 2)), rng.normal(size=4000)
+    blocks = np.stack([row, factor[:, None] * row], axis=1)
+    blocks = blocks[np.linalg.det(blocks) != 0]
+    wrong = [each for each in blocks if sign_of(np.linalg.inv(each)) != sign_of(each)]
+    assert len(wrong) > 100
+    for block in wrong[:150]:
+        assert shown(block) in (0, sign_of(block))
+    for block in rng.normal(size=(20, 2, 2)):
+        assert shown(block) == sign_of(block)
