@@ -14,7 +14,8 @@ from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .family import Family
 from .problem import Problem
-from .rank import Tested
+from .rank import RankTest, Tested
+from ...certificate.boxes.firstpass import MOST_VARIABLES
 from .relation import Relation, are_contractions, by_centres, relation_of
 
 if TYPE_CHECKING:
@@ -141,6 +142,15 @@ class Examiner:
         # A last entry that is not used, for a matrix that is constant.
         entries = ca.vertcat(equations, own, test.entries, problem.z[0])
         self._encloser = Encloser(coordinates, entries, engine)
+        self.second: Encloser | None = None
+        if (
+            not self.count
+            and not self._errors
+            and n <= MOST_VARIABLES
+            and isinstance(test, RankTest)
+            and self._encloser.module
+        ):
+            self.second = Encloser(coordinates, test.entries, engine)
         self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
@@ -151,6 +161,8 @@ class Examiner:
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""
+        if self.second is not None and len(cells.lower):
+            return self._examined(cells, self._test.examine_second(self.second, cells.lower.T, cells.upper.T))
         f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
@@ -190,6 +202,12 @@ class Examiner:
         finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
         return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
+
+    def _examined(self, cells: Cells, found: Tested) -> Examined:
+        """Return the results of a test of boxes without dependent coordinates."""
+        B, f = found.shares.shape
+        none = Relation(np.zeros((B, 0)), np.zeros((B, 0, f)), np.zeros((B, 0)), np.zeros((B, 0, 0)))
+        return Examined(cells, none, *found)
 
     def _forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms of all entries over boxes (B, n), for all machines."""

@@ -7,6 +7,7 @@ equations: all unknowns, and numbers of the pose that a robot with fewer freedom
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -90,6 +91,23 @@ def rotation_of(box: PoseBox, turn: SX) -> SX:
     return SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
 
 
+def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
+    """Return ``s R`` (3, 3) and ``s`` (1, 1), polynomials of the coordinates (3, 1) of a rotation R, ``s > 0``."""
+    if box.kind is TurnKind.ROLL_PITCH_YAW:
+        turned, scale = SX.eye(3), SX(1)
+        for k in range(3):
+            one = 1 + turn[k] ** 2
+            i, j = (k + 1) % 3, (k + 2) % 3
+            single = SX.eye(3) * one
+            single[i, i] = single[j, j] = 1 - turn[k] ** 2
+            single[j, i], single[i, j] = 2 * turn[k], -2 * turn[k]
+            turned, scale = single @ turned, one * scale
+        return turned, scale
+    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    square = ca.sumsqr(r)
+    return (1 - square) * SX.eye(3) + 2 * (r @ r.T) + 2 * ca.skew(r), 1 + square
+
+
 def _turn(about: int, tangent: SX) -> SX:
     """Return the rotation about a coordinate axis by an angle, from the tangent of its half."""
     i, j = (about + 1) % 3, (about + 2) % 3
@@ -113,6 +131,9 @@ class PosedModel:
         signs: (s, 1) numbers that are positive in home's assembly.
         limbs: rows, members and actuators.
         jacobian: (rows, 6) J.
+        turned: the limbs with ``inverse * s R`` as the rotation.
+        inverse: (1, 1) symbol of ``1 / s``.
+        scale: (1, 1) ``s``.
     """
 
     z: SX
@@ -123,6 +144,9 @@ class PosedModel:
     signs: SX
     limbs: Limbs
     jacobian: SX
+    turned: Limbs
+    inverse: SX
+    scale: SX
 
 
 def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
@@ -159,7 +183,9 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=RankMatrix(locked_matrix(limbs), 0),
+        locked=RankMatrix(
+            _polynomial(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed), 0
+        ),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
@@ -198,12 +224,22 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
-    following = iter(ca.Function("model", symbols.all, outputs).call(given.all))
-    wrenches = [
-        replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
-    ]
-    members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-    actuators = [(each.limb, next(following)) for each in model.actuators]
+    function = ca.Function("model", symbols.all, outputs)
+
+    def limbs_of(following: Iterator[SX]) -> Limbs:
+        """Return the limbs from the first outputs."""
+        rows = [
+            replace(row, force=next(following), moment=next(following), square=next(following))
+            for row in model.wrenches
+        ]
+        members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
+        return Limbs(rows, members, [(each.limb, next(following)) for each in model.actuators], position, 1.0)
+
+    following = iter(function.call(given.all))
+    limbs = limbs_of(following)
+    polynomial, scale = polynomial_rotation(box, ca.vertcat(*y[3:]))
+    inverse = SX.sym("inverse")
+    turned = limbs_of(iter(function.call([given.parameters, given.unknowns, inverse * polynomial, position])))
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
     sizes = sizes_at(
         model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
@@ -218,9 +254,29 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         closure=ca.vertcat(SX(0, 1), *scaled[: len(model.closure)]),
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
-        limbs=Limbs(wrenches, members, actuators, position, 1.0),
-        jacobian=jacobian(wrenches, SX(1), members),
+        limbs=limbs,
+        jacobian=jacobian(limbs.wrenches, SX(1), limbs.members),
+        turned=turned,
+        inverse=inverse,
+        scale=scale,
     )
+
+
+def _polynomial(matrix: SX, turned: SX, posed: PosedModel) -> SX:
+    """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
+
+    Args:
+        matrix: (m, c).
+        turned: the same from ``posed.turned``.
+        posed: the robot.
+    """
+    slopes = ca.reshape(ca.jacobian(ca.densify(turned), posed.inverse), *turned.shape)
+    constant = ca.substitute(turned, posed.inverse, 0)
+    rows = [
+        matrix[i, :] if ca.depends_on(slopes[i, :], posed.inverse) else constant[i, :] * posed.scale + slopes[i, :]
+        for i in range(matrix.shape[0])
+    ]
+    return ca.sparsify(ca.vertcat(*rows))
 
 
 def _needed(loops: Loops, start: FloatArray, count: int, posed: PosedModel) -> list[int]:
