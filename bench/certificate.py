@@ -16,7 +16,8 @@ from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import Certificate
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.solver.certified import certify, program_of, proof_of
+from screwsynth.nlp.certificate.paper.statement import program_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 
 LIMIT = 60.0
 

@@ -20,7 +20,8 @@ import numpy as np
 from screwsynth.nlp import case_from_tables
 from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.solver.certified import certify, program_of, proof_of
+from screwsynth.nlp.certificate.paper.statement import program_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 from screwsynth.nlp.solver.solve import solve
 
 #: Starts with the best of which a bound is compared, and the part of F by which it may be below, which is rounding.

@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .actuation import LimbDrive, Velocities, limb_drive, rates_expression
 from .arrays import FloatArray, frozen_array, frozen_vector
 from .basis import constraint_rows, rank_of_rows, reporting_matrix
 from .catalog import AmbiguousModelError, RobotFunction, UnknownModelError, model_names, robot_function
@@ -12,11 +13,11 @@ from .instance import (
     LegInstance,
     RobotInstance,
     Substitution,
+    driven,
     homogenised,
     instantiate,
     jacobian,
     objective,
-    reason_for_zero_row,
 )
 from .legs import LeggedPlatform, legged_platform
 from .member import Member
@@ -35,6 +36,7 @@ from .parts import (
     Quantity,
     Unknown,
     component_names,
+    rate_relations,
 )
 from .rotation import (
     AxisAngle,
@@ -57,7 +59,7 @@ from .screws import (
 )
 from .stewart_gough import stewart_gough
 from .three_upu import three_upu
-from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along
+from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along, reason_for_zero_row
 
 if TYPE_CHECKING:
     from .joints.forms import RobotError
@@ -82,6 +84,7 @@ __all__ = [
     "Leg",
     "LegInstance",
     "LeggedPlatform",
+    "LimbDrive",
     "Link",
     "LinkKind",
     "Mark",
@@ -103,6 +106,7 @@ __all__ = [
     "Substitution",
     "Unknown",
     "UnknownModelError",
+    "Velocities",
     "Wrench",
     "WrenchKind",
     "axis_angle_from_matrix",
@@ -111,6 +115,7 @@ __all__ = [
     "constraint_rows",
     "couple_about",
     "displacement",
+    "driven",
     "force_along",
     "frozen_array",
     "frozen_vector",
@@ -119,6 +124,7 @@ __all__ = [
     "instantiate",
     "jacobian",
     "legged_platform",
+    "limb_drive",
     "line_through",
     "matrix_from_axis_angle",
     "matrix_from_cayley",
@@ -127,6 +133,8 @@ __all__ = [
     "moved_screw",
     "objective",
     "rank_of_rows",
+    "rate_relations",
+    "rates_expression",
     "reason_for_zero_row",
     "reciprocal_product",
     "reporting_matrix",

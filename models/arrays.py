@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 FloatArray: TypeAlias = "NDArray[np.float64]"
 
+#: Sizes that differ by less than this part are the same: rounding must not choose among them.
+_TIE = 1e-6
+
 
 def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     """Return a read-only copy of ``values`` as float64.
@@ -41,3 +44,8 @@ def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
         ValueError: the values are no vector.
     """
     return frozen_array(values, (len(values),))
+
+
+def first_largest(sizes: FloatArray) -> NDArray[np.intp]:
+    """Return the index of the first of the largest sizes along the last axis, up to rounding."""
+    return np.asarray(np.argmax(sizes >= (1 - _TIE) * sizes.max(axis=-1, keepdims=True), axis=-1))

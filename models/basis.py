@@ -2,7 +2,9 @@
 
 Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
 characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
-then forces through the centre, then the others. Behind them are those by which the actuators drive the platform.
+then forces through the centre, then the others. Behind them are those by which the actuators drive the platform. Each
+of these spaces has a basis that follows from the space alone: another one would follow from rounding, and differ from
+one unit of length to another.
 """
 
 from __future__ import annotations
@@ -11,15 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import FloatArray
+from .actuation import RANK_TOLERANCE, Velocities, limb_drive
+from .arrays import FloatArray, first_largest
 from .model import Model
 from .wrench import WrenchKind
 
 #: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
 _ZERO = 1e-9
-#: Singular values of unit wrenches below this are zero, or below this part of the largest: a closed loop is known to
-#: the root of rounding at worst.
-_RANK = 1e-7
 
 
 class Basis(NamedTuple):
@@ -42,7 +42,7 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     works = driven @ actuation
     if works.size:
         # A wrench of actuation does positive work in the joint that it drives most.
-        most = np.take_along_axis(works, np.argmax(np.abs(works), axis=1)[:, None], axis=1)
+        most = np.take_along_axis(works, first_largest(np.abs(works))[:, None], axis=1)
         driven = driven * np.where(most < 0, -1.0, 1.0)
     constraints = space - (space @ driven.T) @ driven
     constraints = np.linalg.svd(constraints)[2][: dimension - len(driven)]
@@ -50,46 +50,43 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     forces, others = _split(rest, slice(3, None)) if space.shape[1] > 3 else (rest, rest[:0])
     if space.shape[1] == 3:
         couples, forces = constraints[:0], constraints
-    rows = np.vstack([couples, forces, others, driven])
+    rows = np.vstack([*(settled_basis(each) for each in (couples, forces, others)), driven])
     return Basis(rows, tuple(_kind(row) for row in rows))
 
 
-def reporting_matrix(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
+def reporting_matrix(model: Model, velocities: Velocities, centre: FloatArray) -> FloatArray:
     """Return the matrix (r, m) that turns the rows of a :class:`~.instance.RobotInstance` into those of results.
+
+    The rows of the robot's wrenches stay as they are; those of a member's projector become a basis.
 
     Args:
         model: the robot.
-        jacobian: (m, 6) rows of its wrenches, which stay as they are, then of its members' projectors.
-        actuators: (6, a) current screws of its actuators.
+        velocities: at a point.
+        centre: (3,) the platform's origin there, length.
     """
     count = len(model.wrenches)
-    matrix = np.zeros((len(model.rows), len(jacobian)))
+    matrix = np.zeros((len(model.rows), len(velocities.jacobian)))
     matrix[:count, :count] = np.eye(count)
     row, column = count, count
+    drives = {limb: limb_drive(model, velocities, centre, limb) for limb in {each.limb for each in model.members}}
     for member in model.members:
-        own = [k for k, each in enumerate(model.actuators) if each.limb == member.limb]
-        block, screws = jacobian[column : column + member.size], actuators[:, own]
-        basis = basis_of_member(block, block @ np.vstack([screws[3:], screws[:3]]), len(member.kinds)).rows
-        matrix[row : row + len(basis), column : column + member.size] = basis
-        row, column = row + len(basis), column + member.size
+        limb, own = drives[member.limb], slice(column, column + member.size)
+        works = limb.drive.works[[limb.rows.index(k) for k in range(own.start, own.stop)]]
+        basis = basis_of_member(velocities.jacobian[own], works, len(member.kinds)).rows
+        matrix[row : row + len(basis), own] = basis
+        row, column = row + len(basis), own.stop
     return matrix
 
 
-def constraint_rows(model: Model, jacobian: FloatArray, actuators: FloatArray) -> FloatArray:
+def constraint_rows(model: Model, velocities: Velocities, centre: FloatArray) -> FloatArray:
     """Return wrenches (k, 6) of all limbs that do no work in their actuated joints: constraints on a free robot.
 
-    Args:
-        model: the robot.
-        jacobian: (m, 6) rows of a :class:`~.instance.RobotInstance`.
-        actuators: (6, a) current screws of its actuators.
+    The arguments are those of :func:`reporting_matrix`.
     """
     found = [np.zeros((0, 6))]
     for limb in model.limbs:
-        own = jacobian[[k for k, row in enumerate(model.frame_rows) if row.limb == limb]]
-        screws = actuators[:, [k for k, each in enumerate(model.actuators) if each.limb == limb]]
-        left, values, _ = np.linalg.svd(own @ np.vstack([screws[3:], screws[:3]]))
-        driven = int(np.count_nonzero(values > _ZERO * float(np.abs(own).max(initial=0.0))))
-        found.append(left[:, driven:].T @ own)
+        rows, _, drive = limb_drive(model, velocities, centre, limb)
+        found.append(drive.constraints @ velocities.jacobian[rows])
     return np.vstack(found)
 
 
@@ -99,7 +96,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
         return 0
     scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
     values = np.linalg.svd(scaled, compute_uv=False)
-    return int(np.count_nonzero(values > _RANK * max(1.0, float(values[0]))))
+    return int(np.count_nonzero(values > RANK_TOLERANCE * max(1.0, float(values[0]))))
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
@@ -115,7 +112,21 @@ def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
 def _span(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the span of rows."""
     _, values, right = np.linalg.svd(rows)
-    return np.asarray(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+    return settled_basis(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
+
+
+def settled_basis(rows: FloatArray) -> FloatArray:
+    """Return the orthonormal basis (k, n) that follows from the space of orthonormal rows (k, n) alone.
+
+    Each vector is the coordinate axis nearest to the rest of the space, projected into it: the first of equally near
+    ones.
+    """
+    projector, found = rows.T @ rows, np.zeros(rows.shape)
+    for vector in found:
+        k = int(first_largest(np.diag(projector)[None])[0])
+        vector[:] = projector[k] / np.linalg.norm(projector[k])
+        projector = projector - np.outer(vector, vector)
+    return found
 
 
 def _kind(row: FloatArray) -> WrenchKind:

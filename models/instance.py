@@ -24,7 +24,7 @@ from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink, expressions_of
 from .member import Member, resisted_parts, scaled_twists
 from .model import Model
-from .parts import Closure, Unknown
+from .parts import Actuator, Closure, Unknown, rate_relations
 from .wrench import Wrench, WrenchKind
 
 #: A matrix or vector of symbols or of numbers.
@@ -104,7 +104,8 @@ class RobotInstance:
         inputs: (k, 1) all that these depend on: parameters, unknowns, rotation column after column, position,
             characteristic length, twists.
         loops: (k, 1) left sides of all loop equations, those beyond the closure included.
-        actuators: (6, a) current unit screw of each of the model's actuators.
+        driven: (m, a) work rate of each row for a unit rate of each of the model's actuators.
+        relations: (r, a) factors of the actuators' rates in the equations that loops demand of these alone.
         signs: (s, 1) numbers that are positive in home's assembly.
         distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
@@ -126,7 +127,8 @@ class RobotInstance:
     rows: tuple[Wrench, ...]
     inputs: SX
     loops: SX
-    actuators: SX
+    driven: SX
+    relations: SX
     signs: SX
     distances: SX
     joints: tuple[LimbJoint, ...]
@@ -152,15 +154,15 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
         ca.vertcat(SX(0, 1), *[equation.expression for equation in model.distances]),
         ca.vertcat(SX(0, 1), *[equation.size for equation in every]),
-        ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
         ca.vertcat(SX(0, 1), *[each.value for each in model.signs]),
         *[quantity.values for quantity in model.quantities],
         *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
         *[part for member in model.members for part in (member.centre, member.screws)],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
         *expressions_of((*model.joints, *model.links)),
     ]
     function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, distances, sizes, actuators, signs, *others = function.call(substitution.all)
+    force, moment, square, closure, loops, distances, sizes, signs, *others = function.call(substitution.all)
     sizes = sizes_at(model, every, substitution.reference, sizes)
     ends = closure.numel(), closure.numel() + loops.numel()
     following = iter(others)
@@ -171,6 +173,7 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         replace(member, centre=centre, screws=screws)
         for member, centre, screws in zip(model.members, parts[::2], parts[1::2], strict=True)
     ]
+    actuators = tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators)
     rows = [
         replace(row, force=force[:, i], moment=moment[:, i], square=square[i]) for i, row in enumerate(model.wrenches)
     ]
@@ -193,7 +196,8 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         inputs=ca.veccat(*substitution.all, length, *twists),
         loops=loops / sizes[ends[0] : ends[1], :],
         distances=distances / sizes[ends[1] :, :],
-        actuators=actuators,
+        driven=driven(rows, actuators, length, members),
+        relations=rate_relations(actuators),
         signs=signs,
         joints=tuple(each.replaced(following) for each in model.joints),
         links=tuple(each.replaced(following) for each in model.links),
@@ -236,6 +240,23 @@ def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Membe
     """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); couples times the length."""
     own = [_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows]
     return ca.vertcat(SX(0, 1), *own, *[_resistance(member, twist, length) for member in members])
+
+
+def driven(rows: Sequence[Wrench], actuators: Sequence[Actuator], length: SX, members: Sequence[Member] = ()) -> SX:
+    """Return the work rates (m, a) of the rows of :func:`jacobian` for a unit rate of each actuator."""
+    found = SX(len(rows) + sum(member.size for member in members), len(actuators))
+    for k, actuator in enumerate(actuators):
+        for i, row in enumerate(rows):
+            screw = actuator.screw_in(row.label.member)
+            if screw is not None:
+                found[i, k] = _scaled_rate(row, screw, length) / ca.sqrt(row.square)
+        at = len(rows)
+        for member in members:
+            screw = actuator.screw_in(member.label)
+            if screw is not None:
+                found[at : at + member.size, k] = _resistance(member, screw, length)
+            at += member.size
+    return found
 
 
 def objective(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
@@ -307,13 +328,6 @@ def homogenised(jacobian: Matrix, centre: Matrix, length: float) -> tuple[Matrix
     x, y, z = coordinates
     mx, my, mz = mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx)
     return fx, fy, fz, mx / length, my / length, mz / length
-
-
-def reason_for_zero_row(row: Wrench) -> str:
-    """Return the reason why a row has zero direction and so no unit wrench, as a clause for messages."""
-    if row.kind is WrenchKind.COUPLE:
-        return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
-    return f"limb {row.limb!r} has zero length: its two joints coincide"
 
 
 def _resistance(member: Member, twists: SX, length: SX) -> SX:

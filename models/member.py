@@ -11,6 +11,7 @@ member's wrenches, and no basis is needed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
@@ -61,6 +62,49 @@ class Member:
         return WrenchKind.FORCE if self.is_pinned else WrenchKind.WRENCH
 
 
+class _Powers(NamedTuple):
+    """The recursion of Faddeev and LeVerrier after as many steps as a matrix has ranks.
+
+    Attributes:
+        last, before: (m, m) its matrices after the last step, and before it.
+        coefficient: (1, 1) the last coefficient.
+        scale: (1, 1) of ``A A'``, which is divided by it.
+    """
+
+    last: SX
+    before: SX
+    coefficient: SX
+    scale: SX
+
+
+def _powers(matrix: SX, rank: int) -> _Powers:
+    """Return the recursion for ``A A'`` of a matrix (m, n) of a rank."""
+    gram = matrix @ matrix.T
+    scale = ca.trace(gram)  # a multiple of the identity's size keeps the coefficients of order 1
+    gram = gram / scale
+    size = gram.shape[0]
+    last, before, coefficient = SX.eye(size), SX.eye(size), SX(1)
+    for k in range(1, rank + 1):
+        before, product = last, gram @ last
+        coefficient = -ca.trace(product) / k
+        last = product + coefficient * SX.eye(size)
+    return _Powers(last, before, coefficient, scale)
+
+
+def pseudo_inverse(matrix: SX, rank: int) -> SX:
+    """Return the pseudo-inverse (n, m) of a matrix (m, n) whose rank does not change.
+
+    It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
+    Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
+    One step ``X (2 I - A X)`` of Newton's method squares its relative error.
+    """
+    if rank == 0:
+        return SX(matrix.shape[1], matrix.shape[0])
+    powers = _powers(matrix, rank)
+    found = -matrix.T @ powers.before / (powers.coefficient * powers.scale)
+    return 2 * found - found @ (matrix @ found)
+
+
 def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
     """Return twists in scaled coordinates about a centre, (size, n).
 
@@ -92,17 +136,10 @@ def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
         rank: of the columns.
         vectors: (size, k).
     """
-    size, n = columns.shape
+    n = columns.shape[1]
     if rank < n:
-        gram = columns @ columns.T
-        scale = ca.trace(gram)  # a multiple of the identity's size keeps the coefficients of order 1
-        gram = gram / scale
-        power, coefficient = SX.eye(size), SX(1)
-        for k in range(1, rank + 1):
-            product = gram @ power
-            coefficient = -ca.trace(product) / k
-            power = product + coefficient * SX.eye(size)
-        return power @ vectors / coefficient
+        powers = _powers(columns, rank)
+        return powers.last @ vectors / powers.coefficient
     orthogonal: list[tuple[SX, SX]] = []
     for k in range(n):
         column = columns[:, k]
@@ -115,4 +152,4 @@ def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
         for base, square in orthogonal:
             left = left - base * (ca.dot(base, left) / square)
         parts.append(left)
-    return ca.horzcat(SX(size, 0), *parts)
+    return ca.horzcat(SX(columns.shape[0], 0), *parts)

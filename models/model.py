@@ -187,7 +187,12 @@ def _check_shapes(model: Model) -> None:
             (f"member {index} screws", member.screws, (6, member.screws.shape[1])),
             *([] if member.slide is None else [(f"member {index} slide", member.slide, (3, 1))]),
         ]
-    expected += [(f"actuator {each.name}", each.screw, (6, 1)) for each in model.actuators]
+    for each in model.actuators:
+        relations = model.actuators[0].relations.shape[0]
+        expected += [
+            (f"actuator {each.name}", each.screws, (6, len(each.members))),
+            (f"relations of actuator {each.name}", each.relations, (relations, 1)),
+        ]
     expected += [(unknown.name, unknown.symbol, (1, 1)) for unknown in model.unknowns]
     expected += [(each.name, each.expression, (1, 1)) for each in (*model.closure, *model.loops)]
     expected += [(each.name, each.value, (1, 1)) for each in model.signs]
@@ -220,7 +225,7 @@ def _check_symbols(model: Model) -> None:
             for part in (member.centre, member.screws, member.slide)
             if part is not None
         ),
-        *(each.screw for each in model.actuators),
+        *(part for each in model.actuators for part in (each.screws, each.relations)),
         *(each.all for each in model.joint_screws),
         *(
             part

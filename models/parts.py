@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import casadi as ca
 from casadi import SX
 
 _AXES = ("x", "y", "z")
@@ -186,14 +188,29 @@ class Actuator:
     Attributes:
         name: unique within the model.
         limb: name of the limb that it is part of.
-        screw: (6, 1) its current unit screw as a twist, the world's origin as reference.
+        members: labels of the members that it moves.
+        screws: (6, k) the platform's twist for its unit rate, as each of these members demands it while the other
+            actuators stand still, up to the twists that the member allows; the world's origin is the reference.
         dimension: length for a slide or a parallelogram, angle for a rotation.
+        relations: (r, 1) its factors in the equations that loops demand of the actuators' rates alone: all actuators of
+            a robot have as many. There are none but where more actuators drive nested loops than these have freedoms.
     """
 
     name: str
     limb: str
-    screw: SX
+    members: tuple[str, ...]
+    screws: SX
     dimension: Dimension
+    relations: SX = field(default_factory=lambda: SX(0, 1))
+
+    def screw_in(self, member: str) -> SX | None:
+        """Return its screw (6, 1) as a member demands it, by the member's label; None where it does not move it."""
+        return self.screws[:, self.members.index(member)] if member in self.members else None
+
+
+def rate_relations(actuators: Sequence[Actuator]) -> SX:
+    """Return the factors (r, a) of the actuators' rates in the equations that loops demand of these alone."""
+    return ca.horzcat(*[each.relations for each in actuators]) if actuators else SX(0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +246,14 @@ class GenericRanks:
         jacobian: rank of all rows.
         constraints: rank of the wrenches that do no work in the actuated joints: the platform has six freedoms less
             this rank.
+        idle: dimension of the actuators' rates with which the platform does not move.
+        undetermined: names of the actuators that have such a rate.
     """
 
     jacobian: int
     constraints: int
+    idle: int = 0
+    undetermined: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

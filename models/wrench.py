@@ -88,3 +88,10 @@ def couple_about(limb: str, direction: SX) -> Wrench:
         direction: (3, 1) in world coordinates, of any length but zero.
     """
     return Wrench(limb, WrenchKind.COUPLE, SX.zeros(3), direction, ca.sumsqr(direction))
+
+
+def reason_for_zero_row(row: Wrench) -> str:
+    """Return the reason why a row has zero direction and so no unit wrench, as a clause for messages."""
+    if row.kind is WrenchKind.COUPLE:
+        return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
+    return f"limb {row.limb!r} has zero length: its two joints coincide"

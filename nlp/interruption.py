@@ -2,7 +2,8 @@
 
 A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
 requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
-Python's own ``KeyboardInterrupt``.
+Python's own ``KeyboardInterrupt``. In a search it ends the search, which returns the state that its last complete step
+left; the searches that follow in the same call (:func:`one_call`) end at once. Elsewhere it ends the call.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ import enum
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
 from threading import Event, Lock
 from types import FrameType
 
@@ -22,6 +26,8 @@ _TO_SHOW = 5.0
 _TO_WRITE = 0.5
 #: Ends the line of progress and shows the cursor, which that line hides.
 _CLEAR = "\r\x1b[K\x1b[?25h"
+#: Reason for which an interrupted search stops.
+STOPPED = "interrupted"
 
 
 class Milestone(enum.Enum):
@@ -30,13 +36,21 @@ class Milestone(enum.Enum):
     START = "a start of a search is done"
     BOUND = "the search of the whole box has begun"
     VALUE = "a value of a trade-off is solved"
+    POINT = "the ends of a front are found"
+    ROBOT = "a robot of a comparison is done"
+    CASE = "a case is checked"
 
 
 #: Held while a file is written, so that none is left half written.
 WRITING = Lock()
+#: Files that are being written under names that are not theirs, and names of those that are written.
+_unfinished: set[Path] = set()
+_written: list[str] = []
 _awaited: set[Milestone] = set()
 _answers = Event()
 _requested = Event()
+#: Set once a search of the present call was interrupted by Python.
+_call: ContextVar[Event | None] = ContextVar("call", default=None)
 #: Process that has something to say where it is ended, and the function that returns its sentence.
 _parting: list[tuple[int, Callable[[], str]]] = []
 
@@ -53,13 +67,82 @@ def reached(milestone: Milestone) -> None:
 
 
 def say_on_leaving(sentence: Callable[[], str]) -> None:
-    """Declare a function whose sentence is written where a request ends this process, but none that it starts."""
+    """Declare a function that says what is kept where a request ends this process, but none that it starts."""
     _parting[:] = [(os.getpid(), sentence)]
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[None]:
+    """Declare a file that is removed where a request ends the process in this block."""
+    _unfinished.add(path)
+    try:
+        yield
+    finally:
+        _unfinished.discard(path)
+
+
+def wrote(name: str) -> None:
+    """Declare that a file is written."""
+    _written.append(name)
+
+
+def kept() -> str:
+    """Return what is kept of the work that a request ended."""
+    for process, sentence in _parting:
+        if process == os.getpid():
+            return sentence()
+    return f"written: {', '.join(ascii(each)[1:-1] for each in _written)}" if _written else "no file is written"
 
 
 def is_requested() -> bool:
     """Return whether the work is requested to stop."""
-    return _requested.is_set()
+    call = _call.get()
+    return _requested.is_set() or (call is not None and call.is_set())
+
+
+@contextmanager
+def one_call() -> Iterator[None]:
+    """Let an interrupt that ends a search end all others of this block, or of the outermost one, at once too."""
+    if _call.get() is not None:
+        yield
+        return
+    token = _call.set(Event())
+    try:
+        yield
+    finally:
+        _call.reset(token)
+
+
+def reason_of(search: Callable[[], str]) -> str:
+    """Run a search; return its reason for stopping before its end, or that Python interrupted it.
+
+    Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
+    step too: a step changes what is claimed by one assignment, its last.
+    """
+    try:
+        return search()
+    except KeyboardInterrupt:
+        call = _call.get()
+        if call is not None:
+            call.set()
+        return STOPPED
+
+
+def reason_to_stop(
+    seconds: float,
+    time_limit: float | None,
+    interrupted: Callable[[], bool] = is_requested,
+    boxes: int = 0,
+    most_boxes: int | None = None,
+) -> str:
+    """Return the reason for stopping a search before its end; empty for none."""
+    if interrupted():
+        return STOPPED
+    if time_limit is not None and seconds >= time_limit:
+        return f"stopped after {seconds:.3g} s"
+    if most_boxes is not None and boxes >= most_boxes:
+        return f"stopped after {boxes:,} boxes"
+    return ""
 
 
 def listen() -> None:
@@ -79,13 +162,15 @@ def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
 
 
 def leave() -> None:
-    """End the process once a file that is being written is complete, with its sentence, or a newline, on stderr."""
+    """End the process once a file that is being written is complete, and say on stderr what is kept."""
     WRITING.acquire(timeout=_TO_WRITE)
     try:
         # Only a bar of progress hides the cursor.
         is_shown = "rich.progress" in sys.modules and os.isatty(2)
-        words = "".join(f"\n{sentence()}" for process, sentence in _parting if process == os.getpid())
-        os.write(2, f"{_CLEAR if is_shown else ''}{words}\n".encode())
+        os.write(2, f"{_CLEAR if is_shown else ''}\nscrewsynth: interrupted: {kept()}\n".encode())
     except OSError:  # nobody reads any more
         pass
+    for path in list(_unfinished):
+        with suppress(OSError):
+            path.unlink()
     os._exit(INTERRUPTED)

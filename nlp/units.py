@@ -69,20 +69,46 @@ class Units:
         return dimension is Dimension.ANGLE and self.angle == "deg"
 
 
-def rate_unit(twist: Iterable[float], units: Units) -> str:
-    """Return the unit of a limb's rate: length per radian or length of a unit screw, or else per unit of time.
+def rate_unit(twist: Iterable[float], units: Units, dimension: Dimension = Dimension.LENGTH) -> str:
+    """Return the unit of a rate: per radian or length of a unit screw, or else per unit of time.
 
     Args:
         twist: (6,) angular velocity, then velocity at the world origin.
         units: units of the case.
+        dimension: of the coordinate that has the rate: of a limb's wrench or a slide a length, of a hinge an angle,
+            whose rates are in radians.
     """
+    own = "rad" if dimension is Dimension.ANGLE else units.length
+    return own + _per_motion(twist, units)
+
+
+def slope_unit(label: str | None) -> str:
+    """Return the unit of a derivative of F by a number with a unit; a plain number has none."""
+    if not label:
+        return "F per 1"
+    return f"F/({label})" if "/" in label else f"F per {label}" if " " in label else f"F/{label}"
+
+
+def twist_units(twist: Iterable[float], units: Units) -> tuple[str, ...]:
+    """Return the units of a twist's six numbers: angular velocity, then velocity at the world origin.
+
+    Args:
+        twist: (6,) the numbers.
+        units: units of the case.
+    """
+    per = _per_motion(twist, units)
+    return (*[f"rad{per}"] * 3, *[f"{units.length}{per}"] * 3)
+
+
+def _per_motion(twist: Iterable[float], units: Units) -> str:
+    """Return the end of a unit that is per radian or length of a unit screw, or else per unit of time."""
     parts = [float(part) for part in twist]
     omega, v = math.hypot(*parts[:3]), math.hypot(*parts[3:])
     if abs(omega - 1) <= _UNIT:
-        return f"{units.length}/rad"
+        return "/rad"
     if omega == 0 and abs(v - 1) <= _UNIT:
-        return f"{units.length}/{units.length}"
-    return f"{units.length} per unit of time"
+        return f"/{units.length}"
+    return " per unit of time"
 
 
 def objective_unit(twists: Iterable[Iterable[float]], units: Units) -> str:

@@ -74,6 +74,10 @@ class Limb:
     centre: SX | None
     turn: FloatArray
 
+    def member(self, path: int) -> str:
+        """Return the name of a path, by its index: that of the limb, with a number where there are several."""
+        return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
+
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
         """Joints of each path from base to platform."""

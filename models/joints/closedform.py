@@ -75,12 +75,13 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
     """
     symbols = [item.symbol for item in model.unknowns]
+    depends = [_depends_on(equation.expression, symbols) for equation in model.closure] if symbols else []
     found: dict[int, Solved] = {}
     dropped: set[int] = set()
     reaches: list[Reach] = []
     for k, unknown in enumerate(model.unknowns):
         for e, equation in enumerate(model.closure):
-            if e in dropped or _depends_on(equation.expression, symbols) != [k]:
+            if e in dropped or depends[e] != [k]:
                 continue
             solved = _solved(model, unknown, equation, extended)
             if solved is not None:
@@ -202,7 +203,7 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
         *[each.expression for each in (*closure, *model.loops, *model.distances)],
-        *[each.screw for each in model.actuators],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
         *[each.value for each in model.signs],
         *[quantity.values for quantity in model.quantities],
         *[part for member in model.members for part in (member.centre, member.screws)],
@@ -221,7 +222,7 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
     # The order of the calls is that of the expressions.
     wrenches = tuple(row(each) for each in model.wrenches)
     kept, loops, distances = equations(closure), equations(model.loops), equations(model.distances)
-    actuators = tuple(replace(each, screw=next(following)) for each in model.actuators)
+    actuators = tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators)
     signs = tuple(replace(each, value=next(following)) for each in model.signs)
     quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
     members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)

@@ -9,33 +9,54 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from ..actuation import Velocities, limb_drive
 from ..basis import basis_of_member, constraint_rows, rank_of_rows
-from ..instance import Substitution, jacobian
+from ..instance import Substitution, driven, jacobian
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
-from ..parts import Actuator, Dimension, GenericRanks, Parameter, Quantity
-from .chain import HomeRobot
+from ..parts import Actuator, Dimension, GenericRanks, Parameter, Quantity, rate_relations
+from .chain import HomeRobot, Joint, Limb
 from .loops import ClosedPoint
 
 
 def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
-    """Return the largest ranks of a robot's rows and constraints over closed configurations."""
+    """Return the largest ranks of a robot's rows and constraints over closed configurations, and its idle actuators."""
     own = Substitution.identity(model)
     size = ca.Function("size", [robot.symbols], [robot.size])
     length = SX.sym("length")
-    screws = ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators])
     rows = jacobian(model.wrenches, length, model.members)
-    function = ca.Function("rows", [*own.all, length], [ca.densify(rows), ca.densify(screws)])
-    ranks = []
+    works = driven(model.wrenches, model.actuators, length, model.members)
+    outputs = [ca.densify(each) for each in (rows, works, rate_relations(model.actuators))]
+    function = ca.Function("rows", [*own.all, length], outputs)
+    ranks, idle = [], []
     for point in points:
         reach = float(size(point.dimensions))
         values = function(point.dimensions, point.unknowns, point.rotation, point.position, reach)
-        J, driven = (each.full() for each in values)
-        if np.isfinite(J).all():
-            constraints = constraint_rows(model, J, driven)
-            ranks.append([rank_of_rows(each, point.position, reach) for each in (J, constraints)])
+        velocities = Velocities(*[each.full() for each in values])
+        if all(np.isfinite(each).all() for each in velocities):
+            constraints = constraint_rows(model, velocities, point.position)
+            ranks.append([rank_of_rows(each, point.position, reach) for each in (velocities.jacobian, constraints)])
+            limbs = [limb_drive(model, velocities, point.position, limb) for limb in model.limbs]
+            known = {limb.actuators[k] for limb in limbs for k in np.flatnonzero(~limb.drive.is_undetermined)}
+            count = len(model.actuators) - sum(len(limb.actuators) - limb.drive.idle.shape[1] for limb in limbs)
+            names = tuple(each.name for k, each in enumerate(model.actuators) if k not in known)
+            idle.append((count, names))
     most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
-    return GenericRanks(int(most[0]), int(most[1]))
+    return GenericRanks(int(most[0]), int(most[1]), *min(idle, default=(0, ())))
+
+
+def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> str:
+    """Return the name of one of a limb's several actuators: its joint's, unless another limb or actuator has it.
+
+    Args:
+        robot: at home.
+        limb: the limb.
+        joint: the actuated joint.
+        number: of the actuator in the limb, from 1 on.
+    """
+    taken = {each.name for each in robot.limbs if each is not limb}
+    taken |= {each.name for each in robot.joints if each.actuated and each is not joint}
+    return joint.name if joint.name and joint.name not in taken else f"{limb.name}.{number}"
 
 
 def with_kinds(
@@ -51,7 +72,7 @@ def with_kinds(
         point: the configuration.
     """
     columns = scaled_twists(member.screws, member.centre, size, member.size)
-    driving = [each.screw for each in actuators if each.limb == member.limb]
+    driving = [screw for each in actuators if (screw := each.screw_in(member.label)) is not None]
     actuated = scaled_twists(ca.horzcat(SX(6, 0), *driving), member.centre, size, member.size)
     vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated))
     function = ca.Function("kinds", list(numbers), [ca.densify(vectors)])
@@ -81,4 +102,14 @@ def quantities(actuators: Sequence[Actuator], positions: Sequence[SX]) -> tuple[
             owners, values = zip(*own, strict=True)
             words = f"{dimension.value} by which an actuator is away from home"
             found.append(Quantity(name, owners, ca.vertcat(*values), dimension, words))
+    return tuple(found)
+
+
+def with_all_relations(actuators: Sequence[Actuator]) -> tuple[Actuator, ...]:
+    """Return actuators with factors in the relations of all limbs: 0 in those of other limbs than their own."""
+    counts = {each.limb: each.relations.shape[0] for each in actuators}
+    found = []
+    for each in actuators:
+        parts = [each.relations if limb == each.limb else SX.zeros(count) for limb, count in counts.items()]
+        found.append(replace(each, relations=ca.vertcat(*parts)))
     return tuple(found)

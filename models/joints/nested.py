@@ -22,7 +22,7 @@ from ..arrays import FloatArray
 from ..mechanism.centre import CentreRule, centre_rule
 from ..mechanism.members import robot_graph
 from ..mechanism.topology import spanning_tree
-from ..member import Member
+from ..member import Member, pseudo_inverse
 from .chain import HomeRobot
 from .generic import RANK_TOLERANCE
 from .loops import ClosedPoint
@@ -178,6 +178,18 @@ def _rank(values: FloatArray) -> int:
     return int(np.count_nonzero(values > RANK_TOLERANCE))
 
 
+class DrivenMotion(NamedTuple):
+    """Motion of a member for a unit rate of an actuator.
+
+    Attributes:
+        screw: (6, 1) twist of the platform, up to those that the member allows.
+        open_loops: (m, 1) what passive joints cannot close of all its loops; 0 where the actuator can move alone.
+    """
+
+    screw: SX
+    open_loops: SX
+
+
 @dataclass(frozen=True, eq=False)
 class NullSpace:
     """The null space of a member's loops, loop after loop: a loop with the rates that all before it leave free.
@@ -197,17 +209,19 @@ class NullSpace:
         """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
         return self.motions.platform @ self.projector
 
-    def driven_screw(self, screw: SX, loops: Sequence[SX]) -> SX:
-        """Return the twist (6, 1) of the platform for a unit rate of an actuated joint, up to those that are allowed.
+    def driven(self, screw: SX, loops: Sequence[SX]) -> DrivenMotion:
+        """Return the motion for a unit rate of an actuated joint, the other actuators at rest.
 
         Args:
             screw: (6, 1) of the joint in the platform's twist.
             loops: (m, 1) of the joint in each loop.
         """
         rates = SX(self.projector.shape[0], 1)
+        open_loops = [SX(0, 1)]
         for own, inverse, loop in zip(loops, self.inverses, self.motions.loops, strict=True):
             rates -= inverse @ (own + loop @ rates)
-        return screw + self.motions.platform @ rates
+            open_loops.append(own + loop @ rates)
+        return DrivenMotion(screw + self.motions.platform @ rates, ca.vertcat(*open_loops))
 
 
 def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
@@ -220,29 +234,6 @@ def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
         inverses.append(inverse)
         projector -= inverse @ left
     return NullSpace(projector, tuple(inverses), motions)
-
-
-def pseudo_inverse(matrix: SX, rank: int) -> SX:
-    """Return the pseudo-inverse (n, m) of a matrix (m, n) whose rank does not change.
-
-    It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
-    Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
-    One step ``X (2 I - A X)`` of Newton's method squares its relative error.
-    """
-    if rank == 0:
-        return SX(matrix.shape[1], matrix.shape[0])
-    gram = matrix @ matrix.T
-    scale = ca.trace(gram)  # keeps the coefficients of order 1
-    gram = gram / scale
-    size = gram.shape[0]
-    power, before, coefficient = SX.eye(size), SX.eye(size), SX(1)
-    for k in range(1, rank + 1):
-        before = power
-        product = gram @ power
-        coefficient = -ca.trace(product) / k
-        power = product + coefficient * SX.eye(size)
-    found = -matrix.T @ before / (coefficient * scale)
-    return 2 * found - found @ (matrix @ found)
 
 
 def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:

@@ -6,13 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from ..limbjoints import JointCoordinate, LimbJoint
 from ..member import Member
 from ..parts import Actuator, Closure, Dimension, JointScrews, PathStructure
+from ..rows import independent_rows
 from .angles import rotation_angle
 from .chain import HomeRobot, Joint
+from .generic import RANK_TOLERANCE
 from .loops import ClosedPoint
 from .motion import AxisKind
 from .nested import NestedMember, is_slide, measured_ranks, member_of, motions_of, nested_members, null_space
@@ -80,10 +83,10 @@ def nested_limb(
         variables: of the axes of joints.
         frame: values that all parts of the robot share.
     """
-    made: set[tuple[int, int]] = set()
+    made: set[tuple[Joint, int]] = set()
 
     def counted(joint: Joint, axis: int) -> SX:
-        made.add((id(joint), axis))
+        made.add((joint, axis))
         return variables(joint, axis)
 
     network = open_network(robot, joints, counted, frame)
@@ -103,42 +106,58 @@ def resisting(
         points: closed configurations.
     """
     network, found = limb.network, ResistingNetwork([], [], [], [], [])
-    screws: dict[int, SX] = {}
+    actuated = [k for k in network.joints if network.joint(k).actuated]
+    screws: dict[int, dict[str, SX]] = {k: {} for k in actuated}
+    rate_sizes = {k: robot.size if is_slide(network, k) else SX(1) for k in actuated}
+    open_loops = [SX(0, len(actuated))]
     members = nested_members(robot, network)
     for number, each in enumerate(members):
         label = _member_name(limb, number) if len(members) > 1 else ""
-        locked = motions_of(network, frame, each.joints, each.passive)
+        locked = motions_of(network, frame, each.joints, [k for k in each.joints if k not in actuated])
         ranks = measured_ranks(locked, symbols, points, robot.size)
         free = motions_of(network, frame, each.joints, each.joints)
         free_ranks = measured_ranks(free, symbols, points, robot.size)
         null = null_space(locked, ranks)
         allowed = null.screws
-        for k in each.joints:
-            if network.joint(k).actuated and k not in screws:
-                column = free.columns.index(k)
-                loops = [loop[:, column] for loop in free.loops]
-                screws[k] = _plain(network, k, null.driven_screw(free.platform[:, column], loops), robot)
+        open_columns = []
+        for k in actuated:
+            column = free.columns.index(k)
+            driven = null.driven(free.platform[:, column], [loop[:, column] for loop in free.loops])
+            open_columns.append(driven.open_loops)
+            if not ca.sparsify(driven.screw).is_zero():
+                screws[k][label or limb.name] = driven.screw / rate_sizes[k]
+        open_loops.append(ca.horzcat(*open_columns))
         if ranks.twists < 6:
             found.members.append(replace(member_of(limb.name, network, each, allowed, ranks.twists), name=label))
         labels = [f"{limb.name}:{network.graph.joints[k].name}" for k in (*locked.columns, *free.columns)]
         columns = ca.horzcat(allowed, null_space(free, free_ranks).screws)
-        driven = tuple(range(allowed.shape[1], columns.shape[1]))
-        own = JointScrews(limb.name, tuple(labels), columns, driven, ranks.twists, free_ranks.twists, is_nested=True)
+        indices = tuple(range(allowed.shape[1], columns.shape[1]))
+        own = JointScrews(limb.name, tuple(labels), columns, indices, ranks.twists, free_ranks.twists, is_nested=True)
         found.screws.append(own)
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
-    actuated = [k for k in network.joints if network.joint(k).actuated and k in screws]
-    for k in actuated:
-        name = network.graph.joints[k].name if len(actuated) > 1 else limb.name
+    relations = _relations(ca.vertcat(*open_loops), symbols, points)
+    for column, k in enumerate(actuated):
+        name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
         dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
-        found.actuators.append(Actuator(name, limb.name, screws[k], dimension))
+        twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
+        found.actuators.append(Actuator(name, limb.name, tuple(screws[k]), twists, dimension, factors))
         found.positions.append(axis.way(network.values[k, 0]))
     return found
 
 
-def _plain(network: OpenNetwork, k: int, screw: SX, robot: HomeRobot) -> SX:
-    """Return a twist for a unit rate of a joint from that for a rate of order 1: of a slide, the robot's size."""
-    return screw / robot.size if is_slide(network, k) else screw
+def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoint]) -> SX:
+    """Return independent rows (r, a) of what passive joints cannot close of loops for actuators' rates of order 1.
+
+    Rows that are zero at almost all configurations say nothing, and are left out.
+    """
+    function = ca.Function("relations", list(symbols), [ca.densify(open_loops)])
+    values = [function(each.dimensions, each.unknowns, each.rotation, each.position).full() for each in points]
+    values = [np.where(np.abs(each) > RANK_TOLERANCE, each, 0.0) for each in values]
+    known = [each for each in values if np.isfinite(each).all() and each.any()]
+    if 2 * len(known) <= len(points):
+        return SX(0, open_loops.shape[1])
+    return open_loops[list(independent_rows(known)), :]
 
 
 def _member_name(limb: NestedLimb, number: int) -> str:

@@ -34,7 +34,7 @@ from .generic import sampled_dimensions
 from .graphwords import read_robot
 from .linkgraph import home_of
 from .loops import PoseOf, examine_loops
-from .modelparts import generic_ranks, parameters, quantities, with_kinds
+from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_all_relations, with_kinds
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
@@ -150,8 +150,8 @@ class _Builder:
         if len(limb.branches) > 1 and passive:
             fault = "is passive and before the branches of its limb; only actuated joints may stand there"
             raise RobotError(passive[0].place, fault)
-        known: dict[tuple[int, int], SX] = {}
-        driven: dict[int, tuple[Joint, OpenedPath, int]] = {}
+        known: dict[tuple[Joint, int], SX] = {}
+        driven: dict[int, list[tuple[Joint, OpenedPath, int, str]]] = {}
         labels: dict[int, str] = {}
         count, opened = len(self.unknowns), []
         for index, joints in enumerate(limb.paths):
@@ -172,22 +172,24 @@ class _Builder:
             self.links.append((path, limb_links(path, labels, self.frame)))
             for j, joint in enumerate(path.joints):
                 if joint.actuated:
-                    driven.setdefault(id(joint), (joint, path, j))
-        if driven and limb.name not in self.carrying:
+                    driven.setdefault(id(joint), []).append((joint, path, j, limb.member(index)))
+        carrying = {row.label.member for row in self.wrenches} | {member.label for member in self.members}
+        if any(carrying.isdisjoint(member for *_, member in each) for each in driven.values()):
             fault = (
                 "has an actuated joint that drives nothing, because its passive joints alone leave the platform free; "
                 "remove actuated = true or a passive joint"
             )
             raise RobotError(limb.place, fault)
         self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
-        several = len(driven) > 1
-        for k, (joint, path, j) in enumerate(driven.values()):
-            name = f"{limb.name}.{k + 1}" if several else limb.name
+        for k, places in enumerate(driven.values()):
+            joint, path, j, _ = places[0]
+            name = actuator_name(self.robot, limb, joint, k + 1) if len(driven) > 1 else limb.name
+            members = tuple(member for *_, member in places)
             (axis,) = joint.axes
-            is_angle = axis.kind is AxisKind.ROTATION
-            dimension = Dimension.ANGLE if is_angle else Dimension.LENGTH
-            self.actuators.append(Actuator(name, limb.name, path.screws[j][0], dimension))
-            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[id(joint), 0])
+            dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
+            screws = ca.repmat(path.screws[j][0], 1, len(members))
+            self.actuators.append(Actuator(name, limb.name, members, screws, dimension))
+            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
 
     @property
@@ -220,8 +222,7 @@ class _Builder:
         before = sum(row.limb == limb.name for row in self.wrenches)
         row = before if len(limb.branches) > 1 and len(rows) == 1 else None
         self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
-        several = len(limb.branches) > 1
-        name = f"{limb.name}.{index + 1}" if several else limb.name
+        several, name = len(limb.branches) > 1, limb.member(index)
         self.wrenches += [replace(each, member=name) for each in rows] if several else rows
         self.members += [] if member is None else [replace(member, name=name if several else "")]
         self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
@@ -234,11 +235,11 @@ class _Builder:
         self.screws += [] if screws is None else [screws]
         return path
 
-    def _variables(self, limb: str, known: dict[tuple[int, int], SX]) -> Variables:
+    def _variables(self, limb: str, known: dict[tuple[Joint, int], SX]) -> Variables:
         """Return the function that gives the variable of a joint's axis, as a new unknown at its first use."""
 
         def variable(joint: Joint, axis: int) -> SX:
-            key = id(joint), axis
+            key = joint, axis
             if key not in known:
                 name = f"q{limb}_{len(known) + 1}"
                 symbol = SX.sym(name)
@@ -308,9 +309,8 @@ def model_of_home(
         builder.screws += found.screws
         builder.structure += found.structure
     _check_carrying(builder)
-    members = [
-        with_kinds(member, builder.actuators, at_home.size, numbers, loops.points[0]) for member in builder.members
-    ]
+    actuators = with_all_relations(builder.actuators)
+    members = [with_kinds(member, actuators, at_home.size, numbers, loops.points[0]) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
     drawings = [network_drawing(e.name, e.network, carries=e.name in builder.carrying) for e in builder.networks]
@@ -331,7 +331,7 @@ def model_of_home(
         loops=tuple(everything),
         signs=tuple(builder.signs),
         distances=tuple(builder.distances),
-        actuators=tuple(builder.actuators),
+        actuators=actuators,
         joint_screws=tuple(builder.screws),
         structure=with_kept(builder.structure, independent),
         joints=tuple(builder.joints),

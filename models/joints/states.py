@@ -18,7 +18,7 @@ from ..arrays import FloatArray
 from ..limbjoints import JointCone, JointCoordinate, LimbJoint
 from ..parts import Dimension
 from .angles import Angle, angle_about, rotation_angle, two_angles
-from .chain import Limb
+from .chain import Joint, Limb
 from .generic import INCIDENT
 from .motion import AxisKind, JointAxis, Motion
 from .opened import OpenedPath, PathFrame, slide_length
@@ -49,7 +49,7 @@ class PathJoints:
         frame: values that all paths of the robot share.
     """
 
-    def __init__(self, limb: Limb, path: OpenedPath, known: Mapping[tuple[int, int], SX], frame: PathFrame) -> None:
+    def __init__(self, limb: Limb, path: OpenedPath, known: Mapping[tuple[Joint, int], SX], frame: PathFrame) -> None:
         self._limb, self._path, self._known, self._frame = limb, path, known, frame
 
     def states(self, labels: Mapping[int, str]) -> list[LimbJoint]:
@@ -86,8 +86,8 @@ class PathJoints:
             return _Coordinates([] if way is None else [JointCoordinate("", Dimension.LENGTH, way)])
         if joint.type == "S" and not joint.parts:
             return _Coordinates([])
-        if joint.type != "S" and (id(joint), 0) in self._known:
-            values = [self._known[id(joint), a] for a in range(len(joint.axes))]
+        if joint.type != "S" and (joint, 0) in self._known:
+            values = [self._known[joint, a] for a in range(len(joint.axes))]
             return _Coordinates([_coordinate(axis, value) for axis, value in zip(joint.axes, values, strict=True)])
         if path.cut.far is not None and j in (path.cut.joint, path.cut.far):
             return self._at_rod(j)

@@ -88,7 +88,7 @@ def decompose(
     networks: list[Network] = []
     used: set[int] = set()
     for own in _parts(ends, moving, (root, top), couplings):
-        kept = _without_dangling(ends, own, (root, top), coupled)
+        kept = without_dangling(ends, own, (root, top), coupled)
         nodes = {node for k in kept for node in ends[k]}
         if not {root, top} <= nodes:
             continue
@@ -128,7 +128,7 @@ def _parts(
     return list(groups.values())
 
 
-def _without_dangling(
+def without_dangling(
     ends: Sequence[tuple[str, str]], own: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
 ) -> list[int]:
     """Return joints without those of links that hang on one joint alone, again and again."""
@@ -174,6 +174,8 @@ def _limb(
         return LimbPaths((), (tuple(stem),))
     branches = []
     for k in following:
+        if k not in left:  # the branch before has come back to the node by it
+            return "its links form a loop of their own"
         left.remove(k)
         branch = [Step(k, ends[k][0] == node)]
         end, _ = walk(ends[k][1] if ends[k][0] == node else ends[k][0], branch)

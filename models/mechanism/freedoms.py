@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
-from .graph import Mechanism
+from .graph import Mechanism, MechanismJoint
 from .motions import WIDTHS, joint_screws, size_of
 from .topology import spanning_tree
 
@@ -121,6 +121,10 @@ class Freedoms:
                 row[0, place[k]] = factor
             rows.append(row / np.abs(row).max())
         return np.vstack(rows)
+
+    def angle(self, joint: MechanismJoint) -> float:
+        """Return the length by which a joint's rate becomes a velocity: the size for an angle, 1 for a slide."""
+        return 1.0 if joint.kind == "P" else self.size
 
     def _unit_screws(self, k: int) -> FloatArray:
         """Return the screws of a joint for rates of order 1."""

@@ -16,9 +16,9 @@ from .checks import check_mechanism
 from .decomposition import GraphJoint, LimbPaths, Network, Step, decompose
 from .graph import Mechanism, MechanismError, MechanismJoint
 
-#: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: what
-#: rounding leaves of a description with six or more decimals.
-_SAME = 1e-6
+#: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: only
+#: rounding is less, as a robot file states an exact one.
+_SAME = 1e-9
 #: Letters that names of a robot file may not have.
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]")
 

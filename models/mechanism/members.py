@@ -2,7 +2,8 @@
 
 Lock all actuators. Links that a locked joint, a weld, or a joint that couplings hold still joins become one. Without
 base and platform, each connected part of the rest is a member; so is a joint directly between base and platform. Joints
-that a coupling relates belong to one member. A *limb* is the same with free actuators.
+that a coupling relates belong to one member. A *limb* is the same with free actuators. Links that hang on one joint are
+left out.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from .decomposition import without_dangling
 from .graph import Mechanism
 from .topology import Classes, parts
 
@@ -62,6 +64,9 @@ def robot_graph(mechanism: Mechanism) -> RobotGraph:
         if joint.kind == "weld":
             welded.merge(joint.inner, joint.outer)
             locked.merge(joint.inner, joint.outer)
+    roots = welded.find(mechanism.base), welded.find(mechanism.platform)
+    ends = [(welded.find(joint.inner), welded.find(joint.outer)) for joint in joints]
+    moving = without_dangling(ends, moving, roots, {k for coupling in couplings for k in coupling})
     still = _still(mechanism, couplings)
     for k in still:
         locked.merge(joints[k].inner, joints[k].outer)

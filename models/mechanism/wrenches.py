@@ -13,17 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..actuation import drive_of
 from ..arrays import FloatArray
 from ..basis import basis_of_member
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
 from .checks import check_mechanism
-from .freedoms import RANK_TOLERANCE, AllowedTwists, Freedoms, rank_of
+from .freedoms import RANK_TOLERANCE, Freedoms, rank_of
 from .graph import Mechanism
 from .members import MemberGraph, robot_graph
-
-#: A row of actuation below this part of the largest one's size is zero: the actuator cannot drive the platform.
-_DEPENDENT = 1e-7
 
 
 def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> FloatArray:
@@ -42,6 +40,7 @@ class MemberWrenches:
         centre: (3,) in the world frame, length.
         projector: (6, 6) ``P_k`` in scaled coordinates about the centre.
         actuation: (6, a) ``rho``: resisted part of the screw of each actuator, in the same coordinates.
+        relations: (r, a) equations that its loops demand of the rates of these actuators alone.
         rows: (d, 6) orthonormal basis of its wrenches as rows of ``J``: a twist's work rate is ``row . (v, w)``. Those
             that do no work in its actuators are first.
         kinds: kind of each row.
@@ -56,6 +55,7 @@ class MemberWrenches:
     centre: FloatArray
     projector: FloatArray
     actuation: FloatArray
+    relations: FloatArray
     rows: FloatArray
     kinds: tuple[WrenchKind, ...]
     twists: FloatArray
@@ -111,14 +111,19 @@ class RobotWrenches:
     Attributes:
         members: its members.
         ranks: its ranks.
-        actuators: names of all actuated joints.
+        units: rates of all actuated joints by name that move the platform with velocities of order 1.
         feasible: (6, f) basis of the platform's twists with free actuators.
     """
 
     members: tuple[MemberWrenches, ...]
     ranks: RobotRanks
-    actuators: tuple[str, ...]
+    units: Mapping[str, float]
     feasible: FloatArray
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of all actuated joints."""
+        return tuple(self.units)
 
     @property
     def jacobian(self) -> FloatArray:
@@ -133,24 +138,25 @@ class RobotWrenches:
     def rates(self, twist: Sequence[float] | FloatArray) -> Mapping[str, float]:
         """Return the rates of the actuators that leave least of what each limb resists in a twist (6,).
 
-        They are infinite where an actuator cannot drive the platform. For a twist that the platform can make with free
-        actuators nothing is left.
+        They are infinite where an actuator cannot drive the platform, and not a number where the twist does not
+        determine them. For a twist that the platform can make with free actuators nothing is left.
         """
         chi = np.asarray(twist, dtype=np.float64)
-        found = dict.fromkeys(self.actuators, float("inf"))
+        found = dict.fromkeys(self.units, float("inf"))
         for limb in {member.limb for member in self.members}:
             own = [member for member in self.members if member.limb == limb]
             names = list(dict.fromkeys(name for member in own for name in member.actuators))
-            driven = np.zeros((6 * len(own), len(names)))
-            for number, member in enumerate(own):
-                for k, name in enumerate(member.actuators):
-                    driven[6 * number : 6 * number + 6, names.index(name)] = member.actuation[:, k]
-            sizes = np.linalg.norm(driven, axis=0)
-            kept = np.flatnonzero(sizes > _DEPENDENT * sizes.max(initial=0.0))
-            resisted = np.concatenate([member.resisted(chi) for member in own])
-            if kept.size:
-                values = np.linalg.lstsq(driven[:, kept], resisted, rcond=_DEPENDENT)[0]
-                found |= {names[k]: float(value) for k, value in zip(kept, values, strict=True)}
+            driven, relations = [np.zeros((0, len(names)))], [np.zeros((0, len(names)))]
+            for member in own:
+                columns = [names.index(name) for name in member.actuators]
+                for part, rows in ((driven, member.actuation), (relations, member.relations)):
+                    part.append(np.zeros((len(rows), len(names))))
+                    part[-1][:, columns] = rows
+            drive = drive_of(
+                np.vstack(driven), np.vstack(relations), np.array([self.units[name] for name in names]), 1.0
+            )
+            values = drive.rates(np.concatenate([member.resisted(chi) for member in own]))
+            found |= {name: float(value) for name, value in zip(names, values, strict=True)}
         return found
 
 
@@ -181,8 +187,8 @@ def wrenches_of(mechanism: Mechanism, length: float = 1.0) -> RobotWrenches:
         jacobian=rank_of(np.linalg.svd(np.vstack(rows), compute_uv=False), 1.0),
         constraints=rank,
     )
-    names = tuple(joint.name for joint in mechanism.joints if joint.actuated)
-    return RobotWrenches(members, ranks, names, freedoms.unscaled(right[rank:].T))
+    units = {each.name: 1 / freedoms.angle(each) for each in mechanism.joints if each.actuated}
+    return RobotWrenches(members, ranks, units, freedoms.unscaled(right[rank:].T))
 
 
 def _reciprocal(freedoms: Freedoms, twists: FloatArray) -> FloatArray:
@@ -201,7 +207,15 @@ def _member(mechanism: Mechanism, freedoms: Freedoms, graph: MemberGraph, length
     basis = left[:, locked.twists.shape[1] :]
     projector = basis @ basis.T
     driven = [k for k in graph.joints if mechanism.joints[k].actuated]
-    actuation = _actuation(projector, free, driven, centre, length)
+    own = np.array([free.columns.index(k) for k in driven], dtype=np.intp)
+    weights = np.array([freedoms.angle(mechanism.joints[k]) / freedoms.size for k in driven])
+    # In every motion with free actuators the resisted part is rho times the rates of the actuators, since a motion
+    # without such rates is not resisted. Rates that no motion has are those in which the relations do work.
+    rates = free.rates[own] * weights[:, None]
+    actuation = projector @ scaled_twists(free.platform, centre, length) @ np.linalg.pinv(rates, rcond=RANK_TOLERANCE)
+    left, values, _ = np.linalg.svd(rates)
+    relations = left[:, rank_of(values, 1.0) :].T * weights
+    actuation = actuation * weights
     # Rows of actuation that are rounding errors of a serial singularity must not count as directions.
     kept = np.linalg.norm(actuation, axis=0) > RANK_TOLERANCE * max(length, freedoms.size)
     found = basis_of_member(projector, actuation[:, kept], basis.shape[1])
@@ -214,24 +228,10 @@ def _member(mechanism: Mechanism, freedoms: Freedoms, graph: MemberGraph, length
         centre=centre,
         projector=projector,
         actuation=actuation,
+        relations=relations,
         rows=rows,
         kinds=found.kinds,
         twists=locked.twists,
         all_rank=free.twists.shape[1],
         length=length,
     )
-
-
-def _actuation(
-    projector: FloatArray, free: AllowedTwists, driven: Sequence[int], centre: FloatArray, length: float
-) -> FloatArray:
-    """Return ``rho`` (6, a): the resisted part of the platform's twist for a unit rate of each actuator.
-
-    In every motion of the member with free actuators the resisted part is ``rho`` times the rates of the actuators,
-    since a motion without such rates is not resisted.
-    """
-    own = np.array([free.columns.index(k) for k in driven], dtype=np.intp)
-    if not own.size or not free.rates.size:
-        return np.zeros((6, len(driven)))
-    resisted = projector @ scaled_twists(free.platform, centre, length)
-    return np.asarray(resisted @ np.linalg.pinv(free.rates[own], rcond=_DEPENDENT))

@@ -20,7 +20,7 @@ from ...models import FloatArray, frozen_array
 from ..case.task import Sense
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
-from ..interruption import Milestone, is_requested, reached
+from ..interruption import Milestone, reached, reason_of, reason_to_stop
 from ..program.nlp import Nlp
 from .boxes.boxsearch import BoxSearch
 from .boxes.engines import engine_for, engine_name
@@ -96,8 +96,9 @@ def certify_program(
         search.incumbent.start(x, claimed)
     except IncumbentError as error:
         return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    reason, search.first_value = "", incumbent.value
-    try:
+    search.first_value = incumbent.value
+
+    def run() -> str:
         reason = search.run(time_limit, progress)
         while not reason and search.is_short():
             search.method.close()
@@ -105,8 +106,10 @@ def certify_program(
                 recorder.clear()
             search.restart(_method(form, incumbent, engine, jobs, recorder))
             reason = search.run(time_limit, progress)
-    except KeyboardInterrupt:
-        reason = "interrupted"
+        return reason
+
+    try:
+        reason = reason_of(run)
     finally:
         search.method.close()
     return search.certificate(reason)
@@ -264,13 +267,12 @@ class _Search:
         reported = -math.inf
         reached(Milestone.BOUND)
         while self.method.is_open:
-            if is_requested():
-                return "interrupted"
             if self._has_counterexample():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began
-            if time_limit is not None and seconds >= time_limit:
-                return f"stopped after {seconds:.3g} s"
+            reason = reason_to_stop(seconds, time_limit)
+            if reason:
+                return reason
             if seconds - reported >= _REPORT_EVERY:
                 reported = seconds
                 self._report(seconds, progress)
@@ -303,15 +305,13 @@ class _Search:
                 for variable, value in zip(nlp.program.variables, self.incumbent.program_point(), strict=True)
             )
             reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
-        elif left:
+        elif left or reason:
             status = CertificateStatus.INCOMPLETE
         elif not known and self.method.bound == -math.inf:
             status = CertificateStatus.INFEASIBLE
         else:
             status = CertificateStatus.PROVED if self._is_met() else CertificateStatus.INCOMPLETE
-            reason = (
-                reason if self._is_met() else reason or "the bounds of the limbs do not add up to the one asked for"
-            )
+            reason = "" if self._is_met() else "the bounds of the limbs do not add up to the one asked for"
         allowed, is_relative = self._allowed_gap()
         own = self.incumbent.x
         in_other_mode = not nlp.in_home_mode and own is not None and is_in_home_mode(nlp, own) is False

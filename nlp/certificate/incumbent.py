@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,6 +40,13 @@ class PointKeeper(Protocol):
         """Correct a point (n,) towards an optimum, and keep the result if it is better."""
 
 
+class _Point(NamedTuple):
+    """A point (n,) and its value; None and -inf without one."""
+
+    x: FloatArray | None
+    value: float
+
+
 class Incumbent:
     """The best feasible point known, and its value in the standard form.
 
@@ -47,17 +54,24 @@ class Incumbent:
         form: the form whose box is searched.
 
     Attributes:
-        x: (n,) the point in the form's variables; None without one.
-        value: of the form there; -inf without a point.
         size: number n of the form's variables.
     """
 
     def __init__(self, form: StandardForm) -> None:
         self._form = form
-        self.x: FloatArray | None = None
-        self.value = -math.inf
+        self._best = _Point(None, -math.inf)
         self.size = form.n
         self._given = math.nan
+
+    @property
+    def x(self) -> FloatArray | None:
+        """(n,) the point in the form's variables; None without one."""
+        return self._best.x
+
+    @property
+    def value(self) -> float:
+        """Value of the form there; -inf without a point."""
+        return self._best.value
 
     @property
     def was_beaten(self) -> bool:
@@ -90,7 +104,7 @@ class Incumbent:
             raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
         if claimed is not None and form.sign * claimed > value + _SAME_VALUE * nlp.objective_size:
             raise IncumbentError(f"the incumbent is said to have F = {claimed:.10g}, but has {form.sign * value:.10g}")
-        self.x, self.value, self._given = point, value, value
+        self._best, self._given = _Point(point, value), value
 
     def consider(self, point: FloatArray) -> None:
         """Keep a point (n,) if it is feasible and better; likewise the points that Newton's method reaches from it."""
@@ -133,4 +147,4 @@ class Incumbent:
     def _keep_if_better(self, point: FloatArray) -> None:
         value = self._form.value_at(point)
         if value > self.value and self._violation(point, value) <= FEASIBLE:
-            self.x, self.value = np.array(point), value
+            self._best = _Point(np.array(point), value)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .numbers import Number, WholeNumber
-from .options import CaseName, Jobs, JsonFile, SettingTexts, console, read_settings, write_json
+from .options import AllAssemblies, CaseName, Jobs, JsonFile, SettingTexts, console, read_settings, write_json
 
 
 def certify(
@@ -34,10 +34,7 @@ def certify(
             help="Starting points for the incumbent instead of the case's.",
         ),
     ] = None,
-    all_assemblies: Annotated[
-        bool,
-        typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
-    ] = False,
+    all_assemblies: AllAssemblies = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
 ) -> None:
@@ -53,6 +50,7 @@ def certify(
     from .progress import certify_with_progress
 
     try:
+        answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
         if proof == "-" and json_file == "-":

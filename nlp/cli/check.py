@@ -20,6 +20,7 @@ def check(
     """Hold cases to their expected and published values."""
     from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
+    from ..interruption import Milestone, answer_after, is_requested
     from ..output.checks import checks_as_junit, checks_as_markdown
     from ..output.files import check_outputs, write_text
     from ..results.checks import checks_of
@@ -29,7 +30,10 @@ def check(
         raise InputError("standard output can take one of --json -, --junit - and --markdown only")
     inputs = {path: words for each in cases or shipped_cases() for path, words in case_inputs(each).items()}
     check_outputs(inputs, {"--json": json_file, "--junit": junit})
+    answer_after(Milestone.CASE)
     checks = check_cases(cases)
+    if is_requested():
+        typer.echo(f"interrupted: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
     if json_file is not None:
         write_json(json_file, checks_of(checks))
     if junit is not None:

@@ -66,6 +66,7 @@ def compare(
     from ..comparison.compare import compare as compare_robots
     from ..comparison.robots import read_robots
     from ..errors import InputError
+    from ..interruption import Milestone, answer_after, is_requested
     from ..output.files import check_outputs
 
     if [json_file, csv_file, html].count("-") > 1:
@@ -87,6 +88,7 @@ def compare(
         sys.stderr.write(f"{CLEAR_LINE}{done} of {total} robots done: {label}")
         sys.stderr.flush()
 
+    answer_after(Milestone.ROBOT)
     try:
         found = compare_robots(
             read.case,
@@ -104,6 +106,9 @@ def compare(
     finally:
         if show_progress:
             sys.stderr.write(CLEAR_LINE)
+    if is_requested():
+        begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
+        typer.echo(f"interrupted: {begun}", err=True)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
     raise typer.Exit(0 if found.ranked and is_proved else 1)

@@ -50,10 +50,9 @@ def export(
     if of is not None:
         import numpy as np
 
-        from ..results.reading import load_result
-        from ..results.settings import robot_of, settings_of
+        from ..results.settings import load_answer, robot_of, settings_of
 
-        robot = robot_of(load_result(of), of, loaded)
+        robot = robot_of(load_answer(of), f"--of {of}", loaded)
         jacobian = np.array(robot.jacobian)
         loaded, _, inputs = read_case(case, {**fixings, **settings_of(robot, loaded)})
     loaded = replace(loaded, search=loaded.search.but(starts, seed))

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from .numbers import Number
 from .options import console
 
 
@@ -39,6 +40,17 @@ def import_(
     ] = None,
     out: Annotated[str | None, typer.Option(metavar="FILE", help="Robot file to write; - is stdout.")] = None,
     close: Annotated[bool, typer.Option("--close", help="Close open loops by Newton's method.")] = False,
+    keyframe: Annotated[
+        str, typer.Option(metavar="NAME", help="Configuration of an MJCF file: one of its keyframes.")
+    ] = "",
+    snap: Annotated[
+        float,
+        typer.Option(
+            parser=Number("--snap"),
+            metavar="LENGTH",
+            help="Move axes by up to this, so that they meet or are parallel.",
+        ),
+    ] = 0.0,
     loops: Annotated[
         str | None, typer.Option(metavar="YAML", help="Loops of a URDF, instead of the .yaml file beside it.")
     ] = None,
@@ -72,7 +84,9 @@ def import_(
     if out is not None:
         check_origin(out, BEGINNING, force=force)
     ends = Ends(platform, base, tuple(actuated or ()))
-    found = import_robot(Request(Path(file), ends, close, None if loops is None else Path(loops)))
+    if not 0 <= snap < float("inf"):
+        raise InputError(f"--snap {snap:g}: must be finite and not negative")
+    found = import_robot(Request(Path(file), ends, close, None if loops is None else Path(loops), keyframe, snap))
     lines = list(summary_lines(found))
     offers = offers_of(found.tables, found.size) if suggest or free else None
     if suggest and offers is not None:

@@ -12,7 +12,7 @@ import sys
 from threading import Thread, stack_size
 from typing import TYPE_CHECKING
 
-from ..interruption import INTERRUPTED, is_requested, listen
+from ..interruption import INTERRUPTED, is_requested, kept, listen
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,7 +83,10 @@ def run() -> int:
         status = 2
     finally:
         gc.set_threshold(*thresholds)
-    return INTERRUPTED if is_requested() else status
+    if not is_requested() and status != INTERRUPTED:
+        return status
+    _say(f"interrupted: the result is what was known by then; {kept()}" if is_requested() else f"interrupted: {kept()}")
+    return INTERRUPTED
 
 
 def _status_of(app: Callable[[], object]) -> int:

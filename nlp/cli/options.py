@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import WholeNumber
+from .numbers import Number, WholeNumber
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -48,6 +48,23 @@ Seed = Annotated[
 Jobs = Annotated[
     int | None,
     typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; the result does not depend on it."),
+]
+AllAssemblies = Annotated[
+    bool,
+    typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
+]
+LegError = Annotated[
+    float,
+    typer.Option(
+        "--leg-error",
+        parser=Number("--leg-error"),
+        metavar="LENGTH",
+        help="Largest error of a leg's length: bounds the errors of the pose.",
+    ),
+]
+ResultFile = Annotated[
+    str | None,
+    typer.Option("--of", metavar="RESULT", help="Take the dimensions from a result that solve --json wrote."),
 ]
 SettingTexts = Annotated[
     list[str] | None,

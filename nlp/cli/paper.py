@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import typer
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.pose import Value
     from ..workspace.judge import Judgement
     from ..workspace.paper.check import CheckedClaim
     from ..workspace.paper.document import PaperProof, Unproved
@@ -63,38 +64,71 @@ def write_paper(
     _echo_unproved(proof.unproved, err=True)
 
 
-def verify_paper(proof: PaperProof, case: Case) -> None:
+def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
     """Check the proof of a workspace and say what it proves.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ...models import Dimension
     from ..certificate.paper.proof import ProofError
+    from ..certificate.paper.statement import exact
     from ..errors import one_line
     from ..workspace.paper.check import check_paper
+    from ..workspace.paper.expected import ERRORS
 
     try:
-        checked = check_paper(proof, case)
+        checked = check_paper(proof, case, leg_error=leg_error)
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
     count = len(checked.claims) + len(checked.unproved)
-    whose = ""
-    if proof.tolerance:
-        off = (
-            f"{case.units.shown(proof.tolerance, Dimension.LENGTH):.10g} {case.units.label(Dimension.LENGTH)}".rstrip()
-        )
-        whose = f", for every machine whose joint centres are off by at most {off}"
-    typer.echo(f"holds: {len(checked.claims)} of {count} claims about the workspace of {one_line(case.name)}{whose}")
+    whose = f"the workspace of {one_line(case.name)}"
+    if case.joint_centre_tolerance:
+        off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
+        whose += f", for every machine whose joint centres are off by at most {off}"
+    typer.echo(f"holds: {len(checked.claims)} of {count} claims about {whose}")
+    for line in _premises(case, checked.numbers_at):
+        typer.echo(f"  {one_line(line)}")
+    legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
-        typer.echo(f"  {one_line(each.name)}: {_words(each, case)}")
+        of = f", for lengths of legs that are {legs}" if each.name in ERRORS else ""
+        typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
     _echo_unproved(checked.unproved, err=False)
+    if checked.unproved:
+        typer.echo("why claims are not on paper is what the file says, and not checked")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
+
+
+def _premises(case: Case, numbers_at: str) -> Iterator[str]:
+    """Yield the poses, the tasks and the assemblies that claims are about."""
+    from ...models import Dimension
+    from ..case.pose import Free
+    from ..certificate.paper.statement import exact
+
+    def span(value: Value, dimension: Dimension) -> str:
+        ends = (value.lower, value.upper) if isinstance(value, Free) else (value,)
+        return " to ".join(exact(case.units.shown(each, dimension)) for each in ends)
+
+    workspace = case.workspace
+    if workspace is None:
+        return
+    turns, length, angle = workspace.turns, Dimension.LENGTH, Dimension.ANGLE
+    about = f" {' '.join(map(exact, turns.axis))}" if turns.kind.value == "axis" else ""
+    position = ", ".join(f"{name} {span(each, length)}" for name, each in zip("xyz", workspace.position, strict=True))
+    rotation = ", ".join(span(each, angle) for each in turns.angles)
+    yield (
+        f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
+        f"{case.units.label(angle)}"
+    )
+    for task in case.tasks:
+        yield f"{'F' if len(case.tasks) == 1 else f'F of {task.name}'}: of the task {task.name!r}"
+    if numbers_at:
+        yield f"assemblies: ranks in the one of home in the middle of the workspace, numbers in {numbers_at}"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:
     """Return what is shown of a claim."""
+    from ..certificate.paper.statement import outward
     from ..workspace.claims import CONSTRAINTS
 
     if claim.by_machine:
@@ -104,8 +138,9 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     if claim.bound is None:
         whose = "the constraint wrenches keep their" if claim.name == CONSTRAINTS else "J has full"
         return f"{whose} rank at every pose"
-    side = "at least" if claim.sense == "min" else "at most"
-    text = f"{side} {case.units.shown(claim.bound, claim.dimension):.10g} {case.units.label(claim.dimension)}".rstrip()
+    is_most = claim.sense != "min"
+    bound = outward(case.units.shown(claim.bound, claim.dimension), up=is_most)
+    text = f"{'at most' if is_most else 'at least'} {bound} {case.units.label(claim.dimension)}".rstrip()
     if claim.limit is None:
         return text
     return f"{text}, within the limit {case.units.shown(claim.limit, claim.dimension):.10g}"

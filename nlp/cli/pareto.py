@@ -51,6 +51,7 @@ def pareto(
     from ..errors import InputError, UncoveredError
     from ..front.front import find_front
     from ..front.goals import read_goals
+    from ..interruption import Milestone, answer_after, is_requested
     from ..output.files import check_outputs
 
     if [json_file, csv_file, html].count("-") > 1:
@@ -69,6 +70,7 @@ def pareto(
         sys.stderr.write(f"{CLEAR_LINE}{done} of {total} points")
         sys.stderr.flush()
 
+    answer_after(Milestone.POINT)
     try:
         found = find_front(
             read.case,
@@ -84,6 +86,8 @@ def pareto(
     finally:
         if show:
             sys.stderr.write(CLEAR_LINE)
+    if is_requested():
+        typer.echo(f"interrupted: {len(found.points)} of {points} points are found", err=True)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
     raise typer.Exit(0 if is_proved else 1)

@@ -27,6 +27,7 @@ def report(
     """
     from ..case.reader import load_case, read_case
     from ..errors import UncoveredError, one_line
+    from ..interruption import Milestone, answer_after, is_requested
     from ..output.files import check_outputs, write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
@@ -43,6 +44,7 @@ def report(
     from ..results.regression import check_case
     from ..results.result import result_of
 
+    answer_after(Milestone.START)
     refusal = ""
     try:
         solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
@@ -53,7 +55,8 @@ def report(
         is_proved = False
     result = result_of(found)
     # The numbers in print are of the case as its file states it.
-    check = check_case(case, {case: result}) if loaded.published and not settings else None
+    is_checked = loaded.published and not settings and not is_requested()
+    check = check_case(case, {case: result}) if is_checked else None
     page = report_of(text, solution, result, check, refusal)
     if page.is_enclosed:
         curves = limit_curves(solution, result, lambda name, value: load_case(case, {**fixed, name: value}), jobs)

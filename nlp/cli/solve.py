@@ -58,9 +58,7 @@ def solve(
     from ..results.result import result_of
     from .progress import solve_with_progress
 
-    # With --certify, an interrupt would leave the proof undone, and the answer would look like a refused one.
-    if not certify:
-        answer_after(Milestone.START)
+    answer_after(Milestone.START)
     given = read_case(case, read_settings(settings))
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
     check_csv(csv_file, table, json_file, loaded, at_point=False)

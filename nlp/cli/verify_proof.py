@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .numbers import Number
+from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_settings
+
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..certificate.paper.proof import Proof
 
 
 def verify_proof(
@@ -17,53 +21,80 @@ def verify_proof(
     case: Annotated[
         str | None, typer.Argument(metavar="[CASE]", help="The case that it must be for; else the one it carries.")
     ] = None,
+    settings: SettingTexts = None,
+    of: ResultFile = None,
+    above: Annotated[
+        float | None,
+        typer.Option(parser=Number("--above"), metavar="F", help="The proof must show that F is above this value."),
+    ] = None,
+    all_assemblies: AllAssemblies = False,
+    leg_error: LegError = 0.0,
 ) -> None:
-    """Check a proof anew, with nothing of what made it."""
-    from ..certificate.paper.proof import ProofError, read_proof
-    from ..certificate.paper.proofcheck import check_proof
-    from ..errors import one_line
+    """Check a proof anew, with nothing of what made it.
+
+    What it is about comes from the case and from the options, which are those of the command that wrote it.
+    """
+    from .. import __version__
+    from ..certificate.paper.proof import Proof, read_proof
+    from ..errors import InputError
     from ..output.files import read_text
-    from ..solver.certified import program_of
     from ..workspace.paper.document import is_paper, read_paper
+    from .dimensions import read_machine
+    from .paper import verify_paper
 
     text = read_text(proof)
-    if is_paper(text):
-        from .paper import verify_paper
+    options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
+    given = read_paper(text, proof) if is_paper(text) else read_proof(text, proof)
+    foreign = ("--leg-error",) if isinstance(given, Proof) else ("--above", "--all-assemblies")
+    for name in foreign:
+        if options[name]:
+            raise InputError(f"{name}: means nothing for this proof, which another command wrote")
+    if case is not None:
+        loaded = read_machine(case, read_settings(settings), of).file.case
+    elif settings or of:
+        raise InputError(f"{'--set' if settings else '--of'}: needs the CASE that it changes")
+    else:
+        loaded = _carried_case(given.case, given.name, proof)
+    if isinstance(given, Proof):
+        _verify(given, loaded, above, all_assemblies=all_assemblies)
+    else:
+        verify_paper(given, loaded, leg_error)
+    whose = "the case is the one that the proof carries; " if case is None else ""
+    typer.echo(f"{whose}checked by screwsynth {__version__}")
 
-        paper = read_paper(text, proof)
-        verify_paper(paper, _case_of(paper.case, paper.name, proof, case))
-        return
-    given = read_proof(text, proof)
-    loaded = _case_of(given.case, given.name, proof, case)
-    nlp = program_of(loaded, given.statement)
+
+def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bool) -> None:
+    """Check the proof of a certificate and say what it proves.
+
+    Raises:
+        Exit: with status 1 where the proof does not hold.
+    """
+    from ..certificate.paper.proof import ProofError
+    from ..certificate.paper.proofcheck import check_proof
+    from ..certificate.paper.statement import claim_words, hold_statement, program_of
+    from ..errors import one_line
+
     try:
-        checked = check_proof(given, nlp)
+        hold_statement(case, proof.statement, above=above, all_assemblies=all_assemblies)
+        checked = check_proof(proof, program_of(case, proof.statement))
+        if above is not None and not -checked.bound > above:
+            raise ProofError(f"the proof shows {-checked.bound:.10g}, which is not above {above:.10g}")
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    what = "there is no feasible point"
-    if given.bound is not None:
-        what = f"F is at most {given.bound:.10g}" if nlp.sign < 0 else f"F is at least {-given.bound:.10g}"
-    where = " in home's working mode" if given.statement.in_home_mode else ""
-    typer.echo(f"holds: {what} within the limits of {one_line(loaded.name)}{where}")
+    typer.echo(f"holds: {one_line(claim_words(case, proof.statement, proof.bound))}")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 
-def _case_of(text: str, name: str, proof: str, case: str | None) -> Case:
-    """Return the case of a file or name; without one, that of the text that a proof carries.
+def _carried_case(text: str, name: str, proof: str) -> Case:
+    """Return the case of the text that a proof carries.
 
     Raises:
-        ProofError: the text is no TOML.
+        InputError: the text is no TOML, or no case.
     """
-    import tomllib
+    from pathlib import Path
 
-    from ..case.reader import case_from_tables, load_case
-    from ..certificate.paper.proof import ProofError
+    from ..case.reader import case_from_tables
+    from ..case.source import tables_of
 
-    if case is not None:
-        return load_case(case)
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ProofError(f"{proof}: the case that it carries is no TOML: {error}") from None
-    return case_from_tables(tables, name=name, source=proof)
+    return case_from_tables(tables_of(Path(proof), text), name=name, source=proof)

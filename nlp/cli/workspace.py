@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .numbers import Number
-from .options import CaseName, Jobs, JsonFile, SettingTexts, console, read_settings
+from .options import CaseName, Jobs, JsonFile, LegError, ResultFile, SettingTexts, console, read_settings
 from .workspacefiles import WorkspaceFiles
 
 if TYPE_CHECKING:
@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 def workspace(
     case: CaseName,
     settings: SettingTexts = None,
-    of: Annotated[
-        str | None,
-        typer.Option("--of", metavar="RESULT", help="Take the dimensions from a result that solve --json wrote."),
-    ] = None,
+    of: ResultFile = None,
     of_quantity: Annotated[
         list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
     ] = None,
@@ -35,15 +32,7 @@ def workspace(
         float,
         typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop each search then, with the bound reached."),
     ] = 20.0,
-    leg_error: Annotated[
-        float,
-        typer.Option(
-            "--leg-error",
-            parser=Number("--leg-error"),
-            metavar="LENGTH",
-            help="Largest error of a leg's length: bounds the errors of the pose.",
-        ),
-    ] = 0.0,
+    leg_error: LegError = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
     jobs: Jobs = None,
@@ -61,26 +50,21 @@ def workspace(
     ] = None,
 ) -> None:
     """Prove regular poses and limits over a whole workspace."""
-    from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..results.workspace import workspace_of
     from ..results.workspaceposes import evaluate_command
     from ..workspace.machine import workspace_of_case
-    from .dimensions import settings_of_result
+    from .dimensions import read_machine
     from .paper import paper_record, write_paper
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     if not time > 0:
         raise InputError(f"--time {time:g}: must be positive")
-    if not 0 <= leg_error < float("inf"):
-        raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
     record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    given = {} if of is None else settings_of_result(of)
-    chosen = {**given, **read_settings(settings)}
-    loaded, text, inputs = read_case(case, chosen)
+    (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
     workspace_of_case(loaded)
     files = WorkspaceFiles(json_file, plot, picture, page, proof)
     files.check(inputs)

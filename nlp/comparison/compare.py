@@ -14,7 +14,7 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, listing
 from ..evidence.singularities import clause_of
-from ..interruption import is_requested
+from ..interruption import Milestone, is_requested, one_call, reached
 from ..solver.certified import certify
 from ..solver.exchange import design_of
 from ..solver.solve import solve
@@ -70,6 +70,7 @@ class Comparison:
         return tuple(each for each in self.entries if part_of(each) == "ranked")
 
 
+@one_call()
 def compare(
     case: Case,
     robots: Sequence[str | Path | Model],
@@ -123,8 +124,9 @@ def compare(
         if certified:
             entry = _with_certificate(entry, time_limit, jobs)
         entries.append(_with_judgement(entry, time_limit, jobs))
+        reached(Milestone.ROBOT)
     answers = [each for each in entries if each.has_answer]
-    if answers and all(each.can_move is False for each in answers):
+    if answers and not is_requested() and all(each.can_move is False for each in answers):
         names = listing(dict.fromkeys(task.name for each in answers for task in each.tasks if task.can_move is False))
         fault = "no robot of the comparison has the freedom for its motion"
         raise InputError(f"{case.source or case.name}: task {names}: {fault}")
@@ -260,12 +262,14 @@ def part_of(entry: Entry) -> Part:
 
 
 def _in_order(entries: Sequence[Entry]) -> tuple[Entry, ...]:
-    """Return robots in the order of a table; those without a common value stay in the order in which they are given."""
+    """Return robots in the order of a table: with fewer limits left out first, then by F.
 
-    def key(entry: Entry) -> tuple[int, float]:
-        value = entry.value
-        if value is None:
-            return _PARTS.index(part_of(entry)), 0.0
-        return _PARTS.index(part_of(entry)), -value if entry.sense is Sense.MAX else value
+    Robots without a common value stay in the order in which they are given.
+    """
+
+    def key(entry: Entry) -> tuple[int, int, float]:
+        value = entry.value or 0.0
+        left_out = 0 if entry.placed is None else len(entry.placed.left_out)
+        return _PARTS.index(part_of(entry)), left_out, -value if entry.sense is Sense.MAX else value
 
     return tuple(sorted(entries, key=key))

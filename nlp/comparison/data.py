@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...models import Dimension, frozen_array
+from ...models import frozen_array
 from ..case.case import Case
 from ..case.pose import Free
 from ..errors import CaseError
@@ -24,7 +24,7 @@ from ..results.evidence import certificate_data
 from ..results.jsondata import finite_or_none
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions
-from ..units import Units, objective_unit
+from ..units import objective_unit, rate_unit
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit
 from .sentences import comparison_sentences, entry_sentences
@@ -99,17 +99,12 @@ def _task(case: Case, index: int, fit: TaskFit) -> ComparedTaskData:
         rates=tuple(
             ComparedRateData(
                 actuator=rate.actuator,
-                unit=rate_unit_of(rate.dimension, units),
+                unit=rate_unit(twist, units, rate.dimension),
                 rate=finite_or_none(rate.value),
             )
             for rate in fit.rates
         ),
     )
-
-
-def rate_unit_of(dimension: Dimension, units: Units) -> str:
-    """Return the unit of an actuator's coordinate in its rate: radians for an angle, as F is per radian."""
-    return "rad" if dimension is Dimension.ANGLE else units.length
 
 
 def _active(entry: Entry) -> tuple[str, ...]:

@@ -29,7 +29,8 @@ class Rate(NamedTuple):
     Attributes:
         actuator: name of the actuator, or of the leg that is driven along its axis.
         dimension: of its coordinate.
-        value: rate, radians or length per unit of the task's motion; infinite where it cannot drive the platform.
+        value: rate, radians or length per unit of the task's motion; infinite where it cannot drive the platform, and
+            not a number where the motion does not determine it.
     """
 
     actuator: str
@@ -64,8 +65,8 @@ class TaskFit(NamedTuple):
 
     @property
     def largest_rate(self) -> Rate | None:
-        """The rate that is largest in size; None where no rate is known."""
-        return max(self.rates, key=lambda each: abs(each.value), default=None)
+        """The rate that is largest in size, one that is no number first; None where no rate is known."""
+        return max(self.rates, key=lambda each: (math.isnan(each.value), abs(each.value)), default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,12 +195,10 @@ def driven_wrenches(contender: Contender) -> int:
 
 
 def outcome_of(judgement: Judgement) -> Outcome:
-    """Return the verdict on a design over its workspace, which is open where regular poses are not proved."""
+    """Return the verdict on a design over its workspace."""
     if judgement.is_refuted:
         return Outcome.REFUTED
-    is_regular = judgement.regularity is not None and judgement.regularity.outcome is Outcome.PROVED
-    held = all(each.outcome is Outcome.PROVED for each in judgement.extremes if each.limit is not None)
-    return Outcome.PROVED if is_regular and held else Outcome.OPEN
+    return Outcome.PROVED if judgement.is_proved else Outcome.OPEN
 
 
 def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: tuple[str, ...]) -> dict[str, Stroke]:

@@ -31,10 +31,12 @@ class LeftOut:
     Attributes:
         key: its key in ``[limits]``, or ``tolerance.joint_centre``.
         reason: a clause for people.
+        is_of_legs: whether it speaks of legs between joint centres.
     """
 
     key: str
     reason: str
+    is_of_legs: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,9 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
         workspace = replace(workspace, position=_moved(workspace.position, offset))
         if workspace.has_limits and not _is_hexapod(model):
             workspace = replace(workspace, has_limits=False)
-            left_out.append(LeftOut("limits.over", "is compared for robots with six straight legs alone"))
+            left_out.append(
+                LeftOut("limits.over", "is compared for robots with six straight legs alone", is_of_legs=True)
+            )
     bare = replace(
         case,
         model=model,
@@ -99,7 +103,7 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     try:
         found = replace(bare, limits=limits, joint_centre_tolerance=case.joint_centre_tolerance)
     except CaseError as error:
-        left_out.append(LeftOut("tolerance.joint_centre", error.fault))
+        left_out.append(LeftOut("tolerance.joint_centre", error.fault, is_of_legs=True))
         found = replace(bare, limits=limits)
     return Placed(found, frozen_array(offset, (3,)), tuple(left_out))
 
@@ -117,7 +121,7 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
         try:
             Limits(limit).check(bare.as_limited)
         except CaseError as error:
-            left_out.append(LeftOut(f"limits.{limit.name}", error.fault))
+            left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))
         else:
             kept.append(limit)
     return Limits(*kept), left_out

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from ...models import Dimension
+from ..errors import listing
 from ..results.point import violations
+from ..solver.status import Status
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
 
@@ -26,13 +29,27 @@ def entry_sentences(entry: Entry) -> list[str]:
         found.append(_no_answer(entry))
     for fit in entry.tasks:
         found += _fit_sentences(entry, fit)
-    if entry.placed is not None and entry.placed.left_out:
-        keys = ", ".join(each.key for each in entry.placed.left_out)
-        one = len(entry.placed.left_out) == 1
-        found.append(f"{keys} cannot hold for this robot: it is solved without {'it' if one else 'them'}.")
+    found += _left_out_sentences(entry)
     found += [f"Singular: {each}." for each in entry.singularities]
     found += _proof_sentences(entry)
     return found
+
+
+def _left_out_sentences(entry: Entry) -> Iterator[str]:
+    """Yield sentences about the limits that a robot is solved without."""
+    model = entry.contender.model
+    left_out = () if entry.placed is None else entry.placed.left_out
+    of_legs = [each.key for each in left_out if each.is_of_legs and model.structure]
+    others = [each.key for each in left_out if each.key not in of_legs]
+    if of_legs:
+        own = listing(each.name for each in model.quantities)
+        measures = f"; its own measures are {own}" if own else ""
+        yield (
+            f"Solved without {', '.join(of_legs)}: they speak of legs between joint centres, and this robot is given "
+            f"joint by joint{measures}."
+        )
+    if others:
+        yield f"Solved without {', '.join(others)}: this robot has nothing that they speak of."
 
 
 def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
@@ -47,7 +64,9 @@ def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
     elif fit.can_move is None:
         found.append(f"Whether the platform can make the motion of {fit.name} is not known for this robot's rows.")
     largest = fit.largest_rate
-    if largest is not None and math.isinf(largest.value):
+    if largest is not None and math.isnan(largest.value):
+        found.append(f"The motion of the platform does not determine the rate of actuator {largest.actuator}.")
+    elif largest is not None and math.isinf(largest.value):
         found.append(f"Actuator {largest.actuator} cannot drive the platform at this design.")
     return found
 
@@ -71,6 +90,8 @@ def _no_answer(entry: Entry) -> str:
     if solution is None or own is None:
         return "No answer."
     status = solution.status.value
+    if solution.status is Status.INTERRUPTED:
+        return f"No answer ({status})."
     closure = {equation.name for equation in (*entry.contender.model.closure, *entry.contender.model.loops)}
     names = [row.name for row in violations(own.nlp, own.x)]
     if any(name.split(" at ")[0] in closure for name in names):
@@ -110,13 +131,18 @@ def _cautions(found: Comparison) -> list[str]:
     case, ranked, lines = found.case, found.ranked, []
     kept = {len(each.placed.case.limits) for each in ranked if each.placed is not None}
     if len(kept) > 1:
-        lines.append("The ranked robots keep different numbers of the limits: fewer limits let F be better.")
+        lines.append(
+            "The ranked robots keep different numbers of the limits. Those that keep more come first: fewer limits let "
+            "F be better."
+        )
     sizes = [each.final_size for each in ranked if each.final_size is not None]
     turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
     if turns and sizes and max(sizes) > (1 + _SAME_SIZE) * min(sizes):
+        own = any(each.contender.is_own for each in ranked)
+        of_all = "one size of all but the case's robot, which keeps its own ranges" if own else "one size"
         lines.append(
             "The designs have different sizes, and F of a rotation grows with the square of the size: see the column "
-            "size, and --range 0 for one size."
+            f"size, and --range 0 for {of_all}."
         )
     terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
     if len(set(terms.values())) > 1:

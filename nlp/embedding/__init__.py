@@ -2,6 +2,6 @@
 
 The modules import each other in this order: ``ctext``, ``casaditext``, ``subject`` and ``calls`` stand alone;
 ``loops``, ``stages`` and ``looptext`` each use those before; ``apitexts`` and ``runtimelimits`` use ``ctext``,
-``manifest`` uses ``runtimelimits``, and ``codegen`` uses all of them. ``folder`` reads the file that ``manifest``
+``unitdata`` uses ``runtimelimits``, ``manifest`` uses both, and ``codegen`` uses all of them. ``folder`` reads the file that ``manifest``
 writes, and ``library`` loads the folder.
 """

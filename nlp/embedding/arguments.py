@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,15 +29,19 @@ def checked_rows(name: str, given: ArrayLike | None, length: int) -> FloatArray 
 
 
 def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
-    """Return an array of finite numbers, contiguous.
+    """Return an array of finite numbers, contiguous. Texts are no numbers, nor are complex ones.
 
     Raises:
         InputError: something in it is no number, or not finite.
     """
     try:
-        array = np.array(given, dtype=np.float64, order="C")
-    except (ValueError, TypeError):
-        raise InputError(f"{name}: must be an array of numbers") from None
+        found = np.array(given)
+        is_real = found.dtype.kind in "biuf" or all(isinstance(each, Real) for each in found.ravel().tolist())
+        array = np.array(found, dtype=np.float64, order="C") if is_real else None
+    except (ValueError, TypeError, OverflowError):
+        array = None
+    if array is None:
+        raise InputError(f"{name}: must be an array of numbers, and no texts or complex ones")
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = ", ".join(str(index) for index in wrong[0])

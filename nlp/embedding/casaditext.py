@@ -25,8 +25,20 @@ _SPARSITY = re.compile(r"^(?:#define casadi_s\d+ |static const casadi_int casadi
 _TESTED = re.compile(r"(arg\[\d+\])\? (\1\[\d+\]) : 0;")
 
 
+#: First line of a function that is left. Not every one uses all of its parameters, and none of them its memory.
+_BEGIN = re.compile(
+    r"^((?:static|CASADI_SYMBOL_EXPORT) int \w+\(const casadi_real\*\* arg, casadi_real\*\* res, casadi_int\* iw, "
+    r"casadi_real\* w, int mem\) ?\{)$",
+    re.MULTILINE,
+)
+_USED = "(void)arg, (void)res, (void)iw, (void)w, (void)mem;"
+
+
 def for_controllers(text: str) -> str:
-    """Return the text of a source or of a header without these functions, their tables, and tests of inputs."""
+    """Return the text of a source or of a header without these functions, their tables, and tests of inputs.
+
+    Parameters are used in name, so that no compiler warns of those that are not.
+    """
     for pattern in (_DEFINITION, _DECLARATION, _SPARSITY):
         text = pattern.sub("", text)
-    return _TESTED.sub(r"\2;", text)
+    return _TESTED.sub(r"\2;", _BEGIN.sub(rf"\1\n{_USED}", text))

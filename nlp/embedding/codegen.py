@@ -11,7 +11,6 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -30,14 +29,15 @@ from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from .apitexts import index_macros, version_texts
 from .casaditext import for_controllers
-from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_table
+from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_literal, string_table
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
 from .measured import header_texts
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
-from .subject import Subject, find_subject, magnitude_of, objective_words
+from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
+from .unitdata import UnitData
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -92,8 +92,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     nlp, prefix = subject.nlp, identifier(case.name)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI")
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
-    names = _substitutions(subject, staged)
-    names |= limit_texts(limits, prefix, replace(case.units, angle="rad").label)
+    names, units = _substitutions(subject, staged), UnitData(nlp)
+    names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
     parts = dict(_PARTS)
     if staged.loops:
         parts["-loops.c"] = "loops.c"
@@ -168,6 +168,9 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     functions = staged.all
     points, references = _references(nlp)
     seeds = (starting_points(nlp, _SEEDS, case.search.seed) - nlp.centre) / nlp.scale
+    level = -1 if program.places.epigraph is None else program.places.epigraph.level
+    if level >= 0:
+        seeds[:, level] = 0.0
     n, c = nlp.n, len(program.constraints)
     rows = len(program.model.frame_rows)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
@@ -191,6 +194,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
+        "level": str(level),
+        "nsigns": str(staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0),
         "ninputs": str(inputs),
         "pose_parameter": "int pose, " if poses > 1 else "",
         "pose_or_first": "pose" if poses > 1 else "0",
@@ -233,22 +238,30 @@ class _References(NamedTuple):
 def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
-    units = {Dimension.LENGTH: case.units.length, Dimension.ANGLE: "rad", Dimension.NUMBER: ""}
+    units = UnitData(nlp)
     lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
-    kinds = list(Dimension)
+    kinds = [list(Dimension).index(each.dimension) for each in program.variables]
+    bounds = bounds_in_c(nlp)
+    if program.places.epigraph is not None:
+        kinds[program.places.epigraph.level] = len(Dimension)
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
         "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
         string_table(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
-        string_table(f"{prefix}_variable_units", N, [units[each.dimension] for each in program.variables]),
-        integer_table(f"{prefix}_variable_kinds", N, [kinds.index(each.dimension) for each in program.variables]),
-        number_table(f"{prefix}_variable_lower", N, nlp.lower),
-        number_table(f"{prefix}_variable_upper", N, nlp.upper),
+        string_table(f"{prefix}_variable_units", N, units.variables),
+        integer_table(f"{prefix}_variable_kinds", N, kinds),
+        integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
+        number_table(f"{prefix}_variable_lower", N, bounds.lower),
+        number_table(f"{prefix}_variable_upper", N, bounds.upper),
         number_table(f"{prefix}_variable_starts", N, nlp.start),
         "/* Fixed numbers: names, units, and the case's values. */",
         string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
-        string_table(f"{prefix}_parameter_units", P, [units[each.dimension] for each in program.arguments]),
+        string_table(f"{prefix}_parameter_units", P, units.parameters),
         number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
+        "/* Units of F, of the rates of each task, and of the multipliers of the variables' bounds, for the case's own twists. */",
+        f"static const char *const {prefix}_F_unit = {string_literal(units.F)};",
+        string_table(f"{prefix}_rate_units", T, units.rates),
+        string_table(f"{prefix}_multiplier_units", N, units.variable_multipliers),
         "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
         string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.frame_rows]),
         string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.frame_rows]),

@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from ...models import FloatArray
 from ..errors import one_line
 
+#: Between two entries of a table: each has a line of its own, so that lines stay short and differences are seen.
+_BY_LINE = ",\n    "
+
 
 def identifier(name: str) -> str:
     """Return the prefix of a case's C names, an identifier of C for any name of a case.
@@ -37,19 +40,19 @@ def c_names(names: Iterable[str]) -> list[str]:
 
 def string_table(name: str, size: str, values: Iterable[str]) -> str:
     """Return a constant table of strings; it ends with a null, so that it is never empty."""
-    quoted = ", ".join([*(_string_literal(text) for text in values), "0"])
-    return f"static const char *const {name}[{size} + 1] = {{{quoted}}};"
+    quoted = _BY_LINE.join([*(string_literal(text) for text in values), "0"])
+    return f"static const char *const {name}[{size} + 1] = {{\n    {quoted}}};"
 
 
 def number_table(name: str, size: str, values: Iterable[float]) -> str:
     """Return a constant table of numbers; it ends with a zero, so that it is never empty."""
-    listed = ", ".join([*(repr(float(value)) for value in values), "0.0"])
-    return f"static const double {name}[{size} + 1] = {{{listed}}};"
+    listed = _BY_LINE.join([*(repr(float(value)) for value in values), "0.0"])
+    return f"static const double {name}[{size} + 1] = {{\n    {listed}}};"
 
 
 def integer_table(name: str, size: str, values: Iterable[int]) -> str:
     """Return a constant table of whole numbers; it ends with a zero, so that it is never empty."""
-    return f"static const int {name}[{size} + 1] = {{{', '.join(map(str, [*values, 0]))}}};"
+    return f"static const int {name}[{size} + 1] = {{\n    {_BY_LINE.join(map(str, [*values, 0]))}}};"
 
 
 def short_table(name: str, values: Iterable[int]) -> str:
@@ -69,7 +72,7 @@ def comment_text(text: str) -> str:
     return one_line(re.sub(r"\s+", " ", text)).replace("*/", "* /").replace("/*", "/ *")
 
 
-def _string_literal(text: str) -> str:
+def string_literal(text: str) -> str:
     """Return a C string literal, with octal escapes for UTF-8 bytes outside of ASCII: they end after three digits."""
     plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
     return f'"{"".join(plain)}"'

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import InputError
+from ..system.reading import read_limited
+from ..system.strictjson import json_tree, value_of
 from .manifest import FORMAT, MANIFEST
+
+#: Largest manifest, bytes.
+_LARGEST = 2**26
 
 
 class CompiledNumber(NamedTuple):
@@ -81,13 +85,12 @@ def read_manifest(folder: Path) -> Manifest:
         InputError: the folder is no folder of generated C, is of another version, or lacks a file.
     """
     try:
-        data = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        data = value_of(Mapping[str, object], json_tree(read_limited(folder / MANIFEST, _LARGEST)))
         found = data["format"]
-    except OSError as error:
-        why = f"{MANIFEST} cannot be read: {error.strerror or error}"
-        raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {why}") from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError(f"{folder}: {MANIFEST} is not as `screwsynth codegen` writes it") from None
+    except InputError as error:
+        raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {error}") from None
+    except (ValueError, KeyError) as error:
+        raise _wrong(folder, error) from None
     if found != FORMAT:
         fault = f"format = {found!r} is not the format {FORMAT} of this version: generate the folder again"
         raise InputError(f"{folder}: {MANIFEST}: {fault}")
@@ -95,38 +98,57 @@ def read_manifest(folder: Path) -> Manifest:
         return _manifest(data, folder)
     except OSError as error:
         raise InputError(f"{folder}: {error.filename} cannot be read: {error.strerror or error}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(f"{folder}: {MANIFEST} is not as `screwsynth codegen` writes it") from None
+    except (ValueError, KeyError) as error:
+        raise _wrong(folder, error) from None
 
 
-def _manifest(data: Mapping[str, Any], folder: Path) -> Manifest:
-    """Return the manifest from its data, which raise any error of a wrong key or type."""
-    names = [str(name) for name in (*data["sources"], *data["headers"])]
+def _wrong(folder: Path, error: Exception) -> InputError:
+    """Return the error of a manifest with a wrong value, or without a key."""
+    why = f"{error} is missing" if isinstance(error, KeyError) else f"{error}"
+    return InputError(f"{folder}: {MANIFEST} is not as `screwsynth codegen` writes it: {why}")
+
+
+def _manifest(data: Mapping[str, object], folder: Path) -> Manifest:
+    """Return the manifest from its data.
+
+    Raises:
+        ValueError: a value is wrong.
+        KeyError: a key is missing.
+        OSError: a file cannot be read.
+    """
+    names = [name for key in ("sources", "headers") for name in value_of(tuple[str, ...], data[key], key)]
     if any(Path(name).name != name for name in names):
-        raise ValueError
+        raise ValueError("a name in sources or headers is no name of a file")
+    prefix, seeds = value_of(str, data["prefix"], "prefix"), value_of(int, data["seeds"], "seeds")
+    if not prefix.isidentifier() or seeds < 0:
+        raise ValueError("prefix must be a name in C, and seeds not negative")
+
+    def rows(where: str, /, **kinds: object) -> list[list[Any]]:
+        """Return the values of some keys of the objects in a list."""
+        tables = value_of(tuple[Mapping[str, object], ...], data[where], where)
+        return [
+            [value_of(kind, each[name], f"{where}[{index}].{name}") for name, kind in kinds.items()]
+            for index, each in enumerate(tables)
+        ]
+
+    end = float | None
     return Manifest(
-        name=str(data["name"]),
-        prefix=str(data["prefix"]),
+        name=value_of(str, data["name"], "name"),
+        prefix=prefix,
         variables=tuple(
-            CompiledNumber(each["name"], each["unit"], float(each["lower"]), float(each["upper"]), float(each["start"]))
-            for each in data["variables"]
+            CompiledNumber(*each)
+            for each in rows("variables", name=str, unit=str, lower=float, upper=float, start=float)
         ),
         parameters=tuple(
-            CompiledNumber(each["name"], each["unit"], -math.inf, math.inf, float(each["default"]))
-            for each in data["parameters"]
+            CompiledNumber(name, unit, -math.inf, math.inf, default)
+            for name, unit, default in rows("parameters", name=str, unit=str, default=float)
         ),
         limits=tuple(
-            CompiledLimit(
-                each["key"],
-                each["unit"],
-                float(each["default"]),
-                -math.inf if each["above"] is None else float(each["above"]),
-                math.inf if each["most"] is None else float(each["most"]),
-            )
-            for each in data["limits"]
+            CompiledLimit(key, unit, default, -math.inf if above is None else above, math.inf if most is None else most)
+            for key, unit, default, above, most in rows("limits", key=str, unit=str, default=float, above=end, most=end)
         ),
-        constraints=tuple(str(each["name"]) for each in data["constraints"]),
-        statuses=tuple(str(each["name"]) for each in data["statuses"]),
-        seeds=int(data["seeds"]),
+        constraints=tuple(name for (name,) in rows("constraints", name=str)),
+        statuses=tuple(name for (name,) in rows("statuses", name=str)),
+        seeds=seeds,
         files={name: (folder / name).read_text(encoding="utf-8") for name in names},
     )

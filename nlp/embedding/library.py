@@ -83,14 +83,18 @@ class CompiledCase:
     :func:`load_compiled` makes it. Its methods may be called from several threads.
     """
 
-    def __init__(self, manifest: Manifest, library: ctypes.CDLL) -> None:
-        self._manifest, self._library = manifest, library
+    def __init__(self, manifest: Manifest, library: ctypes.CDLL, folder: Path) -> None:
+        self._manifest, self._library, self._folder = manifest, library, folder
         counts = (ctypes.c_int * 6)()
         self._function("sizes")(counts)
         *shape, self._work, self._iwork = list(counts)
         lengths = (manifest.variables, manifest.parameters, manifest.constraints, manifest.limits)
         if shape != [len(each) for each in lengths]:
             raise InputError(f"{manifest.name}: the manifest and the C of the folder are not of one case")
+
+    def __reduce__(self) -> tuple[Callable[[str], CompiledCase], tuple[str]]:
+        """Pickle the folder: it is loaded again where the object is unpickled."""
+        return load_compiled, (str(self._folder),)
 
     def __repr__(self) -> str:
         counts = f"{len(self.variables)} variables, {len(self.parameters)} fixed numbers, {len(self.limits)} limits"
@@ -302,7 +306,8 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
     ``gcc`` or ``clang``, or the one that the environment variable ``CC`` names.
 
     Args:
-        folder: the folder that ``screwsynth codegen`` wrote, or :func:`~screwsynth.nlp.generate_c`'s files.
+        folder: the folder that ``screwsynth codegen`` wrote, or :func:`~screwsynth.nlp.generate_c`'s files. A pickle of
+            the result has its absolute path alone.
 
     Raises:
         InputError: the folder is none of generated C or of another version, or there is no working C compiler.
@@ -310,7 +315,7 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
     manifest = read_manifest(Path(folder))
     path = shared_library({**manifest.files, **budget_files(manifest.prefix)})
     try:
-        return CompiledCase(manifest, ctypes.CDLL(str(path)))
+        return CompiledCase(manifest, ctypes.CDLL(str(path)), Path(folder).absolute())
     except (OSError, AttributeError) as error:
         raise InputError(f"{folder}: the compiled library cannot be loaded: {error}") from None
 

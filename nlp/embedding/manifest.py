@@ -6,13 +6,14 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from .. import __version__
 from ..program.nlp import Nlp
 from .runtimelimits import RunTimeLimit
+from .subject import bounds_in_c
+from .unitdata import UnitData
 
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
@@ -32,7 +33,8 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         files: text of every other file of the folder by name.
     """
     case, program, prefix = nlp.case, nlp.program, names["id"]
-    unit_of = replace(case.units, angle="rad").label
+    bounds = bounds_in_c(nlp)
+    units = UnitData(nlp)
     header = files[f"{prefix}.h"]
     statuses = _STATUS.findall(header[header.index("typedef enum") : header.index("} screwsynth_status;")])
     manifest = {
@@ -43,33 +45,44 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "title": case.title,
         "prefix": prefix,
         "sense": nlp.sense.value,
+        "F_unit": units.F,
         "variables": [
-            {"name": each.name, "unit": unit_of(each.dimension), "lower": lower, "upper": upper, "start": start}
-            for each, lower, upper, start in zip(
-                program.variables, nlp.lower.tolist(), nlp.upper.tolist(), nlp.start.tolist(), strict=True
+            {"name": each.name, "unit": unit, "multiplier_unit": own, "lower": lower, "upper": upper, "start": start}
+            for each, unit, own, lower, upper, start in zip(
+                program.variables,
+                units.variables,
+                units.variable_multipliers,
+                bounds.lower.tolist(),
+                bounds.upper.tolist(),
+                nlp.start.tolist(),
+                strict=True,
             )
         ],
         "parameters": [
-            {"name": each.name, "unit": unit_of(each.dimension), "default": default}
-            for each, default in zip(program.arguments, nlp.arguments.tolist(), strict=True)
+            {"name": each.name, "unit": unit, "default": default}
+            for each, unit, default in zip(program.arguments, units.parameters, nlp.arguments.tolist(), strict=True)
         ],
         "limits": [
             {
                 "key": each.key,
                 "c_name": f"{prefix.upper()}_LIMIT_{each.name}",
-                "unit": unit_of(each.dimension),
+                "unit": units.of_case.label(each.dimension),
+                "multiplier_unit": own,
                 "default": each.default,
                 "above": _finite(each.above),
                 "most": _finite(each.most),
             }
-            for each in limits
+            for each, own in zip(limits, units.limit_multipliers(limits), strict=True)
         ],
         "constraints": [
             {"name": each.name, "lower": _finite(lower), "upper": _finite(upper)}
             for each, lower, upper in zip(program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
         ],
         "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.frame_rows],
-        "tasks": [{"name": task.name, "twist": np.asarray(task.twist).tolist()} for task in case.tasks],
+        "tasks": [
+            {"name": task.name, "twist": np.asarray(task.twist).tolist(), "rate_unit": unit}
+            for task, unit in zip(case.tasks, units.rates, strict=True)
+        ],
         "notice": "" if case.workspace is None else case.workspace.stated_pose_notice,
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],

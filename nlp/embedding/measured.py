@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 
 from ..errors import one_line
@@ -10,6 +11,8 @@ from .ctext import comment_text
 from .manifest import MANIFEST
 from .measure import Figures
 
+#: The stack that other compilers and flags may take, in parts of the bound of the one measured: clang took 1.27.
+_ROOM = 1.5
 #: What stands in the place of the figures where no compiler was run.
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
@@ -35,6 +38,7 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
             "compiler": each.compiler,
             "flash_bytes": each.flash,
             "stack_bytes": each.stack,
+            "stack_bytes_with_room": None if each.stack is None else with_room(each.stack),
             "painted_stack_bytes": each.painted,
             "fault": each.fault,
         }
@@ -46,6 +50,11 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
         readme: files[readme].replace(NOT_MEASURED, _rows(figures)),
         MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n",
     }
+
+
+def with_room(stack: int) -> int:
+    """Return the stack in bytes that other compilers may need, from the bound of one: a multiple of 16."""
+    return 16 * math.ceil(_ROOM * stack / 16)
 
 
 def figure_words(figures: Figures) -> str:
@@ -69,10 +78,12 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
             lines.append(f"#define {prefix}_FLASH_BYTES_{name} {each.flash} /* code and constants of the library */")
         if each.stack is not None:
             painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
-            lines.append(
-                f"#define {prefix}_STACK_BYTES_{name} {each.stack} "
-                f"/* bound of a solve, without functions of math.h{painted} */"
-            )
+            lines += [
+                f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} "
+                f"/* bound of a solve by that compiler, without functions of math.h{painted} */",
+                f"#define {prefix}_STACK_BYTES_{name} {with_room(each.stack)} "
+                "/* with room for other compilers, and for functions of math.h */",
+            ]
         if each.fault:
             lines.append(f"/* {each.target.name}: not measured: {comment_text(each.fault)} */")
     return "\n".join(lines)
@@ -81,10 +92,12 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 def _rows(figures: Sequence[Figures]) -> str:
     """Return a table for the README; a line says what is not measured."""
     rows = [
-        "| machine | flash, bytes | bound of the stack, bytes | stack measured, bytes | compiler and flags |",
-        "|---|---|---|---|---|",
+        "| machine | flash, bytes | bound of the stack, bytes | with room for other compilers | stack measured, bytes "
+        "| compiler and flags |",
+        "|---|---|---|---|---|---|",
         *(
-            f"| {each.target.name} | {_cell(each.flash)} | {_cell(each.stack)} | {_cell(each.painted)} "
+            f"| {each.target.name} | {_cell(each.flash)} | {_cell(each.stack)} "
+            f"| {_cell(None if each.stack is None else with_room(each.stack))} | {_cell(each.painted)} "
             f"| {comment_text(each.compiler) or '-'} |"
             for each in figures
         ),

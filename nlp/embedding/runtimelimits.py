@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -208,13 +208,16 @@ def _limit(key: str, reading: Reading, value: float, measured: _Range) -> RunTim
     return RunTimeLimit(key, "", reading.dimension, value, above, max(most, value))
 
 
-def limit_texts(found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str]) -> dict[str, str]:
+def limit_texts(
+    found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str], multiplier_units: Sequence[str]
+) -> dict[str, str]:
     """Return the texts for the placeholders about limits.
 
     Args:
         found: the limits.
         prefix: of the case's names in C.
         unit_of: unit of a dimension, empty for a pure number.
+        multiplier_units: unit of each limit's multiplier.
     """
     ID, L = prefix.upper(), f"{prefix.upper()}_LIMITS"
     limits = found.limits
@@ -229,6 +232,7 @@ def limit_texts(found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension]
             [
                 string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
                 string_table(f"{prefix}_limit_units", L, [unit_of(each.dimension) for each in limits]),
+                string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
                 number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
                 number_table(f"{prefix}_limit_above", L, [max(each.above, -_NONE) for each in limits]),
                 number_table(f"{prefix}_limit_most", L, [min(each.most, _NONE) for each in limits]),

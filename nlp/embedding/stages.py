@@ -77,7 +77,8 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     * ``limits``: constraints with their gradients;
     * ``derivatives``: objective, gradient, constraints, and their gradients;
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
-    * ``magnitude``: size of the objective without cancellation.
+    * ``magnitude``: size of the objective without cancellation;
+    * ``signs``: numbers that are positive in home's assembly of the joints at every pose; absent without any.
 
     Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
     the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a
@@ -114,6 +115,9 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
         "curvature": [hessian],
         "magnitude": [size],
     }
+    signs = ca.vertcat(SX(0, 1), *[robot.signs for robot in program.robots])
+    if signs.numel():
+        outputs["signs"] = [signs]
     if loops:
         del outputs["limits"]
         outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T.nz[:]]

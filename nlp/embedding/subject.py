@@ -9,15 +9,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import frozen_vector
+from ...models import FloatArray, frozen_vector
 from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
+from ..certificate.standardform import is_in_home_mode
 from ..errors import CaseError
-from ..program.formulation import formulate, formulate_weighted
+from ..program.formulation import formulate, formulate_weighted, scaled_weights
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
-from ..solver.compromise import scale_weights
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
@@ -27,15 +27,32 @@ _MOST_SHOWN = 8
 
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
+#: Size of a bound that is none, in tables of C.
+NO_BOUND = 1e300
 #: Digits of numbers that come from a solve: few enough to be the same on every machine.
 _DIGITS = 9
 
 
 class Subject(NamedTuple):
-    """A program, and its optimal value; None where the search ended at no optimum."""
+    """A program, and its optimal value; None where the search ended at no optimum, or in another working mode than home's."""
 
     nlp: Nlp
     optimum: float | None
+
+
+class Bounds(NamedTuple):
+    """Bounds (n,) of variables."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+
+def bounds_in_c(nlp: Nlp) -> Bounds:
+    """Return the bounds of a program's variables in C, where a level has none: it follows from the task, which may change."""
+    lower, upper, epigraph = np.array(nlp.lower), np.array(nlp.upper), nlp.program.places.epigraph
+    if epigraph is not None:
+        lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND
+    return Bounds(lower, upper)
 
 
 def find_subject(case: Case) -> Subject:
@@ -54,9 +71,10 @@ def find_subject(case: Case) -> Subject:
     _check_pairs(formulate(case))
     if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
         several = len(case.tasks) > 1
-        nlp = formulate_weighted(case, scale_weights(case).values) if several else formulate(case)
+        nlp = formulate_weighted(case, scaled_weights(case)) if several else formulate(case)
         own = solve_program(nlp, case.search)
-        return Subject(with_all_pairs(own.nlp), own.F if own.status is Status.OPTIMAL else None)
+        is_known = own.status is Status.OPTIMAL and is_in_home_mode(own.nlp, own.x) is not False
+        return Subject(with_all_pairs(own.nlp), own.F if is_known else None)
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:

@@ -26,7 +26,8 @@ def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
 
     A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
     search: it judges one point in each iteration, and one at the end of each part, of which it has one for each scale
-    of F and for each feasible point found. Before the first of them it evaluates once to scale the constraints.
+    of F and for each feasible point found. Before the first of them it evaluates once to scale the constraints,
+    and to set the level of a worst case, which it sets again after each search for a feasible point.
 
     Args:
         n: number of variables.
@@ -34,7 +35,7 @@ def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
         searches: largest number of searches of a solve.
     """
     parts = _ROUNDS + _RESTORES
-    by_iteration, by_search = _DERIVATIVES, 1 + _TRIALS + _DERIVATIVES * parts
+    by_iteration, by_search = _DERIVATIVES, 1 + _RESTORES + _TRIALS + _DERIVATIVES * parts
     programs = len(_PARTS) + 1
     passes = 20 * (2 * (n + c) + 5)
     iterations = searches * _ITERATIONS

@@ -6,6 +6,10 @@ the joints, dimensions and pose move along a straight line to those of the point
 steps keeps the loops closed. Where the line leaves the poses that the robot can take, the pose is the nearest one.
 Assemblies and modes meet at singularities of the loop equations, so the smallest singular values of their derivatives
 say how near the path comes to one.
+
+The case may have another unit of length than the robot's own numbers, and a robot of another size has the same
+assemblies. So the path leads from home to the dimensions and the pose made smaller, so that the lengths have the size
+of the robot's own.
 """
 
 from __future__ import annotations
@@ -41,6 +45,8 @@ _LARGE = 0.05
 _HEAVY = 1e-3
 #: Largest residual of closed loops; equations are of order 1.
 _CLOSED = 1e-10
+#: Largest residual at home of a robot of another size: rounding of its dimensions.
+_SIMILAR = 1e-7
 #: Singular values below this part of the largest are zero: such a loop moves by itself also at home.
 _ZERO = 1e-9
 #: A path is near a singularity where a singular value falls below this part of that at home.
@@ -169,6 +175,9 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
     path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
     start = np.concatenate([np.zeros(3), model.home])
+    given, factor = parameters, path.factor(parameters)
+    parameters = np.where(path.is_length, parameters / factor, parameters)
+    pose = np.concatenate([pose[:3], pose[3:] / factor])
     at = np.concatenate([start, np.zeros(len(model.unknowns))])
     at_home = path.singular_values(at, dimensions)
     regular = at_home > _ZERO
@@ -190,7 +199,7 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
         at, done = closed, part
         step = 2 * step if change < _LARGE / 4 else step
         nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
-    return at[6:] * _sizes_of_unknowns(model, parameters), nearness
+    return at[6:] * _sizes_of_unknowns(model, given), nearness
 
 
 @lru_cache(maxsize=4)
@@ -209,6 +218,7 @@ class _Path:
 
     Attributes:
         scale: (6 + u,) size of each number: a length of the robot's for positions, 1 for the others.
+        is_length: (k,) whether each component of the parameters is a length.
     """
 
     def __init__(self, model: Model) -> None:
@@ -227,6 +237,23 @@ class _Path:
         self._kernel = Kernel(ca.Function("path", [z, own.parameters], outputs), tuple_of)
         self.scale = np.ones(z.numel())
         self.scale[3:6] = _size(model)
+        self._home = np.concatenate([np.zeros(3), model.home, np.zeros(len(model.unknowns))])
+        self._typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
+        lengths = [[item.dimension is Dimension.LENGTH] * len(item.typical) for item in model.parameters]
+        self.is_length = np.concatenate([np.zeros(0, dtype=bool), *lengths])
+
+    def factor(self, parameters: FloatArray) -> float:
+        """Return by what the lengths of a robot with parameters (k,) are larger than its own at home.
+
+        It is 1 for a robot file that has lengths beside its dimensions: its home is none at another size.
+        """
+        sizes = [float(np.linalg.norm(each[self.is_length])) for each in (parameters, self._typical)]
+        if not min(sizes) > 0:
+            return 1.0
+        factor = sizes[0] / sizes[1]
+        home, typical = self._home.copy(), np.where(self.is_length, factor * self._typical, self._typical)
+        home[3:6] *= factor
+        return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
         """Return the smallest singular values (2,) of the derivatives by unknowns alone, and with the pose."""

@@ -9,15 +9,37 @@ from __future__ import annotations
 import numpy as np
 
 from ...models import FloatArray
+from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from .assembly import unknowns_from_home
 from .kkt import close_equations
-from .state import evaluate
+from .state import CLOSED, evaluate, loops_are_closed
 
 
 def closed_start(nlp: Nlp) -> FloatArray:
     """Return the first starting point (n,) of a program, with the robot's loops closed along a path from home."""
     return close_equations(nlp, _with_unknowns_from_home(nlp, nlp.start))
+
+
+def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
+    """Return the point with a robot's dimensions and pose, and its joints as :func:`closed_start` has them there.
+
+    Args:
+        nlp: the program.
+        x: (n,) point whose internal unknowns do not count.
+
+    Returns:
+        (n,) the point; None where the program's conditions do not hold there, home's working mode among them.
+    """
+    own, target = list(nlp.program.places.inner), x.copy()
+    target[own] = nlp.start[own]
+    try:
+        found = close_equations(nlp, _with_unknowns_from_home(nlp, target), in_place=True)
+    except EvaluationError:
+        return None
+    g = nlp.evaluate(found).g
+    holds = (g >= nlp.g_lower - CLOSED) & (g <= nlp.g_upper + CLOSED)
+    return found if bool(holds.all()) and loops_are_closed(nlp, found) else None
 
 
 def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:

@@ -293,7 +293,7 @@ def _newton_step(
     return None
 
 
-def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
+def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> FloatArray:
     """Return the point, nearest to the given one to first order, at which the program's equations hold.
 
     Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
@@ -302,6 +302,7 @@ def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
     Args:
         nlp: the program.
         x: (n,) the point.
+        in_place: whether nothing but internal unknowns may move.
 
     Returns:
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
@@ -311,7 +312,7 @@ def close_equations(nlp: Nlp, x: FloatArray) -> FloatArray:
     if not len(rows):
         return start.x
     at = start
-    for movable in _movable(nlp):
+    for movable in [list(nlp.program.places.inner)] if in_place else _movable(nlp):
         at = start
         for _ in range(_NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS):
             if np.max(np.abs(at.residual)) <= _ROUNDING or not at.is_defined:

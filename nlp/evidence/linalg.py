@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...models import FloatArray
+from ...models.arrays import first_largest
 
 #: An entry of a basis below this part of the largest is rounding error.
 _NEGLIGIBLE = 1e-9
@@ -62,7 +63,8 @@ def echelon_basis(vectors: FloatArray) -> FloatArray:
         rest = np.abs(rows[done:])
         if rest.max() <= _NEGLIGIBLE:
             break
-        i, j = divmod(int(np.argmax(rest)), rows.shape[1])
+        # The first of equally large entries, so that rounding does not choose among them.
+        i, j = divmod(int(first_largest(rest.ravel())), rows.shape[1])
         rows[[done, done + i]] = rows[[done + i, done]]
         rows[done] /= rows[done, j]
         for other in range(len(rows)):
@@ -70,5 +72,5 @@ def echelon_basis(vectors: FloatArray) -> FloatArray:
                 rows[other] -= rows[other, j] * rows[done]
         done += 1
     rows = rows[:done]
-    rows = np.array([row / row[int(np.argmax(np.abs(row)))] for row in rows]).reshape(done, vectors.shape[1])
+    rows = np.array([row / row[first_largest(np.abs(row))] for row in rows]).reshape(done, vectors.shape[1])
     return np.where(np.abs(rows) > _NEGLIGIBLE, rows, 0.0)

@@ -2,7 +2,7 @@
 
 With ``C`` the wrenches that do no work in the actuated joints, the platform of a robot with free actuators has ``6 -
 rank C`` freedoms, and can make a twist where ``C`` does no work in it. The rates of a limb's actuators for a twist are
-those that leave least of the motion that the limb resists: the least squares solution of ``r = sum rho_a qdot_a``.
+those that leave least of the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models import FloatArray, Model, constraint_rows, rank_of_rows
+from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ..program.nlp import Nlp
-from .singularities import DEPENDENT, Singularity, SingularityKind, limb_singularities, platform_singularities
+from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities
 from .state import RobotState
 
 #: A twist is feasible where the constraints carry less than this part of F's size: the rates are then below 1e-6.
@@ -38,7 +38,7 @@ class Mobility:
         freedoms: of the platform with free actuators.
         constraint_rank: rank of the constraints.
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
-            actuator cannot drive the platform.
+            actuator cannot drive the platform, and not a number where the motion does not determine it.
         constrained: part of F that the constraints carry, 0 to 1; 0 where the platform can make the motion.
         parts: actuation and constraint in F, by limb.
         singularities: all that were found.
@@ -65,16 +65,27 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     if model.generic is None:
         return None
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
-    J, screws, length = numbers.jacobian, numbers.actuators, nlp.case.characteristic_length
+    J, length = numbers.jacobian, nlp.case.characteristic_length
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
-    constraints = constraint_rows(model, J, screws)
+    constraints = constraint_rows(model, numbers.velocities, state.position)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
-    rates, parts = _actuator_rates(model, J, screws, numbers.rates[:, 0])
+    drives = {limb: limb_drive(model, numbers.velocities, state.position, limb) for limb in model.limbs}
+    rates = dict.fromkeys([each.name for each in model.actuators], float("inf"))
+    parts: dict[str, LimbPart] = {}
+    for limb, (rows, actuators, drive) in drives.items():
+        resisted = numbers.rates[rows, 0]
+        moved = drive.driven_part(resisted)
+        parts[limb] = LimbPart(float(moved @ moved), float(np.sum((resisted - moved) ** 2)))
+        rates |= {
+            model.actuators[k].name: float(rate) for k, rate in zip(actuators, drive.rates(resisted), strict=True)
+        }
     left = sum(part.constraint for part in parts.values())
     is_feasible = left <= _FEASIBLE * state.size
     if is_feasible:  # what is left is rounding
         parts = {limb: LimbPart(part.actuation, 0.0) for limb, part in parts.items()}
     found = limb_singularities(nlp, x, state, pose)
+    if not found:
+        found = _idle_limb(drives, model.generic)
     # The wrenches of a limb whose passive joints are dependent are not those of its model, so J says nothing.
     if all(each.kind is not SingularityKind.PASSIVE for each in found):
         generic = model.generic.constraints, model.generic.jacobian
@@ -91,24 +102,12 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     )
 
 
-def _actuator_rates(
-    model: Model, J: FloatArray, screws: FloatArray, rates: FloatArray
-) -> tuple[dict[str, float], dict[str, LimbPart]]:
-    """Return the rate of each actuator by name, and the parts of F of each limb."""
-    found: dict[str, float] = {}
-    parts: dict[str, LimbPart] = {}
-    for limb in model.limbs:
-        rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
-        own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
-        driven = J[rows] @ np.vstack([screws[3:, own], screws[:3, own]])
-        values: FloatArray = np.zeros(len(own))
-        residual, resisted = rates[rows], np.linalg.norm(driven, axis=0)
-        zero = DEPENDENT * float(np.abs(J[rows]).max())
-        if own and float(np.linalg.norm(driven)) > zero:
-            values = np.asarray(np.linalg.lstsq(driven, rates[rows], rcond=DEPENDENT)[0], dtype=np.float64)
-            residual = rates[rows] - driven @ values
-        moved = rates[rows] - residual
-        parts[limb] = LimbPart(float(moved @ moved), float(residual @ residual))
-        for k, value, size in zip(own, values, resisted, strict=True):
-            found[model.actuators[k].name] = float(value) if size > zero else float("inf")
-    return {each.name: found.get(each.name, float("inf")) for each in model.actuators}, parts
+def _idle_limb(drives: Mapping[str, LimbDrive], generic: GenericRanks) -> list[Singularity]:
+    """Return the serial singularity of a limb whose actuators have more rates without a motion than elsewhere.
+
+    The joints of each of its members alone may be independent.
+    """
+    idle = {limb: each.drive.idle.shape[1] for limb, each in drives.items() if each.drive.idle.shape[1]}
+    if sum(idle.values()) <= generic.idle:
+        return []
+    return [Singularity(SingularityKind.SERIAL, next(iter(idle)) if len(idle) == 1 else None)]

@@ -20,6 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...models import FloatArray, frozen_array
+from ...models.basis import settled_basis
+
+#: Singular values that differ by less than this part of the largest are the same: rounding.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +75,13 @@ def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
 def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
     """Return the right singular vectors of a matrix (m, 3) as rows (3, 3).
 
-    Singular values ascend; the largest component of each vector is positive.
+    Singular values ascend; the largest component of each vector is positive. Those of equal singular values are a basis
+    that follows from their space alone.
     """
-    rows = np.linalg.svd(matrix)[2][::-1]
-    lead = rows[np.arange(3), np.argmax(np.abs(rows), axis=1)]
-    return np.asarray(rows * np.sign(lead)[:, None], dtype=np.float64)
+    rows, values = np.linalg.svd(matrix)[2][::-1], np.zeros(3)
+    values[: len(matrix)] = np.linalg.svd(matrix, compute_uv=False)[: len(matrix)]
+    apart = np.flatnonzero(np.diff(values[::-1]) > _SAME * values[0]) + 1
+    return np.vstack([settled_basis(each) for each in np.split(rows, apart)])
 
 
 def _principal_motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:

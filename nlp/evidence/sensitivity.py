@@ -3,16 +3,38 @@
 By the envelope theorem the derivative of the optimal F with respect to an argument is that of the Lagrangian, at the
 optimum and with its multipliers held fixed, without a further solution (A. V. Fiacco, *Introduction to Sensitivity and
 Stability Analysis in Nonlinear Programming*, 1983, chapter 3). The theorem requires that the normals of the active
-sides are independent and that the second-order conditions hold strictly.
+sides are independent and that the second-order conditions hold strictly. Where the normals are dependent, there is a
+derivative only if it is the same for all multipliers: if the variables can follow the argument, to first order, so that
+all active sides stay active. And there is none where the loops of the robot close at one value of the argument only.
 """
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from casadi import SX
 
 from ...models import Dimension, FloatArray
 from ..program.nlp import Nlp
 from .kkt import constraint_weights, linearise, multipliers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Part of a vector's length by which it may be outside of a space that it lies in: rounding of derivatives. Singular
+#: values below this part of the largest are zero, and so are vectors below the second part of the longest.
+_OUTSIDE, _ZERO = 1e-7, 1e-12
+
+
+class Hindrance(enum.Enum):
+    """Why the optimal F has no derivative by a fixed number."""
+
+    NO_CHOICE = "the robot has no choice of it"
+    CORNER = "F has a corner there"
 
 
 @dataclass(frozen=True)
@@ -22,14 +44,16 @@ class Sensitivity:
     Attributes:
         name: name of the number.
         value: the number, radians for angles.
-        derivative: derivative of the optimal F, per radian for angles.
+        derivative: derivative of the optimal F, per radian for angles; None where there is none.
         dimension: length, angle or plain number.
+        hindrance: why there is no derivative; None where there is one.
     """
 
     name: str
     value: float
-    derivative: float
+    derivative: float | None
     dimension: Dimension
+    hindrance: Hindrance | None = None
 
 
 def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
@@ -43,10 +67,46 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
     if not places:
         return []
     at = linearise(nlp, x)
-    mu, _ = multipliers(at, at.active())
+    active = at.active()
+    mu, _ = multipliers(at, active)
     gradient, rows = nlp.program.kernels.argument_derivatives(x, nlp.arguments)
     whole = gradient.ravel() + nlp.sign * nlp.objective_scale * (constraint_weights(nlp, at, mu) @ rows)
-    arguments = nlp.program.arguments
-    return [
-        Sensitivity(arguments[k].name, float(nlp.arguments[k]), float(whole[k]), arguments[k].dimension) for k in places
-    ]
+    sides = [j for j in active if nlp.sides.sides[j].constraint is not None]
+    bounds = [j for j in active if j not in sides]
+    by_argument = (nlp.sides.sign * at.per_unit)[sides, None] * rows[nlp.sides.place[sides] - nlp.n]
+    moved = np.vstack([by_argument, np.zeros((len(bounds), rows.shape[1]))])
+    cornered = ~_can_follow(at.normals[[*sides, *bounds]], moved)
+    without_choice = ~_can_follow(*_loop_derivatives(nlp, x))
+    arguments, found = nlp.program.arguments, []
+    for k in places:
+        hindrance = Hindrance.NO_CHOICE if without_choice[k] else Hindrance.CORNER if cornered[k] else None
+        derivative = float(whole[k]) if hindrance is None else None
+        number = float(nlp.arguments[k])
+        found.append(Sensitivity(arguments[k].name, number, derivative, arguments[k].dimension, hindrance))
+    return found
+
+
+def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the variables can follow each argument, (k,), so that some functions keep their values.
+
+    Args:
+        by_variable: (m, n) derivatives of the functions by the variables.
+        by_argument: (m, k) derivatives by the arguments.
+    """
+    if not by_variable.size:
+        return np.asarray(~by_argument.any(axis=0), dtype=np.bool_)
+    steps = np.linalg.lstsq(by_variable, by_argument, rcond=_OUTSIDE)[0]
+    left, whole = (np.linalg.norm(each, axis=0) for each in (by_argument - by_variable @ steps, by_argument))
+    return np.asarray(left <= np.maximum(_OUTSIDE * whole, _ZERO * whole.max(initial=0.0)), dtype=np.bool_)
+
+
+def _loop_derivatives(nlp: Nlp, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of all loop equations of the robot by scaled variables (m, n) and by the arguments (m, k).
+
+    The program has those alone that are independent at the numbers that the case fixes.
+    """
+    program = nlp.program
+    loops = ca.vertcat(SX(0, 1), *[robot.loops for robot in program.robots])
+    outputs = [ca.densify(ca.jacobian(loops, each)) for each in (program.x, program.p)]
+    by_variable, by_argument = ca.Function("loops", [program.x, program.p], outputs)(x, nlp.arguments)
+    return by_variable.full() * nlp.scale, by_argument.full()

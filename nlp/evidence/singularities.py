@@ -4,7 +4,7 @@ Ranks at the point are compared with those at almost all dimensions and closed c
 
 * passive: the passive screws of a limb have a smaller rank, so that its wrenches ``W`` gain a dimension and F jumps;
 * serial: all screws of a limb have a smaller rank, so that an actuator does no work in any wrench of the limb, and the
-  platform loses a freedom;
+  platform loses a freedom; or those of each of its members keep their ranks, but the actuators can move without it;
 * constraint: all wrenches that do no work in the actuated joints have a smaller rank;
 * actuation: all wrenches have a smaller rank, so that the platform moves with every actuator locked.
 

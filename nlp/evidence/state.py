@@ -17,6 +17,7 @@ from ...models import (
     reason_for_zero_row,
     reporting_matrix,
 )
+from ...models.basis import settled_basis
 from ..case.case import Case
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
@@ -45,9 +46,11 @@ class RobotState:
         rates: (m,) work rates ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
         F: ``sum(rates^2)``.
         size: F without cancellation; F counts as zero when it is small in comparison.
-        singular_values: (min(m, 6),) singular values of ``jacobian``, largest first.
-        rank: rank of the Jacobian with moments about the platform's origin, divided by their longest arm.
-        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form.
+        singular_values: (min(m, 6),) singular values of the Jacobian with moments about the platform's origin, divided
+            by their longest arm, largest first: plain numbers, the same in every unit of length.
+        rank: number of singular values that are not zero.
+        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form; the
+            largest component of each angular velocity is 1 or -1, or of the velocity of a translation.
         quantities: the model's quantities by name, each (n,); radians for angles.
     """
 
@@ -115,14 +118,13 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
     if not all(np.isfinite(each).all() for each in (numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
-    reporting = reporting_matrix(model, numbers.jacobian, numbers.actuators)
+    reporting = reporting_matrix(model, numbers.velocities, position)
     jacobian, rates = reporting @ numbers.jacobian, reporting @ numbers.rates
     axis, angle = axis_angle_from_matrix(rotation)
     stated, step = _pose_displacements(case)[pose]
     if step.is_identity:
         axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
-    rank, free_twists = _rank_and_free_twists(jacobian, position.ravel())
-    singular_values = np.linalg.svd(jacobian, compute_uv=False)
+    rank, free_twists, singular_values = _rank_and_free_twists(jacobian, position.ravel())
     sizes = [len(parameter.typical) for parameter in model.parameters]
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     return RobotState(
@@ -194,8 +196,8 @@ def _pose_displacements(case: Case) -> list[tuple[int, Displacement]]:
     return [(index, step) for index, pose in enumerate(case.poses) for step in pose.displacements]
 
 
-def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray]:
-    """Return the rank and the free twists (6 - rank, 6) of J.
+def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray, FloatArray]:
+    """Return the rank, the free twists (6 - rank, 6) and the singular values of J.
 
     Moments are taken about the platform's origin and divided by their longest arm.
 
@@ -209,6 +211,10 @@ def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int
     resistance = np.vstack([moments, forces]).T
     _, values, rows = np.linalg.svd(resistance)
     rank = int(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[0]))
-    null = rows[rank:] * np.array([1 / arm] * 3 + [1.0] * 3)
-    null[:, 3:] -= np.cross(null[:, :3], centre)
-    return rank, echelon_basis(null) if len(null) else np.zeros((0, 6))
+    null = settled_basis(rows[rank:])
+    null[:, 3:] -= np.cross(null[:, :3], centre / arm)
+    free = echelon_basis(null) if len(null) else np.zeros((0, 6))
+    # Twists of unit rotation about an axis, or else of unit translation, in every unit of length.
+    free[:, 3:] *= arm
+    parts = np.where(free[:, :3].any(axis=1, keepdims=True), free[:, :3], free[:, 3:])
+    return rank, free / np.abs(parts).max(axis=1, keepdims=True, initial=0.0), values

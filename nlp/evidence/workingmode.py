@@ -23,7 +23,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, Model, Substitution
+from ...models import FloatArray, Model, Substitution, driven
 from ..program.kernel import Kernel, tuple_of
 from ..program.nlp import Nlp
 
@@ -101,11 +101,10 @@ class _Modes:
         paths = {each.limb: each for each in model.joint_screws if not each.is_nested}
         for limb in model.limbs:
             rows = [row for row in model.wrenches if row.limb == limb]
-            driving = [each.screw for each in model.actuators if each.limb == limb]
+            driving = [each for each in model.actuators if each.limb == limb]
             path = paths.get(limb)
             if rows and driving:
-                works = [ca.horzcat(*[row.rate(screw) / ca.sqrt(row.square) for screw in driving]) for row in rows]
-                self._add(limb, ca.vertcat(*works), None, outputs)
+                self._add(limb, driven(rows, driving, SX(1)), None, outputs)
             elif driving and path is not None:
                 passive = [k for k in range(path.all.shape[1]) if k not in path.driven]
                 if len(passive) == path.passive_rank and path.all.shape[1] == path.all_rank:

@@ -26,7 +26,7 @@ from ..case.settings import Search
 from ..certificate.branchandbound import certify_program
 from ..certificate.certificate import Certificate
 from ..errors import EvaluationError
-from ..interruption import is_requested
+from ..interruption import Milestone, is_requested, one_call, reached
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
 from .goals import Goal
@@ -78,6 +78,7 @@ class Front:
     seconds: float
 
 
+@one_call()
 def find_front(
     case: Case,
     goals: tuple[Goal, ...],
@@ -113,6 +114,7 @@ def find_front(
     size = np.ptp([end.values for end in ends], axis=0)
     size = np.where(size > 0, size, 1.0)
     ends = [builder.polished(end, size) for end in ends]
+    reached(Milestone.POINT)
     say = progress if progress is not None else _say_nothing
     if len(goals) == 2:
         found, gaps = _spread_between(builder, ends, size, count, say)
@@ -139,6 +141,8 @@ def _spread_between(
             break
         middle = builder.between(found[pair], found[pair + 1], size)
         if middle is None:
+            if is_requested():  # an interrupted search shows no gap
+                break
             closed.add((id(found[pair]), id(found[pair + 1])))
             continue
         found = _undominated([*found, middle], builder.goals, size)

@@ -12,7 +12,7 @@ from itertools import combinations
 from pathlib import Path
 
 from ..errors import InputError
-from ..interruption import WRITING
+from ..interruption import WRITING, unfinished, wrote
 from ..system.reading import read_limited, text_of_bytes
 
 #: Name of the file that lists what was written into a folder; only a folder with it is written into again.
@@ -31,7 +31,9 @@ def write_text(target: str, text: str) -> None:
         InputError: the file cannot be written.
     """
     if target == "-":
-        sys.stdout.write(text)
+        with WRITING:
+            sys.stdout.write(text)
+            sys.stdout.flush()
     else:
         write_bytes(target, text.encode("utf-8"))
 
@@ -50,6 +52,7 @@ def write_bytes(target: str, content: bytes) -> None:
             path.write_bytes(content)
         else:
             _replace(path.resolve(), content)
+        wrote(target)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 
@@ -67,12 +70,14 @@ def write_whole(target: str) -> Iterator[Path]:
     waiting = path.with_name(f".screwsynth.{path.name}")
     try:
         waiting.unlink(missing_ok=True)
-        try:
-            yield waiting
-            waiting.replace(path)
-        except BaseException:
-            waiting.unlink(missing_ok=True)
-            raise
+        with unfinished(waiting):
+            try:
+                yield waiting
+                waiting.replace(path)
+            except BaseException:
+                waiting.unlink(missing_ok=True)
+                raise
+        wrote(target)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 
@@ -103,6 +108,7 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
                 (Path(waiting) / name).write_text(text, encoding="utf-8")
             for name in every:
                 (Path(waiting) / name).replace(folder / name)
+        wrote(target)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
 
@@ -221,6 +227,12 @@ def _replace(path: Path, content: bytes) -> None:
 def _write_and_rename(path: Path, content: bytes) -> None:
     """Write a temporary file and give it the name of the result."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    with unfinished(Path(temporary)):
+        _fill_and_rename(handle, temporary, path, content)
+
+
+def _fill_and_rename(handle: int, temporary: str, path: Path, content: bytes) -> None:
+    """Fill a temporary file and give it the name of the result."""
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)

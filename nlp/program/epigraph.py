@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from operator import mul
 from typing import TypeVar
@@ -23,7 +24,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Dimension, FloatArray
+from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
 from ..case.limits.form import Call, Form
@@ -37,8 +38,11 @@ from .sampling import starting_points
 
 #: Number of points at which the size of F over several poses is evaluated.
 _SIZE_POINTS = 32
-#: Upper bound of the level of a worst pose, as a multiple of that size: far above any F.
+#: Upper bound of the level of a worst pose, as a multiple of that size: mostly above any F.
 _LEVEL_BOUND = 2.0
+#: Distance of a level from its bound, in parts of their range, at which the bound may hold the level back; and by what
+#: the range then grows.
+_AT_BOUND, _WIDER = 1e-6, 4.0
 
 Number = TypeVar("Number", SX, float, FloatArray)
 
@@ -64,7 +68,8 @@ def worst_value(values: Sequence[float] | FloatArray, sense: Sense) -> float:
 def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     """Return the program of the best level that F keeps at every pose.
 
-    The bounds of the level come from the size of F without cancellation, which no F reaches.
+    The bounds of the level come from the size of F without cancellation at a few points. Where F has other values, a
+    search widens them: :func:`with_wider_level`.
 
     Args:
         layout: a case with one task and several poses.
@@ -151,6 +156,24 @@ def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
     moved = np.array(x)
     moved[epigraph.level] = worst_value(values, nlp.sense)
     return moved
+
+
+def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
+    """Return a program with wider bounds of its level where they hold the level back at a point (n,); else None.
+
+    The bounds are estimates, and no limits of the case: a level on its bound is no answer.
+    """
+    epigraph = nlp.program.places.epigraph
+    if epigraph is None or nlp.size is not None:
+        return None
+    k = epigraph.level
+    level, way = float(with_exact_level(nlp, x)[k]), _AT_BOUND * (nlp.upper[k] - nlp.lower[k])
+    is_inside = nlp.lower[k] + way < min(level, x[k]) and max(level, x[k]) < nlp.upper[k] - way
+    if is_inside or not math.isfinite(level):
+        return None
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    lower[k], upper[k] = _WIDER * min(lower[k], level), _WIDER * max(upper[k], level)
+    return replace(nlp, lower=frozen_vector(lower), upper=frozen_vector(upper))
 
 
 def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:

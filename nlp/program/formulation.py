@@ -65,6 +65,13 @@ def formulate_each(case: Case) -> list[Nlp]:
     return programs
 
 
+def scaled_weights(case: Case) -> list[float]:
+    """Return the tasks' weights scaled to sum to the number of tasks, as equation 15 needs them."""
+    given = [task.weight for task in case.tasks]
+    total, n = sum(given), len(given)
+    return given if abs(total - n) <= 1e-12 * n else [weight * n / total for weight in given]
+
+
 def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
     """Return the program of the weighted sum of the tasks' objectives.
 

@@ -13,19 +13,18 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, RobotInstance
+from ...models import RobotInstance
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.pairs import PairFamily
 from ..case.pose import Free
 from ..errors import CaseError
+from .repeated import without_repeated
 
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
 _ALL_PAIRS = 3
-#: Relative difference of two limits that are the same: rounding.
-_SAME = 1e-12
 #: How well a limit that depends on fixed numbers alone must hold: they are written with a dozen digits.
 _ROUNDING = 1e-9
 
@@ -69,15 +68,14 @@ def limit_constraints(
     """
     if not case.limits:
         return LimitConstraints((), ())
-    points = _points(numbers.bounds)
     few, deferred = _sorted_families(list(_families(case, robots, named)), numbers)
-    limits = _without_repeated(list(_constraints(case, robots, named, few)), numbers, points)
+    limits = without_repeated(list(_constraints(case, robots, named, few)), numbers.x, numbers.p)
     if not limits:
         return LimitConstraints((), (), deferred)
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
     x, p = numbers.x, numbers.p
     free = ca.which_depends(expressions, x, 1, True) if numbers.bounds else [False] * len(limits)
-    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(points[0], numbers.values).full().ravel()
+    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(0, numbers.values).full().ravel()
     varying: list[BoundedConstraint] = []
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
@@ -146,35 +144,3 @@ def _constraints(
         for limit in limits:
             for item in limit.at_pose(pose):
                 yield replace(item, constraint=replace(item.constraint, pose=k))
-
-
-def _without_repeated(
-    limits: Sequence[BoundedConstraint], numbers: ProgramNumbers, points: FloatArray
-) -> list[BoundedConstraint]:
-    """Return the limits without those that only repeat another.
-
-    Symmetric robots have limits that are the same function of the variables and the arguments, and would share one
-    multiplier. Two limits of one key are the same where they agree, with the arguments' values, at every one of a few
-    points (k, n).
-    """
-    if not limits:
-        return []
-    constraints = [item.constraint for item in limits]
-    measured = [each.expression if each.exact is None else each.exact for each in constraints]
-    function = ca.Function("limits", [numbers.x, numbers.p], [ca.densify(ca.vertcat(*measured))])
-    columns = np.column_stack([function(point, numbers.values).full().ravel() for point in points])
-    kept: list[int] = []
-    alike: dict[tuple[str, str], list[int]] = {}
-    for i, row in enumerate(columns):
-        like = alike.setdefault(constraints[i].keys, [])
-        if not np.isclose(columns[like], row, rtol=_SAME, atol=0.0).all(axis=1).any():
-            kept.append(i)
-            like.append(i)
-    return [limits[i] for i in kept]
-
-
-def _points(bounds: Sequence[Free]) -> FloatArray:
-    """Return points (3, n) of the box that no symmetry singles out."""
-    parts = np.modf(np.outer(np.arange(1, 4), np.sqrt(2.0 + np.arange(len(bounds)))))[0]
-    lower, upper = np.array([[bound.lower, bound.upper] for bound in bounds]).reshape(-1, 2).T
-    return np.asarray(lower + (0.1 + 0.8 * parts) * (upper - lower), dtype=np.float64)

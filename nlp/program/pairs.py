@@ -11,20 +11,15 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 
 from ...models import FloatArray, frozen_vector
 from ..case.limits.constraint import BoundedConstraint
 from .nlp import Nlp, PairPlace
-from .sampling import starting_points
+from .repeated import without_repeated
 
 #: Violation of a pair, as a part of the largest value of its family, above which it is no rounding of the values.
 _ROUNDING = 1e-13
-#: Relative difference of two constraints that are the same: rounding.
-_SAME = 1e-12
-#: Number of points at which constraints are compared, and one more: the first may be one that a symmetry singles out.
-_POINTS = 4
 
 
 def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
@@ -43,11 +38,12 @@ def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
 
     Two pairs of a symmetric robot may be the same function, and become one constraint.
     """
-    known = set(nlp.pairs)
-    fresh = [place for place in dict.fromkeys(places) if place not in known]
+    fresh = [place for place in dict.fromkeys(places) if place not in set(nlp.pairs)]
     if not fresh:
         return nlp
-    added = _without_repeated(nlp, [item for place in fresh for item in pair_constraints(nlp, place)])
+    known = nlp.program.constraints[len(nlp.program.constraints) - nlp.pair_count :]
+    items = [item for place in fresh for item in pair_constraints(nlp, place)]
+    added = without_repeated(items, nlp.program.x, nlp.program.p, known)
     return replace(nlp.with_constraints(added), pairs=(*nlp.pairs, *fresh), pair_count=nlp.pair_count + len(added))
 
 
@@ -114,23 +110,3 @@ def _values(nlp: Nlp, x: FloatArray) -> list[FloatArray]:
         return []
     sizes = [int(family.values.numel()) for family in nlp.families]
     return np.split(nlp.family_values(x, nlp.arguments).ravel(), np.cumsum(sizes)[:-1])
-
-
-def _without_repeated(nlp: Nlp, added: Sequence[BoundedConstraint]) -> list[BoundedConstraint]:
-    """Return new constraints on pairs without those that only repeat another or a pair that the program has."""
-    known = nlp.program.constraints[len(nlp.program.constraints) - nlp.pair_count :]
-    constraints = [*known, *(item.constraint for item in added)]
-    expressions = ca.densify(ca.vertcat(*[each.expression for each in constraints]))
-    function = ca.Function("pairs", [nlp.program.x, nlp.program.p], [expressions])
-    points = starting_points(nlp, _POINTS, 0)[1:]
-    rows = np.column_stack([function(x, nlp.arguments).full().ravel() for x in points])
-    alike: dict[tuple[str, str], list[int]] = {}
-    kept = []
-    for i, (each, row) in enumerate(zip(constraints, rows, strict=True)):
-        like = alike.setdefault(each.keys, [])
-        if i >= len(known) and np.isclose(rows[like], row, rtol=_SAME, atol=0.0).all(axis=1).any():
-            continue
-        like.append(i)
-        if i >= len(known):
-            kept.append(added[i - len(known)])
-    return kept

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ...models import FloatArray, Model, RobotInstance, Substitution
+from ...models import FloatArray, Model, RobotInstance, Substitution, Velocities
 from ...models.whole import Whole
 from ..case.limits.constraint import Constraint
 from ..case.limits.form import Call
@@ -58,7 +58,8 @@ class RobotNumbers(NamedTuple):
         squares: (m, 1) squared length of each row's direction.
         magnitude: (tasks, 1) F without cancellation.
         loops: (k, 1) left sides of all the model's loop equations.
-        actuators: (6, a) current unit screws of the model's actuators.
+        driven: (m, a) work rate of each row for a unit rate of each of the model's actuators.
+        relations: (r, a) factors of the actuators' rates in the equations that loops demand of these alone.
         quantities: (n, 1) values of each of the model's quantities, radians for angles.
     """
 
@@ -71,26 +72,20 @@ class RobotNumbers(NamedTuple):
     squares: FloatArray
     magnitude: FloatArray
     loops: FloatArray
-    actuators: FloatArray
+    driven: FloatArray
+    relations: FloatArray
     quantities: tuple[FloatArray, ...]
 
     @classmethod
     def from_outputs(cls, *outputs: FloatArray) -> RobotNumbers:
         """Return the numbers from the outputs of :meth:`Program.robot_state`."""
-        parameters, rotation, position, jacobian, rates, F, squares, magnitude, loops, actuators = outputs[:10]
-        return cls(
-            parameters,
-            rotation,
-            position,
-            jacobian,
-            rates,
-            F,
-            squares,
-            magnitude,
-            loops,
-            actuators,
-            tuple(outputs[10:]),
-        )
+        numbers, quantities = outputs[:11], outputs[11:]
+        return cls._make((*numbers, quantities))
+
+    @property
+    def velocities(self) -> Velocities:
+        """Velocity equations of the platform and the actuators."""
+        return Velocities(self.jacobian, self.driven, self.relations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +161,7 @@ class Program(Whole):
         """Return the function ``(x, p) -> RobotNumbers`` at one of the poses; its last outputs are the quantities."""
         robot = self.robots[pose]
         outputs = [robot.parameters, robot.rotation, robot.position, robot.jacobian, robot.rates, robot.F]
-        outputs += [robot.squares, robot.magnitude, robot.loops, robot.actuators, *robot.quantities]
+        outputs += [robot.squares, robot.magnitude, robot.loops, robot.driven, robot.relations, *robot.quantities]
         return ca.Function("robot_state", [self.x, self.p], [ca.densify(output) for output in outputs])
 
     @cached_property

@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 
 from ..case.task import Sense
 from ..solver.status import Status
+from ..system.strictjson import Size
 from ..workspace.verdict import Outcome
 from .data import CertificateData
-from .jsondata import Absent, JsonObject, Size
+from .jsondata import Absent, JsonObject
 from .parts import UnitsData, VersionsData
 
 
@@ -17,7 +18,8 @@ class ComparedRateData(JsonObject):
     Attributes:
         actuator: its name.
         unit: of the rate, per unit of the task's motion.
-        rate: for the task's motion; null where the actuator cannot drive the platform.
+        rate: for the task's motion; null where the motion does not determine it, because the actuator can move while
+            the platform stands still.
     """
 
     actuator: str

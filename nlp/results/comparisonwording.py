@@ -130,7 +130,7 @@ def _largest_rate(robot: ComparedRobotData) -> str:
     if not rates:
         return ""
     if any(rate.rate is None for rate in rates):
-        return "none drives"
+        return "undetermined"
     largest = max(rates, key=lambda each: abs(each.rate or 0.0))
     # A motion that no actuator drives leaves rounding errors of a size that F tells.
     size = max((math.sqrt(each.F) for each in robot.tasks if each.F is not None), default=0.0)

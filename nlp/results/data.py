@@ -10,7 +10,8 @@ from ..case.task import Method, Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
 from ..solver.status import Status
-from .jsondata import Absent, Inline, JsonObject, Size, Vector
+from ..system.strictjson import Size
+from .jsondata import Absent, Inline, JsonObject, Vector
 from .parts import (
     Bound,
     HeadData,

@@ -5,24 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...models import FloatArray
+from ...models import Dimension, FloatArray, frozen_array
+from ..case.case import Case
 from ..evidence.margins import Margin, margins_of
 from ..evidence.sensitivity import sensitivities
 from ..evidence.tolerance import tolerance_loss
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
-from ..units import Units
+from ..units import rate_unit
 from .jsondata import finite_or_none, vector
 from .parts import JointGradientData, LimitData, MarginData, RelaxationData, SensitivityData, ToleranceData
+from .rounding import NOISE
+
+#: Beginning of the names of constraints on the rates of actuators.
+_RATE = "actuator_rate actuator "
 
 
 def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[MarginData, ...]:
     """Return the margins of a point (n,) in every limit of the case; their costs too where the point is an optimum."""
-    return tuple(_margin(nlp.case.units, row) for row in margins_of(nlp, x, optimal=optimal))
+    return tuple(_margin(nlp.case, row) for row in margins_of(nlp, x, optimal=optimal))
 
 
-def _margin(units: Units, row: Margin) -> MarginData:
+def _margin(case: Case, row: Margin) -> MarginData:
     """Return a margin in the case's units."""
+    units = case.units
     return MarginData(
         name=row.name,
         key=row.key,
@@ -30,11 +36,27 @@ def _margin(units: Units, row: Margin) -> MarginData:
         value=finite_or_none(units.shown(row.value, row.dimension)),
         limit=units.shown(row.limit, row.dimension),
         margin=finite_or_none(units.shown(row.margin, row.dimension)),
-        unit=units.label(row.dimension),
+        unit=unit_of_side(case, row.name, row.dimension),
         active=row.active,
         violated=row.violated,
         cost=None if row.cost is None else units.per_unit(row.cost, row.dimension),
     )
+
+
+def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
+    """Return the unit of a bound's or a limit's number; empty for a plain number.
+
+    Args:
+        case: the case.
+        name: of the variable or the constraint.
+        dimension: of the number; a limit on actuators' rates has one number for angles and lengths.
+    """
+    if not name.startswith(_RATE):
+        return case.units.label(dimension)
+    owners = [each for each in case.model.actuators if name.startswith(f"{_RATE}{each.name}")]
+    kind = max(owners, key=lambda each: len(each.name)).dimension if owners else Dimension.LENGTH
+    tasks = [task for task in case.tasks if f" task {task.name}" in name] or list(case.tasks[:1])
+    return rate_unit(frozen_array(tasks[0].twist, (6,)), case.units, kind)
 
 
 def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
@@ -45,7 +67,10 @@ def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
 
 def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
     """Return one limiting number from all its margins."""
-    least = min(margins, key=lambda row: -math.inf if row.margin is None else row.margin)
+    sizes = [-math.inf if row.margin is None else row.margin for row in margins]
+    # The first of equally near ones: rounding must not choose among legs that are images of each other.
+    near = min(sizes) + NOISE * max(abs(margins[0].limit), abs(margins[0].value or 0.0))
+    least = next(row for row, size in zip(margins, sizes, strict=True) if size <= near)
     costs = [row.cost for row in margins if row.cost is not None]
     return LimitData(
         key=key,
@@ -83,7 +108,8 @@ def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
             name=row.name,
             value=units.shown(row.value, row.dimension),
             unit=units.label(row.dimension),
-            derivative=units.per_unit(row.derivative, row.dimension),
+            derivative=None if row.derivative is None else units.per_unit(row.derivative, row.dimension),
+            hindrance=None if row.hindrance is None else row.hindrance.value,
         )
         for row in sensitivities(nlp, x)
     )

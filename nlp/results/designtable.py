@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...models import Dimension, component_names
 from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
-from ..units import Units
-from .rounding import STATED, listed, number, robot_size, settled, size_of_F
+from ..units import Units, slope_unit
+from .rounding import STATED, TURNED, listed, number, robot_size, settled, size_of_F
 from .text import FEWEST_FOLDED, TextTable
 
 if TYPE_CHECKING:
     from .data import ActiveData, CombinedData, SolveResult
     from .parts import PoseData, RobotData, SensitivityData
 
-#: A rotation by less than this, radians, has no axis that means anything.
-_TURNED = 1e-9
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
 
@@ -88,12 +86,14 @@ class _Reasons:
         if side is not None:
             place = _Place.ACTIVE
             cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
-            why = f"{side.bound}, {cost:.4g} F/{label or 'unit'}"
-        elif fixed is not None:
+            why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
+        elif fixed is not None and fixed.derivative is None:
+            why = f"fixed: {fixed.hindrance}"
+        elif fixed is not None and fixed.derivative is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
             slope = settled(fixed.derivative, self._F / size)
-            why = f"fixed, {f'{slope:+.4g}' if slope else '0'} F/{label or 'unit'}"
+            why = f"fixed, {f'{slope:+.4g}' if slope else '0'} {slope_unit(label)}"
             felt = abs(slope) * size
         return _Row(place, (name, shown, label, between, *((why,) if self.any else ())), felt)
 
@@ -149,7 +149,7 @@ def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_
         for name, value, given in zip(component_names("p", 3), found.position, pose.position, strict=True)
     ]
     angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
-    turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > _TURNED
+    turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > TURNED
     if not is_held and isinstance(angle, Free):
         # The sign of the angle means nothing then: its size is limited.
         angle = Free(*sizes_of_turn(angle))

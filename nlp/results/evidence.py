@@ -9,6 +9,7 @@ from ..certificate.certificate import Certificate
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from .data import ActiveData, CertificateData, OptimalityData
+from .design import unit_of_side
 from .jsondata import finite_or_none, vector
 
 
@@ -28,7 +29,7 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
                 name=side.name,
                 bound=side.bound,
                 value=units.shown(side.value, side.dimension),
-                unit=units.label(side.dimension) or None,
+                unit=unit_of_side(nlp.case, side.name, side.dimension) or None,
                 multiplier=units.per_unit(side.multiplier, side.dimension),
             )
             for side in evidence.active

@@ -13,7 +13,8 @@ class ActuatorData(JsonObject):
     Attributes:
         name: of the actuator: its limb, with a number where the limb has several.
         kind: ``angle`` or ``length``.
-        rate: for the task's motion, radians or length per unit of time; null where it cannot drive the platform.
+        rate: for the task's motion, radians or length per unit of time; null where the motion does not determine it,
+            because the actuator can move while the platform stands still.
     """
 
     name: str

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from ...models import Dimension
 from ..case.case import Case
 from ..units import Units, objective_unit, rate_unit
 from .motionwording import motion_words, wrench_words
@@ -24,21 +25,23 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
     """Yield the rates of the actuators, whether the motion is possible, the freedoms, singularities and assembly."""
     task = robot.task
     if joints.actuators and task is not None:
-        length = rate_unit(task.motion.twist, units)
-        angle = f"rad{length.removeprefix(units.length)}"
         largest = max((abs(each.rate) for each in joints.actuators if each.rate is not None), default=1.0)
         # Where the task moves no actuator, all rates are rounding of the platform's velocity.
         reach = robot_size(robot)
         speed = math.hypot(*task.motion.twist[3:]) + reach * math.hypot(*task.motion.twist[:3])
         sizes = {"length": max(largest, speed), "angle": max(largest, speed / reach)}
-        units_of = {"length": length, "angle": angle}
+        kinds = (Dimension.LENGTH, Dimension.ANGLE)
+        units_of = {kind.value: rate_unit(task.motion.twist, units, kind) for kind in kinds}
         rates = (
-            f"{each.name}: none"
+            f"{each.name}: undetermined"
             if each.rate is None
             else f"{each.name}: {number(each.rate, sizes[each.kind], digits=6, signed=True)} {units_of[each.kind]}"
             for each in joints.actuators
         )
         yield Line(", ".join(rates), label="actuator rates")
+        idle = [each.name for each in joints.actuators if each.rate is None]
+        if idle:
+            yield Line(idle_words(idle), label="note")
     if joints.constrained:
         part = number(100 * joints.constrained, 100.0, digits=3)
         words = f"the platform cannot make the task's motion exactly: constraints carry {part} % of F"
@@ -49,6 +52,13 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
         yield from _singularity_lines(each, robot, units)
     for sentence in joints.assembly:
         yield Line(f"assembly: {sentence}", tone=Tone.CAUTION)
+
+
+def idle_words(names: Sequence[str]) -> str:
+    """Return the sentence about actuators whose rates the motion of the platform does not determine."""
+    rates, who = ("rates of actuators", "they") if len(names) > 1 else ("rate of actuator", "it")
+    words = f"the platform's motion does not determine the {rates} {', '.join(names)}"
+    return f"{words}: {who} can move while the platform stands still"
 
 
 def convention_lines(robot: RobotData) -> Iterator[Line]:

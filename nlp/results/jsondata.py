@@ -8,11 +8,12 @@ short command a thirtieth slower.
 import enum
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, NamedTuple, TypeAlias, TypeVar, dataclass_transform, get_origin
+from typing import Annotated, ClassVar, TypeAlias, TypeVar, dataclass_transform, get_origin
 
 import numpy as np
 
 from ...models import FloatArray
+from ..system.strictjson import Size
 
 _T = TypeVar("_T")
 JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, JsonValue] | None"
@@ -23,12 +24,6 @@ class Mark(enum.Enum):
 
     ABSENT = "left out where it is None"
     INLINE = "its own fields stand in its place; none of them where it is None"
-
-
-class Size(NamedTuple):
-    """Number of entries of a list."""
-
-    entries: int
 
 
 #: A field that is absent from the object where the value is None.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..case.case import Case
 from ..errors import CaseError
+from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.tradeoff import tradeoff
 from .data import CaseResult, SolveResult
@@ -48,6 +49,8 @@ def limit_curves(
         if len(values) > 1:
             starts = min(_STARTS, solution.case.search.starts)
             found = tradeoff(at, values, name=name, starts=starts, jobs=jobs, first=[solution.x])
+            if is_requested():  # only whole curves are shown
+                break
             curves.append(tradeoff_result(found))
     return tuple(curves)
 

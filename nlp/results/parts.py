@@ -8,8 +8,9 @@ from typing import Annotated, Literal, TypeAlias
 
 from ..case.pose import OverPoses
 from ..case.task import Sense
+from ..system.strictjson import Size
 from .jointdata import JointsData
-from .jsondata import Absent, Inline, JsonObject, Size, Vector, Vector3, Vector6
+from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
 from .motiondata import MotionData
 
 #: Version of the format.
@@ -104,7 +105,8 @@ class PoseStateData(JsonObject):
         rates: one for each row.
         rank: of the Jacobian.
         singular: whether the rank is below six.
-        singular_values: of the Jacobian, largest first.
+        singular_values: of the Jacobian with moments about the platform's origin, divided by their longest arm, largest
+            first.
         quantities: leg lengths, joint angles and the like, by limb.
         limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
     """
@@ -147,7 +149,8 @@ class RobotData(JsonObject):
         rates: work rate of each row in the task's motion.
         rank: of the Jacobian.
         singular: whether the rank is below six.
-        singular_values: of the Jacobian, largest first.
+        singular_values: of the Jacobian with moments about the platform's origin, divided by their longest arm, largest
+            first.
         free_motions: basis of the motions that no row resists.
         task_is_free: whether F is zero, so that nothing resists the task's motion.
         quantities: leg lengths, joint angles and the like, by limb.
@@ -272,13 +275,15 @@ class SensitivityData(JsonObject):
         name: of the number.
         value: of the number.
         unit: of the value.
-        derivative: of the optimal F by the number.
+        derivative: of the optimal F by the number; absent where there is none.
+        hindrance: why there is none, in words.
     """
 
     name: str
     value: float
     unit: str
-    derivative: float
+    derivative: Absent[float]
+    hindrance: Absent[str]
 
 
 class JointGradientData(JsonObject):

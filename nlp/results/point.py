@@ -35,6 +35,7 @@ from .parts import (
     VersionsData,
     ViolationData,
 )
+from .rounding import TURNED
 
 if TYPE_CHECKING:
     pass
@@ -161,10 +162,11 @@ def _pose_state(case: Case, state: RobotState, limited: Mapping[str, ByOwner] | 
 
 
 def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
-    """Return a pose in the case's units."""
+    """Return a pose in the case's units; without rotation its axis is z, unless the case holds another one."""
+    is_held = any(each.rotation.axis is not None for each in case.poses)
     return PoseData(
         position=vector(pose.position),
-        axis=vector(pose.axis),
+        axis=vector(pose.axis) if is_held or abs(pose.angle) > TURNED else (0.0, 0.0, 1.0),
         angle=case.units.shown(pose.angle, Dimension.ANGLE),
         rotation_matrix=matrix(pose.rotation),
     )

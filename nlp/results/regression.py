@@ -27,6 +27,7 @@ from ..case.reader import load_case
 from ..case.settings import Published, Search
 from ..case.source import shipped_cases
 from ..errors import CaseError, EvaluationError, InputError
+from ..interruption import Milestone, is_requested, reached
 from ..program.formulation import formulate_each
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
@@ -102,6 +103,8 @@ class CaseCheck:
 def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
     """Solve cases and check their expected and published values; a case that others refer to is solved once.
 
+    Where the work is requested to stop, the cases that are checked by then are returned.
+
     Args:
         names: paths of case files, or bare names of shipped cases; left out, all shipped cases.
 
@@ -109,7 +112,14 @@ def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
         InputError: a case, or one that it refers to, cannot be read.
     """
     solved: dict[str, CaseResult] = {}
-    return [check_case(name, solved) for name in names or shipped_cases()]
+    checks: list[CaseCheck] = []
+    for name in names or shipped_cases():
+        found = check_case(name, solved)
+        if is_requested():  # an interrupted solve is no check
+            break
+        checks.append(found)
+        reached(Milestone.CASE)
+    return checks
 
 
 def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCheck:

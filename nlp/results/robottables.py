@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...models import Dimension, Quantity, WrenchKind, component_names
+from ...models import Dimension, Model, Quantity, WrenchKind, component_names
 from ..case.case import Case
 from ..case.task import Sense
 from ..units import rate_unit
@@ -153,7 +153,7 @@ def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterato
             sizes = rate_sizes(pose.jacobian, task.motion.twist, pose.pose.position)
             rates = settled_rates(pose.rates, sizes, is_free=values[k] == 0)
             cells.append((str(k + 1), *(number(rate, digits=6, signed=True) for rate in rates), marks[k]))
-        title = "rate by pose and limb"
+        title = f"{rate_word(case.model)} by pose and limb"
         yield TextTable(("pose", *labels, ""), tuple(cells), "rates", title, folded, "more poses")
     for measure in _measures(case, robot):
         owners = list(measure.of(several.poses[0]))
@@ -170,6 +170,11 @@ def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterato
 def _measure_cells(values: ByOwner, owners: Sequence[str], measure: _Measure, case: Case) -> list[str]:
     size = size_of(measure.dimension, values.values(), case.units)
     return [number(values[owner], size, digits=5) for owner in owners]
+
+
+def rate_word(model: Model) -> str:
+    """Return the name of a row's rate: that of a leg's length, or the work rate of a wrench that is no actuator's."""
+    return "work rate" if model.structure else "rate"
 
 
 def _limb_table(case: Case, robot: RobotData) -> TextTable:
@@ -196,7 +201,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
     labels = [f"{each.words}\n{each.unit}" for each in measures]
     headers = ["limb", *(["wrench"] if couples else [])]
     if task is not None and rates:
-        headers += [f"rate\n{rate_unit(task.motion.twist, case.units)}", "share of F\n%"]
+        headers += [f"{rate_word(model)}\n{rate_unit(task.motion.twist, case.units)}", "share of F\n%"]
     return TextTable((*headers, *labels), tuple(rows), "limbs")
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from ...models import Model, Parameter
 from ..case.robots import ModelOption
 from ..units import Units
+from .jointwording import idle_words
 from .text import Line, TextTable, Tone
 
 
@@ -61,6 +62,8 @@ def _structure_words(model: Model) -> Iterator[Line | TextTable]:
         freedoms, rank = 6 - model.generic.constraints, model.generic.jacobian
         yield Line(f"{freedoms} with free actuators", label="freedoms")
         yield Line(f"{rank} of all wrenches, {model.generic.constraints} of the constraints", label="ranks")
+        if model.generic.undetermined:
+            yield Line(idle_words(model.generic.undetermined), label="note")
     unknowns, every = len(model.unknowns), sum(each.equations for each in model.structure)
     if every == 0:
         yield Line("closed by the pose alone: no unknowns, no equations", label="loops")

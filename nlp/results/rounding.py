@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 NOISE = 1e-9
 #: Error bound of a number that a case states, as a part of the largest beside it: the rounding of a sine, some times.
 STATED = 1e-14
+#: A rotation by less than this, radians, has no axis that means anything.
+TURNED = 1e-9
 
 
 def settled(value: float, size: float, part: float = NOISE) -> float:

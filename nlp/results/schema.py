@@ -9,13 +9,14 @@ from collections.abc import Mapping
 from types import NoneType, UnionType
 from typing import Annotated, Literal, NamedTuple, TypeAlias, Union, get_args, get_origin
 
+from ..system.strictjson import Size
 from .certified import CertifiedResult
 from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .front import FrontResult
-from .jsondata import JsonObject, JsonValue, Mark, Size
+from .jsondata import JsonObject, JsonValue, Mark
 from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult

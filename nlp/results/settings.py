@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from ..case.case import Case
 from ..case.overrides import Settings
 from ..case.pose import Free, Pose
@@ -9,26 +11,43 @@ from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .parts import PoseData, RobotData
-from .reading import Result
+from .reading import load_result
+
+Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 
 
-def robot_of(result: Result, source: str, case: Case) -> RobotData:
+def load_answer(file: str) -> Answer:
+    """Read a result of ``solve`` or ``evaluate``.
+
+    Raises:
+        InputError: the file cannot be read, or holds no such result.
+    """
+    result = load_result(file)
+    if not isinstance(result, Answer):
+        raise InputError(f"--of {file}: is no result of solve or evaluate")
+    return result
+
+
+def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = False) -> RobotData:
     """Return the robot of a result of a case.
 
     Args:
         result: the result.
         source: name of its file, for messages.
         case: the case.
+        of_any_case: whether the result may be of another case with the same robot and units.
 
     Raises:
-        InputError: the result is of another kind, of another case, or no answer.
+        InputError: the result is of another case, in other units, or no answer.
     """
-    if not isinstance(result, SolveResult | CombinedResult | EvaluationResult):
-        raise InputError(f"{source}: is no result of solve or evaluate")
-    stated = result.head.case, result.head.model
-    if stated != (case.name, case.model.name):
-        fault = f"is a result of the case {stated[0]!r} with the robot {stated[1]!r}"
+    name, model = result.head.case, result.head.model
+    if model != case.model.name or (name != case.name and not of_any_case):
+        fault = f"is a result of the case {name!r} with the robot {model!r}"
         raise InputError(f"{source}: {fault}, not of {case.name!r} with {case.model.name!r}")
+    units = result.head.units
+    if (units.length, units.angle) != (case.units.length, case.units.angle):
+        own = f"{case.units.length!r} and {case.units.angle!r}"
+        raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, and the case {own}")
     if isinstance(result, CombinedResult):
         point = result.combined.method_point
         robot = None if point is None else point.robot
@@ -41,13 +60,19 @@ def robot_of(result: Result, source: str, case: Case) -> RobotData:
 
 def settings_of(robot: RobotData, case: Case) -> Settings:
     """Return the numbers of a robot by the names that they have in its case, in the case's units."""
-    found: dict[str, float | list[float]] = {}
-    for name, value in robot.parameters.items():
-        found[case.parameter_name(name)] = list(value) if isinstance(value, tuple) else value
+    found = dict(dimensions_of(robot, case))
     stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
     for prefix, pose, data in zip(case.pose_prefixes, case.poses, stated, strict=True):
         found |= _pose_settings(prefix, pose, data)
     return found
+
+
+def dimensions_of(robot: RobotData, case: Case) -> Settings:
+    """Return the dimensions of a robot by the names that they have in its case, in the case's units."""
+    return {
+        case.parameter_name(name): list(value) if isinstance(value, tuple) else value
+        for name, value in robot.parameters.items()
+    }
 
 
 def _pose_settings(prefix: str, pose: Pose, data: PoseData) -> Settings:

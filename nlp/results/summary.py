@@ -13,7 +13,7 @@ from .designtable import combined_design_table, design_table, solved_design_tabl
 from .jointwording import limb_part_table
 from .robottables import jacobian_table, robot_tables
 from .rounding import listed, number, robot_size, size_of_F
-from .tables import limit_table, outcome_table, principal_table
+from .tables import limit_table, limits_title, outcome_table, principal_table
 from .text import Line, TextTable, Tone
 from .wording import (
     certificate_lines,
@@ -54,7 +54,8 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)
     if result.limits:
-        yield limit_table(result.limits, 0.0 if result.robot is None else size_of_F(result.robot))
+        size = 0.0 if result.robot is None else size_of_F(result.robot)
+        yield limit_table(result.limits, size, limits_title(case, result.workspace))
     if result.tolerance is not None:
         yield tolerance_line(result.tolerance, result.F, case.units)
     yield from evidence_lines(result)
@@ -78,7 +79,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         yield combined_design_table(case, combined, robot)
     if point is not None and point.limits:
-        yield limit_table(point.limits, combined.value or 0.0)
+        yield limit_table(point.limits, combined.value or 0.0, limits_title(case))
     yield outcome_table(combined, result.tasks)
     yield from combined_value_lines(combined)
     for task in result.tasks:
@@ -122,7 +123,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     yield design_table(case, robot)
     yield from robot_tables(case, robot)
     if result.limits:
-        yield limit_table(result.limits, size_of_F(robot))
+        yield limit_table(result.limits, size_of_F(robot), limits_title(case))
     yield jacobian_table(case, robot)
     # As many are zero as the rank says: what is left of them is rounding error.
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
-from ..units import Units
+from ..units import Units, slope_unit
 from .data import CombinedData
 from .motionwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
@@ -15,11 +15,13 @@ from .wording import SET, counted
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from ..case.case import Case
     from ..case.settings import Search
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
     from .evaluation import PrincipalMotionsData
     from .parts import LimitData, MarginData, RobotData, VersionsData
+    from .workspace import WorkspaceProofData
 
 #: So many places where a limit is active are named.
 _PLACES = 3
@@ -48,25 +50,43 @@ def principal_table(motions: PrincipalMotionsData, units: Units, size: float) ->
     return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
 
 
-def limit_table(limits: Sequence[LimitData], F: float = 0.0) -> TextTable:
+def limits_title(case: Case, proof: WorkspaceProofData | None = None) -> str:
+    """Return at which poses the rows of the limits hold, where a case has limits over a workspace; else nothing.
+
+    Args:
+        case: the case.
+        proof: of a solved design over the workspace, in which some of its poses became constraints.
+    """
+    if case.workspace is None or not case.workspace.has_limits:
+        return ""
+    stated = "limits at the stated pose" if case.pose_count == 1 else "limits at the stated poses"
+    if proof is None or not proof.poses:
+        return f"{stated}, not over the workspace"
+    return f"{stated}, and where a pose of the workspace became a constraint of its limit"
+
+
+def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") -> TextTable:
     """Return every limit of the case: how near the design comes to it, its cost, and where; violated and active first.
 
     Args:
         limits: of the case.
         F: size of F, of which costs have their error.
+        title: of the table; empty for none.
     """
     rows = []
     for row in sorted(limits, key=lambda each: (not each.violated, not each.active)):
         where = [_place(name) for name in row.violated or row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
         slope = settled(row.cost or 0.0, abs(F) / (abs(row.limit) or 1.0))
-        cost = f"{slope:+.4g} F/{row.unit or 'unit'}" if row.active and slope else ""
+        cost = f"{slope:+.4g} {slope_unit(row.unit)}" if row.active and slope else ""
         beside = abs(row.limit) or 1.0
         word = "violated" if row.violated else "active" if row.active else ""
         shown = ", ".join(where[:_PLACES]) + more
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
-    return TextTable(("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits")
+    return TextTable(
+        ("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits", title
+    )
 
 
 def _text(value: float | None, size: float) -> str:
@@ -140,7 +160,7 @@ def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: boo
     for side in active:
         slope = number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4)
         state = "violated" if side.name in violated else "active"
-        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} F/{side.unit or 'unit'}")
+        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} {slope_unit(side.unit)}")
         rows.append(cells if is_answer else cells[:-1])
     return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...models import component_names, frozen_array
 from ..case.case import Case
 from ..solver.status import Status
-from ..units import objective_unit
+from ..units import objective_unit, slope_unit
 from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
@@ -43,7 +43,7 @@ def tradeoff_table(result: TradeoffResult) -> TextTable:
     """Return a row for each value: F, its slope and what is active there only; with several tasks F of each."""
     several = len(result.tasks) > 1
     header = f"{result.over}\n{result.unit}" if result.unit else result.over
-    per = f"slope\nF/{result.unit}" if result.unit else "slope"
+    per = f"slope\n{slope_unit(result.unit)}"
     names = tuple(f"F of {name}" for name in result.tasks) if several else ()
     throughout = _active_throughout(result)
     last = "also active" if throughout else "active"

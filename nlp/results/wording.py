@@ -10,7 +10,7 @@ from ..case.task import Sense
 from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import CURVED, PointKind
 from ..solver.status import Status
-from ..units import Units, objective_unit
+from ..units import Units, objective_unit, slope_unit
 from .jointwording import convention_lines, joint_lines
 from .motionwording import motion_words, reach_of, screw_words, triple
 from .rounding import number, robot_size, settled, task_F
@@ -161,8 +161,7 @@ def costliest_words(limits: Sequence[LimitData]) -> str | None:
     if not costly:
         return None
     row, cost = max(costly, key=lambda each: abs(each[1] * (each[0].limit or 1.0)))
-    unit = row.unit or "unit"
-    return f"Per part of its own size, {row.key} costs most: F changes by {cost:+.4g} per {unit}."
+    return f"Per part of its own size, {row.key} costs most: {cost:+.4g} {slope_unit(row.unit)}."
 
 
 def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:

@@ -149,7 +149,7 @@ class WorkspaceResult(JsonObject):
         parameters: dimensions by name; three numbers for a point or direction.
         joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
             about the exact machine alone.
-        proved: whether J is regular at every pose, every limit holds, and every number is bounded.
+        proved: whether J is regular at every pose, and every limit holds; numbers without a limit are information.
         regular: whether J has full rank at every pose.
         constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
         extremes: smallest and largest values.

@@ -23,19 +23,25 @@ _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 
 def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
     """Yield the verdict on a machine, what it is about, F, and the tightest claims."""
-    outcomes = [each.outcome for each in result.extremes]
-    outcomes.append(result.regular.outcome)
-    words = "everything is proved for every pose"
-    if not result.proved:
-        refuted, left = outcomes.count(Outcome.REFUTED), outcomes.count(Outcome.OPEN)
-        words = f"not everything is proved: {refuted} refuted, {left} open, {len(outcomes) - refuted - left} proved"
-    yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
     yield from machine_lines(case, result.joint_centre)
     for low, high in zip(result.extremes, result.extremes[1:], strict=False):
         if low.name == high.name and low.name.partition(" ")[0] == "F" and low.bound and high.bound:
             ends = f"{number(low.bound)} to {number(high.bound)}"
             yield Line(ends, label=low.name, after=", at no pose smaller or larger")
     yield from tightest_table(result.extremes)
+
+
+def verdict_words(result: WorkspaceResult) -> str:
+    """Return the verdict in one clause: counts of ranks and limits, and of numbers without a limit that stay open."""
+    claims = [each.outcome for each in (result.regular, result.constraints) if each is not None]
+    claims += [each.outcome for each in result.extremes if each.limit is not None]
+    counts = ", ".join(f"{claims.count(each)} {each.value}" for each in _ORDER)
+    words = "everything is proved for every pose" if result.proved else f"not everything is proved: {counts}"
+    shown = sum(each.limit is None and each.outcome is Outcome.OPEN for each in result.extremes)
+    if not shown:
+        return words
+    return f"{words}; {shown} number{' without a limit stays' if shown == 1 else 's without a limit stay'} open"
 
 
 def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:

@@ -125,7 +125,8 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
     for each in itertools.chain.from_iterable(shown.values()):
         yield Line(each.words, label="refuted")
         yield Line(command(each.pose), label="see it with", is_command=True)
-    left = len({each.name for each in claims}) - len(shown)
+    # One number may have two limits: a claim is its name with the limit's key.
+    left = len({(each.name, each.key) for each in claims}) - len(shown)
     if left:
         yield Line(f"{left}, whose poses --html FILE lists", label="other refuted claims")
 

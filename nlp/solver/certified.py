@@ -14,15 +14,16 @@ from ..certificate.boxes.tapes import search_tape
 from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
 from ..certificate.certificate import Certificate, CertificateStatus
 from ..certificate.paper.proof import Proof, Statement, fingerprint
+from ..certificate.paper.statement import check_minimum, has_both_senses, has_modes, program_of
 from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
-from ..program.epigraph import formulate_worst
-from ..program.formulation import formulate, formulate_each, formulate_weighted
+from ..interruption import is_requested, one_call
+from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
 from .answer import Answer
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
-from .solution import Combination, Solution
+from .solution import Solution
 from .solve import solve_programs
 
 
@@ -92,6 +93,7 @@ class Certified(Whole, Shown, Answer):
         return all(each.status is CertificateStatus.PROVED for each in every)
 
 
+@one_call()
 def certify(
     found: Case | Solution,
     *,
@@ -128,20 +130,23 @@ def certify(
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
     several = len(case.tasks) > 1
-    if several and above is not None:
-        raise OptionError("above: is for a case with one task")
+    if above is not None:
+        try:
+            check_minimum(case)
+        except InputError as error:
+            raise OptionError(str(error)) from None
     if several and with_proof and case.method is Method.AVERAGE:
         raise OptionError("proof: a case whose tasks are averaged has no one program to prove something of")
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
-    has_modes = not all_assemblies and any(each.is_mode for each in case.model.signs)
+    with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # An operation without a rule is refused before a solve.
-        search_tape(standard_form(replace(nlps[0], in_home_mode=has_modes)))
+        search_tape(standard_form(replace(nlps[0], in_home_mode=with_mode)))
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None) -> Certificate:
         x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
-        in_home_mode = has_modes and (x is None or is_in_home_mode(own.nlp, x) is True)
+        in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
         return certify_program(
             replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
             x,
@@ -155,12 +160,12 @@ def certify(
         )
 
     if not several:
-        statement = Statement(minimise=above is not None)
-        nlp = _with_sense(nlps[0], statement)
+        statement = Statement(is_minimum=above is not None and case.tasks[0].sense is Sense.MAX)
+        nlp = replace(nlps[0], sense=Sense.MIN) if statement.is_minimum else nlps[0]
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
         writer = _proof_writer(nlp) if with_proof else None
         certificate = certify_one(own, case.tasks[0].name, writer)
-        if certificate.was_beaten and certificate.x is not None:
+        if certificate.was_beaten and certificate.x is not None and not is_requested():
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
@@ -172,32 +177,8 @@ def certify(
     combined = solution.combination.combined
     writer = _proof_writer(combined.nlp) if with_proof else None
     certificate = certify_one(combined, case.method.value, writer)
-    statement = _combined_statement(solution.combination, combined)
-    statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
+    statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
-
-
-def program_of(case: Case, statement: Statement) -> Nlp:
-    """Formulate the program of a case to which a proof belongs.
-
-    Raises:
-        InputError: the case has no such program.
-    """
-    nlp = _stated_program(case, statement)
-    return replace(nlp, in_home_mode=True) if statement.in_home_mode else nlp
-
-
-def _stated_program(case: Case, statement: Statement) -> Nlp:
-    """Formulate the program of a case to which a proof belongs, for all working modes."""
-    if statement.kind == "task":
-        if not 0 <= statement.task < len(case.tasks):
-            raise InputError(f"the proof is for task {statement.task + 1}, which the case does not have")
-        return _with_sense(formulate(case, statement.task), statement)
-    if not len(case.tasks) == len(statement.weights) > 1:
-        raise InputError("the proof is for several tasks, and not for those of the case")
-    if statement.kind == "weighted-sum":
-        return formulate_weighted(case, statement.weights)
-    return formulate_worst(case, statement.weights, statement.best, statement.ceiling)
 
 
 def proof_of(certified: Certified, text: str) -> Proof:
@@ -215,12 +196,8 @@ def proof_of(certified: Certified, text: str) -> Proof:
         raise OptionError("proof: nothing was proved, so nothing is written")
     nlp = certificate.nlp
     bound = None if certificate.status is CertificateStatus.INFEASIBLE else -nlp.sign * certificate.bound
-    return Proof(text, nlp.case.name, certified.statement, fingerprint(nlp), bound, certified.tree)
-
-
-def _with_sense(nlp: Nlp, statement: Statement) -> Nlp:
-    """Return the program of a task, minimised where the statement says so."""
-    return replace(nlp, sense=Sense.MIN) if statement.minimise and nlp.sense is not Sense.MIN else nlp
+    graph = fingerprint(program_of(nlp.case, certified.statement))
+    return Proof(text, nlp.case.name, certified.statement, graph, bound, certified.tree)
 
 
 def _proof_writer(nlp: Nlp) -> ProofWriter | None:
@@ -234,14 +211,9 @@ def _complete_tree(writer: ProofWriter | None, certificate: Certificate) -> byte
     return writer.tree() if writer is not None and complete else None
 
 
-def _combined_statement(combination: Combination, combined: ProgramSolution) -> Statement:
+def _combined_statement(case: Case, combined: ProgramSolution) -> Statement:
     """Return the statement that names the combined program of several tasks."""
-    weights = combination.weights
-    if combination.method is Method.WEIGHTED_SUM:
-        return Statement("weighted-sum", weights=weights)
-    nlp = combined.nlp
-    epigraph = nlp.program.places.epigraph
-    if epigraph is None:
-        raise TypeError("the program of a worst case has an epigraph")
-    best = tuple(float(nlp.arguments[place]) for place in epigraph.best)
-    return Statement("worst-case", weights=weights, best=best, ceiling=float(nlp.arguments[epigraph.ceiling]))
+    epigraph = combined.nlp.program.places.epigraph
+    if epigraph is None or not has_both_senses(case):
+        return Statement()
+    return Statement(best=tuple(float(combined.nlp.arguments[place]) for place in epigraph.best))

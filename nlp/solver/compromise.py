@@ -30,7 +30,7 @@ from ..case.task import Method, Sense, Task
 from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
-from ..program.formulation import formulate_weighted, proximity_program, with_proximity_term
+from ..program.formulation import formulate_weighted, proximity_program, scaled_weights, with_proximity_term
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
@@ -87,9 +87,9 @@ def combine(
     Returns:
         The solution, with no seconds yet.
     """
-    weights, scaling_notices = scale_weights(case)
+    weights = scaled_weights(case)
     points, unique, notices = _choose_members(nlps, own, polish)
-    notices = [*scaling_notices, *notices]
+    notices = [*_scaling_notices(case, weights), *notices]
     combined: ProgramSolution | None = None
     if not all(solution.status.is_answer for solution in own):
         x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
@@ -118,24 +118,13 @@ def combine(
     )
 
 
-class Weights(NamedTuple):
-    """Scaled weights of the tasks, and notices about the scaling."""
-
-    values: list[float]
-    notices: list[str]
-
-
-def scale_weights(case: Case) -> Weights:
-    """Return the tasks' weights scaled to sum to the number of tasks, as equation 15 needs them."""
+def _scaling_notices(case: Case, scaled: Sequence[float]) -> list[str]:
+    """Return a notice where the weights that a case states were scaled."""
     given = [task.weight for task in case.tasks]
-    total, n = sum(given), len(given)
-    if abs(total - n) <= 1e-12 * n:
-        return Weights(given, [])
-    scaled = [weight * n / total for weight in given]
-    shown = ", ".join(f"{weight:g}" for weight in scaled)
-    return Weights(
-        scaled, [f"the weights sum to {total:g} and were scaled to sum to {n}, the number of tasks: {shown}"]
-    )
+    if given == scaled:
+        return []
+    n, shown = len(given), ", ".join(f"{weight:g}" for weight in scaled)
+    return [f"the weights sum to {sum(given):g} and were scaled to sum to {n}, the number of tasks: {shown}"]
 
 
 def _outcome(nlp: Nlp, task: Task, own: ProgramSolution, unique: bool, point: FloatArray, x: FloatArray) -> TaskOutcome:

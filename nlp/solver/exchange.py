@@ -30,7 +30,7 @@ from ..case.limits.legs import Actuator
 from ..case.limits.limit import Design, PosedRobot
 from ..case.task import Sense
 from ..errors import CaseError
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..workspace.judge import Judgement, judge_workspace
@@ -87,6 +87,7 @@ class Exchanged(NamedTuple):
     proof: WorkspaceProof | None
 
 
+@one_call()
 def solve_over_workspace(
     case: Case, solve_one: SolveOne, *, time_limit: float | None = 60.0, progress: ExchangeProgress | None = None
 ) -> Exchanged:
@@ -190,7 +191,7 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         faults.append(None)
     by_name = {(each.name, each.sense): each for each in judged.extremes}
     for each in judged.extremes:
-        if each.limit is None or each.outcome is Outcome.PROVED:
+        if not each.fails:
             continue
         if each.pose is None:
             faults.append(None)

@@ -17,6 +17,7 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate
 from ..interruption import Milestone, is_requested, reached
+from ..program.epigraph import with_wider_level
 from ..program.nlp import Nlp, PairPlace
 from ..program.pairs import violated_pairs, with_pairs, with_pairs_at
 from ..program.relaxation import (
@@ -153,6 +154,22 @@ def _during_relaxation(phase: PhaseProgress) -> Progress:
 
 
 def _search(
+    nlp: Nlp,
+    search: Search,
+    first: Sequence[FloatArray],
+    jobs: int | None,
+    progress: Progress | None,
+    solver: Solver,
+    phase: PhaseProgress,
+) -> ProgramSolution:
+    """Search a program from the first points and from sampled ones, again while bounds of its level hold it back."""
+    solution = _search_within(nlp, search, first, jobs, progress, solver, phase)
+    while (wider := with_wider_level(solution.nlp, solution.x)) is not None and not is_requested():
+        solution = _search_within(wider, search, [*first, solution.x], jobs, progress, solver, phase)
+    return solution
+
+
+def _search_within(
     nlp: Nlp,
     search: Search,
     first: Sequence[FloatArray],

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from typing import NamedTuple
+from functools import cache
+from typing import NamedTuple, get_type_hints
 
 from ..evidence.optimality import Evidence
+from ..system.strictjson import json_tree, value_of
 
 #: Status of a point at which the case contradicts itself; the other statuses are those of a solve.
 REFUSED = "refused"
@@ -85,8 +87,13 @@ def row_of(line: str | bytes) -> Row:
     Raises:
         ValueError: the line is none of :func:`line_of`.
     """
-    data = json.loads(line)
+    data = json_tree(line)
     if not isinstance(data, list) or len(data) != len(Row._fields):
-        raise ValueError
-    row = Row(*data)
-    return row._replace(x=tuple(row.x), active=tuple(row.active), multipliers=tuple(row.multipliers))
+        raise ValueError("the line is no row")
+    return Row(*(value_of(kind, value, name) for (name, kind), value in zip(_kinds(), data, strict=True)))
+
+
+@cache
+def _kinds() -> tuple[tuple[str, object], ...]:
+    """Return the fields of a row with their types."""
+    return tuple(get_type_hints(Row).items())

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..interruption import is_requested, one_call
 from ..program.designnumbers import design_indices
 from ..program.formulation import formulate
 from .cluster import answer_on_cluster
@@ -89,6 +90,7 @@ class Sweep:
         return Journal(Path(f"{out}{ENDING}"), self.fingerprint, len(self.points))
 
 
+@one_call()
 def run_sweep(
     sweep: Sweep,
     journal: Journal,
@@ -137,6 +139,8 @@ def run_sweep(
         answers = ([_solve(job, block)] for block in blocks)
     began, before, done = time.perf_counter(), len(sweep.points) - len(missing), 0
     for rows in answers:
+        if is_requested():  # an interrupted search is no answer
+            raise KeyboardInterrupt
         journal.append(rows)
         done += len(rows)
         if progress is not None:

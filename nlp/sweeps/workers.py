@@ -9,13 +9,15 @@ from __future__ import annotations
 import signal
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from multiprocessing import get_context
+from contextlib import contextmanager
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import NamedTuple
 
 from ...models import FloatArray
 from ..errors import InputError
+from ..interruption import WRITING
 from .engines import Job, answer
 from .rows import Row
 
@@ -96,14 +98,31 @@ def _start(job: Job) -> _Worker:
     context = get_context("spawn")
     mine, its = context.Pipe()
     process = context.Process(target=_serve, args=(its, job), daemon=True)
-    process.start()
+    # This process does not end between the worker's start and the job, without which the worker would show an error.
+    with WRITING, _without_interrupts():
+        process.start()
     its.close()
     return _Worker(process, mine)
 
 
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Let a process that is started here have no interrupts: Ctrl-C goes to every process, also while it starts."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # It is started with the first worker otherwise, and lets interrupts through again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve(pipe: Connection, job: Job) -> None:
     """Answer blocks until the other end of the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to every process: the first one closes the pipe
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked; the first process closes the pipe
     while True:
         try:
             block = pipe.recv()

@@ -8,8 +8,8 @@ The rooms and modules import each other in this order:
 * ``built`` (machines within a tolerance), ``regular`` (regular poses of six straight legs), ``general`` (of any
   robot);
 * ``numbers`` (their extremes over the box), ``anybuilt`` (those of every machine within a tolerance, for any robot);
-* ``builtlegs`` (claims about every machine of six straight legs), ``anyrobot`` (ranks of any robot), ``looplimits``
-  (limits of robots with loops);
+* ``builtlegs`` (claims about every machine of six straight legs), ``homeposes`` (machines at single poses, in home's
+  assembly), ``anyrobot`` (ranks of any robot), ``looplimits`` (limits of robots with loops);
 * ``judge`` (all claims about a machine), ``scale`` (the largest box), ``slices`` (for pictures), and ``paper``
   (proofs as files and their checker).
 """

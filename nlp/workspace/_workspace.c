@@ -22,6 +22,7 @@
 #define ROUNDING 1e-13 /* as in rows.py */
 #define OUTWARDS (1 + 1e-12) /* as in rows.py */
 #define ULP 0x1p-51
+#define TINY 1e-300   /* more than underflow can take from a sum of squares */
 #define POWERS 12     /* steps of the power method, as in regularity.py */
 
 enum { OPEN, REGULAR, OUTSIDE };
@@ -208,8 +209,8 @@ static double expand(const Robot *robot, const double *c, const double *h, doubl
             }
             for (int j = 0; j < 3; j++) {
                 int k = (j + 1) % 3, l = (j + 2) % 3;
-                double turned = sqrt(sizes[k] * sizes[k] + sizes[l] * sizes[l]);
-                double arms = sqrt(arm[k] * arm[k] + arm[l] * arm[l]);
+                double turned = sqrt(sizes[k] * sizes[k] + sizes[l] * sizes[l] + TINY);
+                double arms = sqrt(arm[k] * arm[k] + arm[l] * arm[l] + TINY);
                 rest[i][j] += 2 * most_scale * outwards;
                 rest[i][3 + j] += (most_scale * arms + turned + most_scale * robot->tolerance) * outwards;
             }

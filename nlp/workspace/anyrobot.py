@@ -19,6 +19,7 @@ from .general.problem import NotJudgedError, Problem, build_problem
 from .general.search import BY_NEWTON, prove_rank
 from .general.singularmachine import SingularMachine
 from .general.singularpose import SingularPose
+from .homeposes import Homes
 from .posebox import PoseBox
 from .regular.search import RankProgress
 from .verdict import Outcome, Regularity
@@ -39,11 +40,9 @@ class Ranks(NamedTuple):
 
 
 def prove_ranks(
-    case: Case,
     model: Model,
-    box: PoseBox,
+    homes: Homes,
     *,
-    family: Family | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     progress: RankProgress | None = None,
@@ -52,27 +51,36 @@ def prove_ranks(
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot, without unknowns that follow in closed form.
-        box: the poses.
-        family: all machines that are meant; None for the design alone.
+        model: the robot, without unknowns that follow in closed form.
+        homes: the case, its poses and the machines that are meant.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds for each of the two searches.
         progress: called during them.
         paper: records the searches for a proof.
     """
+    box, family = homes.box, None if homes.machines is None else homes.machines.family
     try:
-        problem = build_problem(case, model, box) if family is None else family.problem
+        problem = build_problem(homes.case, model, box) if family is None else family.problem
         prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
+        shown = partial(_is_shown, problem, family, homes)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is not None:
                 recorder = None if paper is None or family is not None else paper.own(name)
-                found.append(prove(matrix, recorder=recorder))
+                is_shown = partial(shown, constraints=name == CONSTRAINTS)
+                found.append(prove(matrix, recorder=recorder, is_shown=is_shown))
         regular, constraints = found[0], found[1] if len(found) > 1 else None
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(box, str(error)), None)
-    return Ranks(_after_newton(regular, problem, problem.locked, family), constraints)
+    is_shown = partial(shown, constraints=False)
+    return Ranks(_after_newton(regular, problem, problem.locked, family, is_shown), constraints)
+
+
+def _is_shown(problem: Problem, family: Family | None, homes: Homes, z: FloatArray, *, constraints: bool) -> bool:
+    """Return whether a singular point, or one of another machine, is singular in home's assembly."""
+    is_machine = family is not None and len(z) > len(problem.start)
+    centres = family.errors_of(z) if family is not None and is_machine else None
+    return homes.is_singular(problem.pose_of(z), centres, constraints=constraints)
 
 
 def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
@@ -83,7 +91,13 @@ def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
     return _after_newton(found, problem, problem.locked)
 
 
-def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix, family: Family | None = None) -> Regularity:
+def _after_newton(
+    found: Regularity,
+    problem: Problem,
+    matrix: RankMatrix,
+    family: Family | None = None,
+    is_shown: Callable[[FloatArray], bool] = lambda _: True,
+) -> Regularity:
     """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
@@ -96,7 +110,7 @@ def _after_newton(found: Regularity, problem: Problem, matrix: RankMatrix, famil
     for search in searches:
         for k in np.argsort(values)[:_WORST]:
             z = search(points[k]) if np.isfinite(values[k]) else None
-            if z is not None:
+            if z is not None and is_shown(z):
                 y = frozen_array(problem.pose_of(z), (6,))
                 centres = family.errors_of(z) if family is not None and len(z) > len(free) else None
                 return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres)

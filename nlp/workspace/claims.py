@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,8 @@ from casadi import SX
 
 from ...models import Dimension
 from ..case.limits.constraint import SQUARED_LENGTH, BoundedConstraint, Reading
-from ..case.limits.legs import LegLength
+from ..case.limits.legs import Actuator, LegLength
+from ..case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ..case.task import Sense
 from ..errors import InputError, nearest
 from ..program.layout import Layout
@@ -23,8 +24,12 @@ if TYPE_CHECKING:
 
 #: Names of the claims that J, and that the constraint wrenches alone, have full rank.
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
+#: Key of the claims that limbs reach every pose.
+REACH = "reach"
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
 OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
+#: Names of the measures that are no quantities of a robot.
+SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +73,16 @@ def one_machine_name(claim: str) -> str:
     return f"{claim}, lengths of one machine"
 
 
+def asked_spectra(case: Case, names: Sequence[str]) -> list[str]:
+    """Return the measures of the singular values of J among names; not those that are limited with the same length."""
+    length = case.characteristic_length
+    same = [each for each in case.limits if isinstance(each, SmallestSingularValue | ConditionNumber)]
+    limited = {each.key for each in same if each.length == length}
+    return [name for name in dict.fromkeys(names) if name in SPECTRAL and name not in limited]
+
+
 def asked_name(case: Case, name: str) -> str:
-    """Return the name in proofs of a measure of the singular values of J that is asked for, and not limited.
+    """Return the name of a measure of the singular values of J that is asked for.
 
     A limit on it divides moments by a length of its own, and has the shorter name.
     """
@@ -88,15 +101,29 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = [*_of_limits(layout), *_of_legs(layout), *_of_quantities(layout, quantities)]
+    found = with_limits(_of_quantities(layout, quantities), [*_of_limits(layout), *_of_legs(layout)])
     if with_objective:
         found += _of_tasks(layout)
     return found
 
 
+def with_limits(claims: Iterable[Claim], more: Sequence[Claim]) -> list[Claim]:
+    """Return claims after those on limits of theirs and after more; a measure with its limit is claimed once.
+
+    Args:
+        claims: among them measures that are asked for, which give way to claims of the same number.
+        more: further claims.
+    """
+    named = {(each.name, each.sense) for each in more}
+    kept = [each for each in claims if each.limit is not None or (each.name, each.sense) not in named]
+    place = next((k for k, each in enumerate(kept) if not each.key or each.leg is not None), len(kept))
+    return [*kept[:place], *more, *kept[place:]]
+
+
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
-    own = (*OWN_SEARCHES, "leg_length") if layout.robots[0].legs else OWN_SEARCHES
+    # At one pose the limit on a leg's dead length says less than over all poses.
+    own = (*OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else OWN_SEARCHES
     items = (*layout.constraints, *layout.constant_limits)
     yield from claims_of_items([item for item in items if not any(key.startswith(own) for key in item.constraint.keys)])
 
@@ -132,7 +159,7 @@ def _of_legs(layout: Layout) -> Iterator[Claim]:
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
     """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
-    for name in names:
+    for name in dict.fromkeys(names):
         if name not in known:
             raise InputError(f"--of-quantity {name}: no measure of this robot; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]

@@ -17,7 +17,7 @@ from ..case.task import Sense
 from ..case.workspace import Workspace
 from ..program.layout import Layout
 from ..program.sampling import starting_points
-from .claims import Claim
+from .claims import REACH, Claim
 from .posed import extreme_program, posed_layout
 
 #: Poses at which an equation is tested, and its largest residual, of order 1, where it holds by itself.
@@ -51,7 +51,7 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> ReachC
     values = _on(layout, [each.value for each in closed.reaches])
     reading = Reading(Dimension.NUMBER)
     claims = tuple(
-        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, "reach", 0.0)
+        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
         for each, value in zip(closed.reaches, values, strict=True)
     )
     return ReachClaims(layout, claims)

@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING
 from ...models.joints.closedform import ClosedForm, closed_form
 from ..case.case import Case
 from ..case.workspace import Workspace
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from ..program.layout import Layout
-from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of
+from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
 from .anyrobot import Ranks, not_judged, prove_ranks, touched
 from .builtlegs import as_built, refined
-from .claims import Claim, claims_of
+from .claims import SPECTRAL, Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
+from .homeposes import Homes
 from .looplimits import loop_extremes
-from .machine import Legs, legs_of, workspace_of_case
-from .numbers.askedvalues import SPECTRAL, spectral_extremes
+from .machine import Legs, check_leg_error, legs_of, workspace_of_case
+from .numbers.askedvalues import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.ownsearches import own_searches, pose_errors
 from .numbers.robotlimits import limited_spectrum
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 #: Seconds for each search where none are asked for: the searches of singular values have no other end in six
 #: dimensions.
 TIME_LIMIT = 20.0
+#: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
+_AS_NEEDED = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +72,8 @@ class Judgement:
 
     @property
     def is_proved(self) -> bool:
-        """Whether all ranks are proved to be full, every limit holds, and every other number is bounded to the gap."""
-        return self.is_regular and all(each.outcome is Outcome.PROVED for each in self.extremes)
+        """Whether all ranks are proved to be full, and every limit holds; a number without a limit is information."""
+        return self.is_regular and not any(each.fails for each in self.extremes)
 
     @property
     def is_refuted(self) -> bool:
@@ -78,6 +81,7 @@ class Judgement:
         return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
+@one_call()
 def judge_workspace(
     case: Case,
     *,
@@ -109,34 +113,37 @@ def judge_workspace(
         with_objective: whether F of each task is bounded.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
             the errors of the platform's pose are bounded, where F is.
-        until_fault: whether the work ends at the first claim that is not proved.
+        until_fault: whether the work ends at the first rank or limit that is not proved.
         rank_progress: called during the search for singular poses.
         progress: called before each number with its name, the number of those done, and of all.
         paper: records the searches for a proof.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a name.
+        InputError: the robot has no measure of a name, or the error of legs is negative, or for a robot that is not six
+            straight legs.
     """
     own = workspace_of_case(case)
+    check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
     closed = closed_form(case.model)
     machines, unknown = _machines(case, closed, box, legs)
+    homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
     ranks = (
         Ranks(not_judged(box, unknown), None)
         if unknown
-        else _ranks(case, closed, box, legs, machines, engine, time_limit, rank_progress, paper)
+        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
     )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
         return judged
     numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
     found: list[Extreme] = []
-    for outcome in numbers.add(found, quantities, leg_error, with_objective=with_objective):
-        if until_fault and outcome is not Outcome.PROVED:
+    for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+        if until_fault and each.fails:
             break
-    return replace(judged, extremes=tuple(found))
+    return replace(judged, extremes=tuple(homes.shown(each) for each in found))
 
 
 def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
@@ -150,24 +157,21 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -
 
 
 def _ranks(
-    case: Case,
     closed: ClosedForm,
-    box: PoseBox,
+    homes: Homes,
     legs: Legs | None,
-    machines: Machines | None,
     engine: str | None,
     time_limit: float | None,
     progress: RankProgress | None,
     paper: PaperRecord | None,
 ) -> Ranks:
     """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
+    case, box = homes.case, homes.box
     if legs is not None:
         recorder = None if paper is None else paper.rank
         found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
         return Ranks(touched(case, box, found), None)
-    family = None if machines is None else machines.family
-    searched = partial(prove_ranks, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
-    return searched(case, closed.model, box, family=family)
+    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,8 +202,8 @@ class _Numbers:
 
     def add(
         self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
-    ) -> Iterator[Outcome]:
-        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks; yield each outcome.
+    ) -> Iterator[Extreme]:
+        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks, and yield each.
 
         Args:
             found: gets the extremes; lengths that a stroke needs more finely take the place of those found before.
@@ -212,7 +216,6 @@ class _Numbers:
         """
         case, box, legs = self.case, pose_box(self.workspace), self.legs
         names = [name for name in quantities if name not in SPECTRAL]
-        asked = [name for name in quantities if name in SPECTRAL]
         family = None if self.machines is None else self.machines.family
         spectral = partial(
             spectral_extremes,
@@ -226,37 +229,39 @@ class _Numbers:
         if self.machines is not None:
             effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
             yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
-            yield from self._add_others(found, spectral(case, self.closed.model, box, asked))
+            yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
             return
         layout = posed_layout(case, self.workspace)
-        claims = claims_of(layout, names, with_objective=with_objective)
+        claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
         if self.closed.reaches:
             reach = reach_claims(case, self.closed, self.workspace)
             place, reaches = reach.layout, [replace(each, uncovered=self.unknown) for each in reach.claims]
             yield from self._add_proved(found, place, reaches)
-            if all(each.outcome is Outcome.PROVED for each in found):
+            is_reached = not any(each.fails for each in found)
+            if is_reached:
                 # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
                 layout = closed_layout(case, self.closed, self.workspace)
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
-        if legs is None and self.paper is None and not case.joint_centre_tolerance:
+        decided: list[Extreme] = []
+        if legs is None and not case.joint_centre_tolerance:
             search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            own = search(case, self.closed, box)
-            yield from _add(found, own)
-            known = {(each.name, each.sense) for each in own}
-            claims = [each for each in claims if each.limit is None or (each.name, each.sense) not in known]
-        yield from self._add_proved(found, layout, claims)
+            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
+            if is_reached:
+                effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
+        yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
             refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
-            yield from (each.outcome for each in found[before:])
+            yield from found[before:]
             others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
-        yield from self._add_others(found, spectral(case, self.closed.model, box, asked, shortest=shortest))
+        yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
@@ -264,7 +269,7 @@ class _Numbers:
             errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
             yield from _add(found, errors(legs, box, eps, shortest))
 
-    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Outcome]:
+    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
         """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
         if self.legs is None:
             family = None if self.machines is None else self.machines.family
@@ -284,17 +289,26 @@ class _Numbers:
             legs=self.legs,
         )
 
-    def _add_proved(self, found: list[Extreme], layout: Layout, claims: Sequence[Claim]) -> Iterator[Outcome]:
-        """Add the extremes of claims, and yield their outcomes."""
-        prove = self._prove(layout)
+    def _add_proved(
+        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+    ) -> Iterator[Extreme]:
+        """Add the extremes of claims, and yield them; those that are decided are searched again for the paper alone."""
+        prove, known = self._prove(layout), {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
-            yield from _add(found, [prove(claim, gap=self.gap, paper=self.paper)])
+            own = known.get((claim.name, claim.sense, claim.key))
+            is_limit = own is not None and own.limit is not None
+            if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
+                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap, paper=self.paper)
+                if is_limit and self.paper is not None and again.outcome is not Outcome.PROVED:
+                    self.paper.elsewhere.add((claim.name, claim.sense.value))
+                own = own or again
+            yield from _add(found, [own])
 
 
-def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Outcome]:
-    """Add extremes one by one, and yield the outcome of each."""
+def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:
+    """Add extremes one by one, and yield each."""
     for each in more:
         found.append(each)
-        yield each.outcome
+        yield each

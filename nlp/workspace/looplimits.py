@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from ...models import FloatArray
 from ...models.joints.closedform import ClosedForm
 from ..case.case import Case
 from ..errors import UncoveredError
-from .general.cells import Cells, Examiner, joined
+from ..interruption import reason_of, reason_to_stop
+from .general.cells import Cells, Examiner, are_between, joined
 from .general.connected import is_connected
 from .general.covering import coordinates_to_split, in_workspace, whole_workspace, widths_of
 from .general.limitvalues import Enclosed, LimitValues
@@ -68,6 +70,13 @@ def loop_extremes(
     return search.run(time_limit, interrupted)
 
 
+class _Best(NamedTuple):
+    """Largest values (K,) that are known of K numbers, -inf without one, and the points (K, n) that have them."""
+
+    value: FloatArray
+    z: FloatArray
+
+
 class _Search:
     """The state of a search over K numbers."""
 
@@ -76,22 +85,26 @@ class _Search:
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self._examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None, None)
         count, n = len(values.claims), len(problem.start)
-        self._best, self._at = np.full(count, -np.inf), np.full((count, n), np.nan)
+        self._best = _Best(np.full(count, -np.inf), np.full((count, n), np.nan))
         self._bound = np.full(count, -np.inf)
         self._boxes = 0
         self._roots: list[Cells] = []
 
     def run(self, time_limit: float | None, interrupted: Callable[[], bool]) -> list[Extreme]:
         """Search until every claim is decided, or the time is over."""
-        began, problem = time.perf_counter(), self._problem
-        start = whole_workspace(problem)
+        began = time.perf_counter()
+        reason = reason_of(lambda: self._run(began, time_limit, interrupted))
+        return self._extremes(reason, time.perf_counter() - began)
+
+    def _run(self, began: float, time_limit: float | None, interrupted: Callable[[], bool]) -> str:
+        """Search until no box is left; return the reason for stopping earlier, or an empty text."""
+        problem, start = self._problem, whole_workspace(self._problem)
         whole = (start.upper - start.lower)[0, self._independent]
-        stack, reason = [start], ""
-        while stack and not reason:
-            if interrupted():
-                reason = "interrupted"
-            elif time_limit is not None and time.perf_counter() - began >= time_limit:
-                reason = f"stopped after {time_limit:g} s"
+        stack = [start]
+        while stack:
+            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
+            if reason:
+                return reason
             cells = stack.pop()
             if len(cells.lower) > _BLOCK:
                 stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
@@ -100,13 +113,13 @@ class _Search:
             if not len(cells.lower):
                 continue
             halves = self._halves(cells, whole)
-            if halves is not None and len(halves.lower):
+            if halves is None:
+                return "the boxes that are left are too small to be divided"
+            if len(halves.lower):
                 stack.append(halves)
-            elif halves is None:
-                reason = "the boxes that are left are too small to be divided"
-        if not reason and self._roots and not self._is_one():
-            reason = "the assemblies in two neighbouring boxes are not proved to be the same"
-        return self._extremes(reason, bool(stack) or bool(reason), time.perf_counter() - began)
+        if self._roots and not self._is_one():
+            return "the assemblies in two neighbouring boxes are not proved to be the same"
+        return ""
 
     def _is_one(self) -> bool:
         """Return whether all boxes surely have the assembly of the middle."""
@@ -147,10 +160,11 @@ class _Search:
     @property
     def _least(self) -> FloatArray:
         """(K,) bounds up to which a number is decided."""
-        size = np.maximum(np.abs(self._best), _NEAR_ZERO)
+        best = self._best.value
+        size = np.maximum(np.abs(best), _NEAR_ZERO)
         with np.errstate(invalid="ignore"):
-            beyond = self._best + self._gap * size
-        return np.asarray(np.where(self._best > self._values.limit, beyond, self._values.limit))
+            beyond = best + self._gap * size
+        return np.asarray(np.where(best > self._values.limit, beyond, self._values.limit))
 
     def _add_points(self, cells: Cells, enclosed: Enclosed) -> None:
         """Try the middles of boxes, and for each number the end of the box with the largest bound."""
@@ -169,27 +183,26 @@ class _Search:
         own = [k for k in self._independent if k < count]
         z[:, own] = inside[:, own]
         z = self._examiner.loops.all_closed(z.T, self._dependent).T
+        z[~are_between(z, cells.some(rows), self._dependent)] = np.nan
         numbers = self._values.values(z)
         y = self._problem.pose_of(np.nan_to_num(z))
         held = np.array([self._problem.box.holds(each) for each in y]) & np.isfinite(z).all(axis=1)
         numbers = np.where(held & np.isfinite(numbers), numbers, -np.inf)
         place = np.argmax(numbers, axis=1)
         value = numbers[np.arange(len(place)), place]
-        better = value > self._best
-        self._best[better], self._at[better] = value[better], z[place[better]]
+        better = value > self._best.value
+        self._best = _Best(np.where(better, value, self._best.value), np.where(better[:, None], z[place], self._best.z))
 
-    def _extremes(self, reason: str, is_open: bool, seconds: float) -> list[Extreme]:
-        """Return the extremes of the numbers."""
+    def _extremes(self, reason: str, seconds: float) -> list[Extreme]:
+        """Return the extremes of the numbers; with a reason for stopping before the end nothing is bounded."""
         found, values = [], self._values
         for k, claim in enumerate(values.claims):
             sign, read = float(values.sign[k]), claim.reading.from_value
-            best, bound = (
-                float(self._best[k]),
-                math.inf if is_open else max(float(self._bound[k]), float(self._best[k])),
-            )
+            best = float(self._best.value[k])
+            bound = math.inf if reason else max(float(self._bound[k]), best)
             pose = None
             if math.isfinite(best):
-                pose = self._problem.box.pose(self._problem.pose_of(self._at[k]))
+                pose = self._problem.box.pose(self._problem.pose_of(self._best.z[k]))
             outcome = Outcome.PROVED if bound <= values.limit[k] else Outcome.OPEN
             outcome = Outcome.REFUTED if best > values.limit[k] else outcome
             found.append(

@@ -11,7 +11,7 @@ from ...models import FloatArray, Model, frozen_array
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.workspace import Workspace
-from ..errors import CaseError
+from ..errors import CaseError, InputError
 
 #: Number of legs, as many as the platform has freedoms.
 LEGS = 6
@@ -71,6 +71,18 @@ def workspace_of_case(case: Case) -> Workspace:
             )
             raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
     return case.workspace
+
+
+def check_leg_error(case: Case, leg_error: float) -> None:
+    """Refuse an error of the lengths of legs that is none, or that no claim about the robot has.
+
+    Raises:
+        InputError: it is negative or not finite, or is given for a robot that is not six straight legs.
+    """
+    if not 0 <= leg_error < float("inf"):
+        raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
+    if leg_error and not has_straight_legs(case.model):
+        raise InputError(f"--leg-error {leg_error:g}: is for six straight legs, which {case.model.name!r} is not")
 
 
 def has_straight_legs(model: Model) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.workspace import LARGEST_TURN, Workspace
-from ..interruption import is_requested
+from ..interruption import is_requested, one_call
 from .judge import Judgement, judge_workspace
 from .machine import workspace_of_case
 from .posebox import PoseNumbers, scaled
@@ -38,6 +38,7 @@ class Scale:
     pose: PoseNumbers | None
 
 
+@one_call()
 def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | None = None) -> Scale:
     """Return the largest factor of a case's workspace for which J is regular and every limit holds, to 1 %.
 
@@ -63,8 +64,10 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
             with_objective=False,
             until_fault=True,
         )
-        if judged_holds(judged):
+        if judged.is_proved:
             proved = factor
+        elif is_requested() and not judged.is_refuted:  # an interrupted search shows no fault
+            break
         else:
             failed, fault = factor, judged
         if failed == float("inf"):
@@ -83,24 +86,13 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
     return Scale(proved, failed, refuted, claim, pose)
 
 
-def judged_holds(judged: Judgement) -> bool:
-    """Return whether J is regular and every limit holds; numbers without a limit do not count."""
-    return judged.is_regular and all(
-        each.outcome is Outcome.PROVED for each in judged.extremes if each.limit is not None
-    )
-
-
 def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
     """Return the claim that fails, a pose of it, and whether it is refuted: a refuted one before an open one."""
-    faults = []
+    faults: list[tuple[Outcome, str, PoseNumbers | None]] = []
     for name, found in zip(("regular", "constraints regular"), judged.ranks, strict=False):
         if found.outcome is not Outcome.PROVED:
             faults.append((found.outcome, name, None if found.y is None else found.box.pose(found.y)))
-    faults += [
-        (each.outcome, f"{each.name}: {each.key}", each.pose)
-        for each in judged.extremes
-        if each.limit is not None and each.outcome is not Outcome.PROVED
-    ]
+    faults += [(each.outcome, f"{each.name}: {each.key}", each.pose) for each in judged.extremes if each.fails]
     if not faults:
         return "regular poses", None, False
     outcome, name, pose = min(faults, key=lambda each: each[0] is not Outcome.REFUTED)

@@ -138,14 +138,19 @@ class Engine:
         return column_space(self.motion(self.mechanism.platform, np.zeros(3)) @ motions, 1.0)
 
     def rates(self, chi: Array) -> Array:
-        """Rates of the actuated joints for a twist that the platform can make with free actuators."""
-        rows = self.rows(locked=False)
-        free = null_space(rows)
+        """Rates of the actuated joints for a twist that the platform can make with free actuators.
+
+        They are not numbers for joints that can move while the platform stands still.
+        """
+        free = null_space(self.rows(locked=False))
         platform = self.motion(self.mechanism.platform, np.zeros(3)) @ free[: self.model.nv]
         weights = np.linalg.lstsq(platform, chi, rcond=1e-9)[0]
         own = [each for each in self.mechanism.joints if each.kind in ("R", "P", "H")]
         driven = [self.model.nv + k for k, each in enumerate(own) if each.actuated]
-        return np.asarray(free[driven] @ weights)
+        idle = free[driven] @ null_space(platform)
+        found: Array = free[driven] @ weights
+        found[np.linalg.norm(idle, axis=1) > 1e-7] = np.nan
+        return found
 
 
 def without(mechanism: Mechanism, links: set[str]) -> Mechanism:

@@ -13,6 +13,7 @@ from casadi import SX
 from screwsynth.models import (
     Model,
     Substitution,
+    Velocities,
     constraint_rows,
     instantiate,
     matrix_from_cayley,
@@ -98,7 +99,7 @@ def check_tangents(model: Model, freedoms: int) -> None:
     here = instantiate(model, Substitution(dimensions, u, R, position), SX(0.7), [SX.zeros(6)])
     quantities = ca.vertcat(SX(0, 1), *here.quantities)
     moving = ca.vertcat(omega, v, u)
-    outputs = [here.loops, ca.jacobian(here.loops, moving), here.jacobian, here.actuators]
+    outputs = [here.loops, ca.jacobian(here.loops, moving), here.jacobian, here.driven, here.relations]
     outputs += [ca.jacobian(quantities, moving)]
     at = ca.vertcat(c, p, u)
     function = ca.Function("here", [at, omega, v], [ca.densify(each) for each in outputs])
@@ -113,11 +114,11 @@ def check_tangents(model: Model, freedoms: int) -> None:
         residual, slopes = (each.full() for each in closing(x))
         x = x - np.linalg.lstsq(slopes, residual.ravel(), rcond=1e-9)[0]
     found = function(x, np.zeros(3), np.zeros(3))
-    residual, slopes, J, screws, quantity_slopes = (each.full() for each in found)
+    residual, slopes, J, driven, relations, quantity_slopes = (each.full() for each in found)
     assert np.abs(residual).max(initial=0.0) < 1e-12
     values, right = np.linalg.svd(slopes)[1:] if slopes.size else (np.zeros(0), np.eye(moving.numel()))
     tangents = right[int(np.count_nonzero(values > 1e-8 * values.max(initial=1e-300))) :]
-    constraints = constraint_rows(model, J, screws)
+    constraints = constraint_rows(model, Velocities(J, driven, relations), x[3:6])
     work = np.hstack([constraints[:, 3:], constraints[:, :3]])
     assert np.abs(work @ tangents[:, :6].T).max(initial=0.0) < 1e-12
     rank = rank_of_rows(constraints, x[3:6], size)
@@ -128,9 +129,8 @@ def check_tangents(model: Model, freedoms: int) -> None:
     for limb in dict.fromkeys(each.limb for each in model.actuators):
         rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
         own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
-        driven = J[rows] @ np.vstack([screws[3:, own], screws[:3, own]])
         resisted = J[rows] @ np.hstack([tangents[:, 3:6], tangents[:, :3]]).T
-        rates = np.linalg.lstsq(driven, resisted, rcond=None)[0]
+        rates = np.linalg.lstsq(driven[np.ix_(rows, own)], resisted, rcond=None)[0]
         expected = quantity_slopes[[owners.index(model.actuators[k].name) for k in own]] @ tangents.T
         assert rates == pytest.approx(expected, abs=1e-10 * size)
 

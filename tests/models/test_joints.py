@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from screwsynth.models import (
     Model,
     Substitution,
+    Velocities,
     constraint_rows,
     instantiate,
     matrix_from_cayley,
@@ -161,9 +162,15 @@ class Numbers(NamedTuple):
     F: float
     rates: Array
     J: Array
-    actuators: Array
+    driven: Array
+    relations: Array
     loops: Array
     quantities: Array
+    position: Array
+
+    @property
+    def velocities(self) -> Velocities:
+        return Velocities(self.J, self.driven, self.relations)
 
 
 class Robot:
@@ -178,15 +185,17 @@ class Robot:
         substitution = Substitution(dimensions, pose[6:], matrix_from_cayley(pose[:3]), pose[3:6])
         here = instantiate(model, substitution, SX(length), [twist])
         quantities = ca.vertcat(SX(0, 1), *here.quantities)
-        outputs = [here.F, here.rates, here.jacobian, here.actuators, here.loops, quantities]
+        outputs = [here.F, here.rates, here.jacobian, here.driven, here.relations, here.loops, quantities]
         self._numbers = ca.Function("numbers", [pose, twist], [ca.densify(each) for each in outputs])
         loops = ca.vertcat(here.loops, quantities)
         self._loops = ca.Function("loops", [pose], [ca.densify(loops), ca.densify(ca.jacobian(loops, pose))])
         self._count = here.loops.numel()
 
     def at(self, pose: Array, twist: Array = CHI) -> Numbers:
-        F, rates, J, actuators, loops, quantities = (each.full() for each in self._numbers(pose, twist))
-        return Numbers(float(F.item()), rates.ravel(), J, actuators, loops.ravel(), quantities.ravel())
+        F, rates, J, driven, relations, loops, quantities = (each.full() for each in self._numbers(pose, twist))
+        return Numbers(
+            float(F.item()), rates.ravel(), J, driven, relations, loops.ravel(), quantities.ravel(), pose[3:6]
+        )
 
     def driven(self, target: Array) -> Array:
         """Return the closed pose near home at which the actuators are away from home by so much."""
@@ -220,7 +229,7 @@ def actuator_rates(model: Model, here: Numbers) -> Array:
     for limb in dict.fromkeys(each.limb for each in model.actuators):
         rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
         own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
-        found += list(np.linalg.lstsq(work(here.J[rows]) @ here.actuators[:, own], here.rates[rows], rcond=None)[0])
+        found += list(np.linalg.lstsq(here.driven[np.ix_(rows, own)], here.rates[rows], rcond=None)[0])
     return np.array(found)
 
 
@@ -231,7 +240,7 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
     here = Robot(model)
     home = here.at(here.home)
     assert pytest.approx(reference.F, abs=1e-10) == home.F
-    constraints = constraint_rows(model, home.J, home.actuators)
+    constraints = constraint_rows(model, home.velocities, home.position)
     _, values, right = np.linalg.svd(work(constraints))
     rank = int(np.count_nonzero(values > 1e-9))
     assert rank == reference.constraints == rank_of_rows(constraints, np.zeros(3), 1.0)
@@ -245,7 +254,7 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
     assert np.abs(driven.loops).max(initial=0.0) < 1e-12
     # The rows of results are a basis of the same wrenches: J'J and so F, singular values and rank are the same.
     for each in (home, driven):
-        rows = reporting_matrix(model, each.J, each.actuators) @ each.J
+        rows = reporting_matrix(model, each.velocities, each.position) @ each.J
         assert len(rows) == sum(reference.wrenches)
         assert rows.T @ rows == pytest.approx(each.J.T @ each.J, abs=1e-12)
     assert model.generic is not None
@@ -288,7 +297,7 @@ def test_published_facts_of_the_three_upu_hold() -> None:
     here = snu.at(snu.home)
     assert rank_of_rows(here.J, np.zeros(3), 1.0) == 4
     # Constraint singularity: the constraints have rank 1 where they have 3 elsewhere.
-    assert rank_of_rows(constraint_rows(snu.model, here.J, here.actuators), np.zeros(3), 1.0) == 1
+    assert rank_of_rows(constraint_rows(snu.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
     assert snu.model.generic is not None
     assert snu.model.generic.constraints == 3
     assert pytest.approx(3.0, abs=1e-12) == snu.at(snu.home, about_z).F

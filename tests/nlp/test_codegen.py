@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -101,6 +102,38 @@ def test_only_the_mathematics_library_is_needed(embedded: Callable[[str], Embedd
 
 
 @needs_compiler
+def test_a_parent_project_may_forbid_warnings_and_headers_are_read_line_by_line(
+    embedded: Callable[[str], Embedded],
+) -> None:
+    c = embedded("paper-4.1-helical")
+    command = [COMPILERS[0], "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"{c.prefix}-casadi.c"]
+    done = subprocess.run(command, cwd=c.folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    tables = re.findall(rf"{c.prefix}_\w+\[\w+ \+ 1\] = \{{([^}}]*)\}}", c.header)
+    assert len(tables) > 20
+    for table in tables:
+        for line in table.strip().splitlines():
+            assert line.strip().rstrip(",").count(",") == 0 or '"' in line
+
+
+def test_units_of_f_twists_rates_and_multipliers_are_data() -> None:
+    files = generate_c(load_case("hexapod-machining"), "")
+    data = json.loads(files["manifest.json"])
+    units = {each["name"]: each["unit"] for each in data["parameters"]}
+    assert data["F_unit"] == "(in/rad)\N{SUPERSCRIPT TWO}"
+    assert (units["twist_0"], units["twist_5"], data["tasks"][0]["rate_unit"]) == ("rad/rad", "in/rad", "in/rad")
+    of_limits = {each["key"]: each["multiplier_unit"] for each in data["limits"]}
+    assert of_limits["leg_length.max"] == f"{data['F_unit']}/in"
+    assert of_limits["base_joint_angle.max"] == f"{data['F_unit']}/rad"
+    assert of_limits["rate_share.max"] == data["F_unit"]
+    header = next(text for name, text in files.items() if name.endswith(".h") and "_F_unit" in text)
+    assert '_F_unit = "(in/rad)\\302\\262";' in header
+    assert "_limit_multiplier_units[" in header
+    # A translation has no angle to be measured by.
+    drill = json.loads(generate_c(load_case("drilling-spindle"), "")["manifest.json"])
+    assert (drill["F_unit"], drill["tasks"][0]["rate_unit"]) == ("(mm/mm)\N{SUPERSCRIPT TWO}", "mm/mm")
+
+
 def test_the_header_serves_cpp(tmp_path: Path, embedded: Callable[[str], Embedded]) -> None:
     compiler = shutil.which("g++")
     if compiler is None:

@@ -200,3 +200,28 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         assert words in err
     with pytest.raises(InputError, match="is given twice"):
         compare(case(), ["case", build_model("6-ups"), "case"])
+
+
+def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cli: Run) -> None:
+    names = ["6-ups", "delta", "case"]
+    code, out, err = cli("compare", "hexapod-machining", *names, "--starts", "2", "--json", "-")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
+    # The six legs given joint by joint resist the motion more, without all limits but one.
+    assert kept["6-ups"][2] > kept["case"][2]
+    assert [(each["name"], each["part"]) for each in result["robots"]] == [
+        ("case", "ranked"),
+        ("6-ups", "ranked"),
+        ("delta", "no freedom"),
+    ]
+    assert [kept[name][1] for name in names] == [1, 1, 7]
+    sentences = {each["name"]: " ".join(each["sentences"]) for each in result["robots"]}
+    for name, measure in (("6-ups", "actuator_length"), ("delta", "actuator_angle")):
+        assert "legs between joint centres, and this robot is given joint by joint" in sentences[name]
+        assert f"its own measures are {measure}" in sentences[name]
+        assert "cannot hold" not in sentences[name]
+    units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in result["robots"]}
+    assert units == {"case": {"in/rad"}, "6-ups": {"in/rad"}, "delta": {"rad/rad"}}
+    # The case's robot keeps its ranges with --range 0 too.
+    assert any("--range 0 for one size of all but the case's robot" in each for each in result["sentences"])

@@ -42,7 +42,7 @@ def with_twist(nlp: Nlp, twist: np.ndarray) -> Nlp:
 def feasible(nlp: Nlp) -> np.ndarray:
     """The general twist, projected on the twists that the platform can make with free actuators."""
     numbers = nlp.program.kernels.robot_state(nlp.start, nlp.arguments)
-    rows = constraint_rows(nlp.program.model, numbers.jacobian, numbers.actuators)
+    rows = constraint_rows(nlp.program.model, numbers.velocities, numbers.position)
     work = np.hstack([rows[:, 3:], rows[:, :3]])
     return GENERAL - np.linalg.pinv(work, rcond=1e-9) @ (work @ GENERAL)
 

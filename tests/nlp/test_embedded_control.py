@@ -210,8 +210,8 @@ def test_refused_input_leaves_the_last_answer_and_every_status_has_words(embedde
     assert np.all(bad.x == -7)
     words = c._library[f"{c.prefix}_status_text"]
     words.restype = ctypes.c_char_p
-    texts = [words(status).decode() for status in range(-1, 6)]
-    assert len(set(texts)) == 6
+    texts = [words(status).decode() for status in range(-1, 8)]
+    assert len(set(texts)) == 8
     assert texts[0] == texts[-1]
     assert all(text and not text.endswith(".") for text in texts)
 

@@ -34,6 +34,7 @@ from screwsynth.nlp import (
 )
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.evidence.state import loops_are_closed
 
 Run = Callable[..., tuple[int, str, str]]
@@ -117,6 +118,25 @@ def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) ->
 
         slope = (best(value + step) - best(value - step)) / (2 * step)
         assert found.derivative == pytest.approx(slope, rel=1e-4, abs=1e-5 * abs(own.F / value)), name
+
+
+def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
+    # A Delta does not turn: no sum of changes of the other numbers closes its loops where it is turned.
+    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 0}
+    tables["solve"]["starts"] = 1
+    solution = solve(case_from_tables(tables, name="delta", source="delta"))
+    rows = {row.name: row for row in sensitivities(solution.nlp, solution.x)}
+    assert {name for name, row in rows.items() if row.derivative is None} == {"angle"}
+    assert rows["angle"].hindrance is Hindrance.NO_CHOICE
+    assert "fixed: the robot has no choice of it" in str(solution.table())
+    # The planar robot has the choice of its rotation.
+    tables = tomllib.loads(starter_case(robot_function("planar-3-rrr")()))
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 3}
+    tables["solve"]["starts"] = 1
+    solution = solve(case_from_tables(tables, name="planar", source="planar"))
+    rows = {row.name: row for row in sensitivities(solution.nlp, solution.x)}
+    assert rows["angle"].derivative
 
 
 def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: Run) -> None:

@@ -55,7 +55,7 @@ def test_motor_rates_of_reachy_mini_are_its_makers() -> None:
     closure = ca.vertcat(*[each.expression for each in model.closure])
     length = ca.SX.sym("length")
     rows = ca.densify(jacobian(model.wrenches, length, model.members))
-    screws = ca.densify(ca.horzcat(*[each.screw for each in model.actuators]))
+    screws = ca.densify(ca.horzcat(*[each.screws for each in model.actuators]))
     unknowns = own.all[1]
     function = ca.Function("head", [*own.all, length], [closure, ca.jacobian(closure, unknowns), rows, screws])
     typical = ca.DM([value for each in model.parameters for value in each.typical])
@@ -303,7 +303,7 @@ def test_the_written_robot_is_refused_where_it_is_another(tmp_path: Path) -> Non
     for number, wrong in (("0.0766", "0.0767"), ("0.1495", "0.1496")):
         other = text.replace(number, wrong, 1)
         assert other != text
-        with pytest.raises(InputError, match="would state another robot"):
+        with pytest.raises(InputError, match="differs from the model: its work rates are off by"):
             check_text(other, found.mechanism, found.size)
     with pytest.raises(RobotError):
         robot(**{**found.tables, "limb": [{"joints": []}]})

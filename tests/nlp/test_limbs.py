@@ -23,7 +23,7 @@ from screwsynth.nlp.certificate.limbs.sharedcuts import LeftOwn
 from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.standardform import standard_form
+from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
@@ -240,6 +240,8 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
     """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
     form, found = separated(poses(0))
     search = sharedsearch.SharedSearch(form, found, Incumbent(form), None, 1)
+    for _ in found.limbs:
+        search.step(-np.inf)  # prepares a limb
     boxes = search._opened.pop(1)
     for bound in (np.inf, 1.0):
         with np.errstate(all="ignore"):
@@ -250,3 +252,21 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
             ]
         assert sums.bound[0] == min(bound, sums.sums[0])
         assert all(each.own.of.size for each in lists)
+
+
+def test_the_time_limit_ends_the_preparation_of_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Engines of long limbs take seconds: a search whose time is up builds no further one."""
+    built: list[object] = []
+    engine_for = sharedsearch.limb_engine_for
+
+    def counted(form: StandardForm, shared: int, engine: str | None, jobs: int) -> LimbEngine:
+        built.append(form)
+        return engine_for(form, shared, engine, jobs)
+
+    monkeypatch.setattr(sharedsearch, "limb_engine_for", counted)
+    nlp = formulate(machine(2.0, pose_is_free=True))
+    found = certify_program(nlp, time_limit=1e-9)
+    assert (found.status, found.open, built) == (CertificateStatus.INCOMPLETE, 1, [])
+    assert found.reason.startswith("stopped after")
+    assert certify_program(nlp, gap=0.9, time_limit=60).status is CertificateStatus.PROVED
+    assert built

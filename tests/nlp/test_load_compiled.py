@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -74,7 +75,8 @@ def test_answers_are_those_of_the_c(compiled: CompiledCase, embedded: Callable[[
         assert (found.axis[k] == one.axis).all()
     assert {OK, BAD_INPUT} <= statuses
     assert (found.ok == (found.status == OK)).all()
-    assert compiled.statuses == ("OK", "NOT_CONVERGED", "INFEASIBLE", "BAD_INPUT", "BUDGET")
+    names = ("OK", "NOT_CONVERGED", "INFEASIBLE", "BAD_INPUT", "BUDGET", "OTHER_ASSEMBLY", "RANGE_END")
+    assert compiled.statuses == names
 
 
 def test_rows_do_not_depend_on_threads_or_company(compiled: CompiledCase) -> None:
@@ -128,6 +130,11 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         ({"x0": spoilt}, r"x0\[2, 1\] = nan: must be finite"),
         ({"lower": np.full(6, -np.inf)}, r"lower\[0\] = -inf"),
         ({"x0": [["a"] * 6]}, "x0: must be an array of numbers"),
+        ({"x0": [["1"] * 6]}, "x0: must be an array of numbers"),
+        ({"x0": np.array([1, 2, 3, 4, 5, "6"], dtype=object)}, "x0: must be an array of numbers"),
+        ({"p": np.full(11, 1 + 0j)}, "p: must be an array of numbers"),
+        ({"limits": {"angle.max": "0.1"}}, "must be an array of numbers"),
+        ({"max_iterations": 3 + 0j}, "must be an array of numbers"),
         ({"x0": x0, "p": p[:3]}, "x0 has 4, p has 3"),
         ({"x0": x0, "limits": {"angle.max": [0.1, 0.2]}}, "x0 has 4, limits has 2"),
         ({"limits": {"angel.max": 0.1}}, "did you mean 'angle.max'"),
@@ -144,6 +151,14 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         with pytest.raises(InputError, match=match) as error:
             compiled.solve(**arguments)
         assert "\n" not in str(error.value)
+
+
+def test_a_pickle_has_the_folder_alone(compiled: CompiledCase, folder: Path) -> None:
+    text = pickle.dumps(compiled)
+    assert str(folder).encode() in text
+    assert len(text) < 500
+    again = pickle.loads(text)
+    assert (again.solve().x == compiled.solve().x).all()
 
 
 def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

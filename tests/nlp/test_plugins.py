@@ -213,7 +213,7 @@ def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
 def test_it_is_found_by_a_new_process(tripod: Path, tmp_path: Path) -> None:
     program = f"import sys; sys.path.insert(0, {str(tripod)!r}); from screwsynth.nlp.cli.main import main; main()"
     command = [sys.executable, "-P", "-c", program, "solve", case_file(tmp_path), "--json", "-"]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert json.loads(ended.stdout)["status"] == "optimal"
 

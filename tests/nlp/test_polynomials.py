@@ -16,9 +16,10 @@ from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmeti
 from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
 from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+from screwsynth.nlp.certificate.paper.statement import program_of
 from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.solver.certified import certify, program_of, proof_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")

@@ -19,8 +19,9 @@ from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.certificate.paper.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
 from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.certificate.paper.prooftree import TreeReader, read_claims
+from screwsynth.nlp.certificate.paper.statement import program_of
 from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
-from screwsynth.nlp.solver.certified import certify, program_of, proof_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 
 Run = Callable[..., tuple[int, str, str]]
 NAME = "paper-4.1-helical-axis-z"
@@ -297,7 +298,12 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
     bound = result["certificate"]["bound"]
-    assert f"{bound:.10g}" in out
+    assert bound <= float(out.split("F is at most ")[1].split(" ")[0]) <= bound * (1 + 1e-9)
+    whole = {
+        "weighted-sum": "F being 1 F('drive the screw') + 1 F('other')\n",
+        "worst-case": "F being the least of F('drive the screw') / 1 and F('other') / 1\n",
+    }
+    assert whole[method] in out
     code, out, _ = cli("solve", str(case), "--certify", "--starts", "4", "--json", "-")
     assert code == 0
     assert json.loads(out)["combined"]["certificate"]["bound"] >= json.loads(out)["combined"]["value"]
@@ -347,6 +353,10 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
     assert "could not be shown" in rejected(replace(proof, tree=lower), case)
     assert "ends" in rejected(replace(proof, tree=proof.tree[:-1]), case)
     assert "goes on" in rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), case)
+    # Bounds whose sum is no number.
+    for huge in (np.finfo(float).max, np.inf, np.nan):
+        limb = struct.pack("<d", huge) + bytes([Node.BOUNDED])
+        assert "together" in rejected(replace(proof, tree=bytes([Node.LIMBS]) + 2 * limb), case)
 
 
 def test_leg_clearance_is_covered_and_its_proof_holds() -> None:

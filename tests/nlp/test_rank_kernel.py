@@ -85,7 +85,7 @@ FAULTS = {
     "the half of a square is its own middle": ("b == a - n ? 0.5 : 1.0", "b == a - n ? 0.0 : 1.0"),
     "a square moves about 0": ("EACH middle[l] += 0.5 * terms[t][l], size", "EACH size"),
     "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (0 * rest[l] + "),
-    "the rest has half its width": ("double half = 0.5 * (v->q[l] - v->p[l]);", "double half = 0.1 * (v->q[l] - v->p[l]);"),
+    "the rest has a fifth of its width": ("double half = 0.5 * (v->q[l]", "double half = 0.1 * (v->q[l]"),
     "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < 3)"),
 }  # fmt: skip
 
@@ -127,7 +127,7 @@ class Copy:
 
 
 def is_found(copy: Copy, problem: Problem, matrix: RankMatrix) -> bool:
-    """Whether a point of a box has ``I - C M(y)`` beyond the kernel's bound, or a box counts whose bound is too large."""
+    """Whether ``I - C M(y)`` is beyond the kernel's bound at a point of a box, or a box counts with too large a bound."""
     rng = np.random.default_rng(1)
     test = RankTest(matrix, problem.z, problem.start)
     examiner = Examiner(problem, test, "c")

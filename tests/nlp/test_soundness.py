@@ -106,7 +106,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    target, name = (search._Search, "_branch") if place == "branch" else (NumpyRankEngine, "examine")
+    target, name = (search._Search, "_halves") if place == "branch" else (NumpyRankEngine, "examine")
     monkeypatch.setattr(target, name, interrupt)
     found = prove_regular(legs, box, engine="numpy")
     assert found.outcome is Outcome.OPEN

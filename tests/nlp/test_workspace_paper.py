@@ -7,7 +7,6 @@ import math
 import struct
 import subprocess
 import sys
-import time
 import tomllib
 import zlib
 from collections.abc import Callable
@@ -75,6 +74,7 @@ home = { position = [0, 0, 20] }
 position = [{ min = -2, max = 2 }, 0.5, { min = 18, max = 21 }]
 rotation = { roll = 3, pitch = { min = -5, max = 9 } }
 """
+LEG_ERROR = 0.008
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
 
 
@@ -86,13 +86,13 @@ def case_of(text: str = TEXT) -> Case:
 def judged() -> tuple[Judgement, PaperRecord]:
     record = PaperRecord()
     # Lengths of legs are asked for once more, without their limit.
-    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=0.008, paper=record)
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=LEG_ERROR, paper=record)
     return found, record
 
 
 @pytest.fixture(scope="module")
 def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
-    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=0.008)
+    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Genera
 
 def rejected(proof: PaperProof, case: Case | None = None) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_paper(proof, case_of() if case is None else case)
+        check.check_paper(proof, case_of() if case is None else case, leg_error=proof.leg_error)
     return str(caught.value)
 
 
@@ -144,7 +144,7 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple
     assert not proof.unproved
     again = read_paper(proof.as_text(), "again")
     assert again == proof
-    checked = check.check_paper(again, case_of())
+    checked = check.check_paper(again, case_of(), leg_error=LEG_ERROR)
     assert len(checked.claims) == len(proof.claims)
     assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}
     bounds = {(each.name, each.sense): each.bound for each in checked.claims}
@@ -287,29 +287,26 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
 
 
 def test_random_machines_are_accepted() -> None:
-    """A dozen random hexapods of each kind of rotation, and the time against that of the NumPy search."""
+    """A dozen random hexapods, some of each kind of rotation."""
     rng = np.random.default_rng(5)
-    ratios = []
-    while len(ratios) < 12:
+    accepted = 0
+    while accepted < 12:
         machine = Legs(
             np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
             np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
         )
-        kind, size = list(TurnKind)[len(ratios) % 3], float(rng.uniform(0.1, 0.3))
+        kind, size = list(TurnKind)[accepted % 3], float(rng.uniform(0.1, 0.3))
         turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
         near = rng.uniform((-3, -3, 9), (3, 3, 15))
         place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
         workspace = Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
         record = TreeRecord()
-        began = time.process_time()
         found = prove_regular(machine, pose_box(workspace), engine="numpy", most_boxes=3000, recorder=record)
-        searched = time.process_time()
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)
         show(rank(root, machine), root, read_leaves(record.tree(), root.lower, root.upper))
-        ratios.append((time.process_time() - searched) / (searched - began))
-    assert float(np.median(ratios)) < 20
+        accepted += 1
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))

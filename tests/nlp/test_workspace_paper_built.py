@@ -103,7 +103,7 @@ def proof(both: tuple[Judgement, PaperProof]) -> PaperProof:
 
 def rejected(proof: PaperProof, text: str = TEXT) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_paper(proof, case_of(text))
+        check.check_paper(proof, case_of(text), leg_error=proof.leg_error)
     return str(caught.value)
 
 
@@ -139,7 +139,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Pa
     others = ("1+", "2-", "2+", "3-", "3+")
     kept = {each.name for each in proof.claims if not any(f" {leg}" in each.name for leg in others)}
     some = alone(proof, *kept, strokes[0], "leg_clearance limbs 1- and 2+", "joint_spacing base joints 1- and 1+")
-    checked = check.check_paper(some, case_of())
+    checked = check.check_paper(some, case_of(), leg_error=some.leg_error)
     assert len(checked.claims) == len(some.claims)
     # No machine that the search found is beyond a bound that the check shows, and the bounds are those of the search.
     extremes = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
@@ -162,7 +162,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Pa
 
 def rejections(proof: PaperProof, text: str = TEXT) -> Callable[..., str]:
     """The check of one claim after the other, with other values in it: a function that returns why it is rejected."""
-    checker = check._Checker(proof, case_of(text))
+    checker = check._Checker(proof, case_of(text), proof.leg_error)
     expected = {each.key: each for each in checker.expected}
 
     def reject(name: str, sense: str, **values: Any) -> str:  # noqa: ANN401
@@ -444,7 +444,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     text += "rotation = {angle={min=-30,max=30}}\n"
     judged, given = written(text, (), with_limits=False)
     assert judged.regularity.errors is not None
-    (found,) = check.check_paper(read_paper(given.as_text(), "again"), case_of(text)).claims
+    (found,) = check.check_paper(read_paper(given.as_text(), "again"), case_of(text), leg_error=given.leg_error).claims
     assert found.is_refuted
     assert found.by_machine
     pose, *machine = claim(given, "regular").sides
@@ -483,7 +483,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     judged, given = written(text, ASKED[1:], with_objective=False)
     reject = rejections(given, text)
     for name, sense, extreme in zip(ASKED[1:], ("min", "max"), judged.extremes[-2:], strict=True):
-        checked = check.check_paper(alone(given, name), case_of(text)).claims[0]
+        checked = check.check_paper(alone(given, name), case_of(text), leg_error=given.leg_error).claims[0]
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
         assert "wrong" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))

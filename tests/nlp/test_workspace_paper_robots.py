@@ -25,6 +25,7 @@ from screwsynth.nlp.workspace.paper.anyrobot import motionclaim
 from screwsynth.nlp.workspace.paper.anyrobot.connected import Pieces, refuse_apart
 from screwsynth.nlp.workspace.paper.anyrobot.interval import balls, half_widths
 from screwsynth.nlp.workspace.paper.anyrobot.rankofrobot import rank_claim
+from screwsynth.nlp.workspace.paper.anyrobot.robotclaims import robot_claims
 from screwsynth.nlp.workspace.paper.check import check_paper
 from screwsynth.nlp.workspace.paper.document import (
     PaperClaim,
@@ -289,3 +290,24 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     assert small.workspace is not None
     other = replace(proof, workspace=workspace_numbers(small.workspace))
     assert "not one of the workspace" in rejected(other, small)
+
+
+@pytest.mark.parametrize(
+    ("name", "reached", "words"),
+    [
+        ("6-sps", True, ""),
+        ("6-rus", True, "the assembly of home"),
+        ("6-rus", False, "every assembly"),
+        ("planar-3-prr", True, "every assembly in which limbs in closed form are as at home"),
+        ("3-rps", True, "every assembly"),
+    ],
+)
+def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, words: str) -> None:
+    case = gallery_case(name, 0.02, 3)
+    assert case.workspace is not None
+    limbs = {f"reach limb {k}" for k in range(1, 7)} if reached else set()
+    found = robot_claims(case, case.workspace, limbs)
+    assert found.numbers_at == words
+    # Unknowns that are still variables may have any value; those in closed form have home's.
+    unknowns = [k for at_pose in found.layout.places.unknowns for k in at_pose]
+    assert len(unknowns) == {"6-sps": 0, "6-rus": 0 if reached else 6, "planar-3-prr": 5, "3-rps": 6}[name]

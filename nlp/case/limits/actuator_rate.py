@@ -1,8 +1,7 @@
 """A limit on the rates of actuators for the task's motion.
 
-A straight leg's rate is the work rate of its force. In a limb given joint by joint, the rates are the least squares
-solution of ``r = sum_a rho_a qdot_a``, with ``r`` the part of the task's twist that the limb resists and ``rho_a`` that
-of an actuator's unit screw. The constraint is on ``qdot^2``.
+A straight leg's rate is the work rate of its force. The rates of a limb given joint by joint are those that leave least
+of the part of the task's twist that the limb resists. The constraint is on ``qdot^2``.
 """
 
 from __future__ import annotations
@@ -11,10 +10,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self
 
-import casadi as ca
 from casadi import SX
 
-from ....models import Dimension, Model, WrenchKind
+from ....models import Dimension, Model, WrenchKind, rates_expression
+from ...errors import CaseError
 from .constraint import SQUARED_NUMBER, BoundedConstraint, between
 from .interval import AtMost
 from .limit import Limit, LimitedCase, PosedRobot, Written
@@ -53,12 +52,16 @@ class ActuatorRate(Limit[AtMost]):
         return cls(written.value.max)
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a rate that is not positive.
+        """Refuse a rate that is not positive, and a robot whose rates its motion does not determine.
 
         Raises:
             CaseError: in the words of a case file.
         """
         case.check_number("actuator_rate.max", self.max, Dimension.NUMBER)
+        names = () if case.model.generic is None else case.model.generic.undetermined
+        if names:
+            fault = "is not for this robot: its actuators can move while its platform stands still, so that its motion"
+            raise CaseError("limits.actuator_rate", f"{fault} does not determine the rates of {', '.join(names)}")
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the squared rate of each actuator for each task."""
@@ -81,6 +84,5 @@ def _rates(pose: PosedRobot, limb: str) -> _Rates:
     own = [a for a, each in enumerate(model.actuators) if each.limb == limb]
     if not own:
         return _Rates((), SX(0, robot.rates.shape[1]))
-    screws, resisted = robot.actuators[:, own], robot.rates[rows, :]
-    rho = robot.jacobian[rows, :] @ ca.vertcat(screws[3:, :], screws[:3, :])
-    return _Rates(tuple(model.actuators[a].name for a in own), ca.inv_minor(rho.T @ rho) @ (rho.T @ resisted))
+    values = rates_expression(robot.driven[rows, own], robot.relations[:, own], robot.rates[rows, :])
+    return _Rates(tuple(model.actuators[a].name for a in own), values)

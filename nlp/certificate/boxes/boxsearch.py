@@ -48,14 +48,13 @@ class BoxSearch(BoundedSearch[Boxes]):
         """Stop the engine."""
         self._engine.close()
 
-    def step(self, threshold: float) -> None:
+    def _step(self, threshold: float) -> None:
         """Examine a block of boxes, and close those whose bounds do not exceed a threshold."""
-        self._current = self._opened.pop(self._engine.block if self._turn else 1)
+        boxes = self._opened.pop(self._engine.block if self._turn else 1)
         self._turn += 1
-        found = self._engine.examine(self._current.lower, self._current.upper, threshold)
+        found = self._engine.examine(boxes.lower, boxes.upper, threshold)
         self._improve(found)
-        self._branch(self._current, found, threshold)
-        self._current = None
+        self._branch(boxes, found, threshold)
 
     @property
     def fault(self) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import heapq
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -127,8 +128,17 @@ class OpenBoxes(Generic[Chunk]):
         return -self._heap[0][0] if self._heap else -np.inf
 
 
-class BoundedSearch(Generic[Chunk]):
+class _Claim(NamedTuple):
+    """What a search claims: an upper bound over all boxes, and the number of open ones."""
+
+    bound: float
+    left: int
+
+
+class BoundedSearch(ABC, Generic[Chunk]):
     """What every search by bisection keeps: its open boxes, and a bound over all boxes.
+
+    Bound and number of open boxes are those after the last complete step: one that is interrupted changes neither.
 
     Args:
         root: the whole box.
@@ -140,12 +150,23 @@ class BoundedSearch(Generic[Chunk]):
     def __init__(self, root: Chunk) -> None:
         self._opened: OpenBoxes[Chunk] = OpenBoxes()
         self._opened.push(root)
-        # Boxes under examination, and open ones that are too small to bisect.
-        self._current: Chunk | None = None
+        # Open boxes that are too small to bisect.
         self._undivided: list[Chunk] = []
         # Largest bound of all boxes that were closed because of their bounds.
         self._closed_bound = -math.inf
         self.boxes, self._turn = 0, 0
+        self._claim = _Claim(float(root.bound.max()), root.count)
+
+    def step(self, threshold: float) -> None:
+        """Examine some boxes, and close those whose bounds do not exceed a threshold."""
+        self._step(threshold)
+        bounds = [float(boxes.bound.max()) for boxes in self._undivided]
+        left = self._opened.count + sum(boxes.count for boxes in self._undivided)
+        self._claim = _Claim(max(self._closed_bound, self._opened.bound, *bounds, -math.inf), left)
+
+    @abstractmethod
+    def _step(self, threshold: float) -> None:
+        """Examine some boxes, and close those whose bounds do not exceed a threshold."""
 
     @property
     def is_open(self) -> bool:
@@ -155,13 +176,9 @@ class BoundedSearch(Generic[Chunk]):
     @property
     def left(self) -> int:
         """Number of open boxes."""
-        current = 0 if self._current is None else self._current.count
-        return self._opened.count + sum(boxes.count for boxes in self._undivided) + current
+        return self._claim.left
 
     @property
     def bound(self) -> float:
         """Upper bound of the maximum over the boxes, without that of the incumbent; -inf where no point is feasible."""
-        others = [float(boxes.bound.max()) for boxes in self._undivided]
-        if self._current is not None:
-            others.append(float(self._current.bound.max()))
-        return max(self._closed_bound, self._opened.bound, *others, -math.inf)
+        return self._claim.bound

@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..enclosing.intervals import TINY, ULP
+from ..enclosing.intervals import LARGEST, TINY, ULP
 from ..enclosing.quotients import as_quotient
 from ..enclosing.secondorder import Forms, monomials
 from ..separation import terms_of
@@ -86,7 +86,8 @@ def tangent_forms(rows: Forms, squared: tuple[int, ...], count: int) -> TangentF
         e = _low_point(rows.c[N][of], rows.a[N][of], rows.c[D][of])
         values = _values(rows, e)
         ratio = np.where(values[D][of] > 0, values[N][of] / values[D][of], 0.0)
-        ratio = np.where(np.isfinite(ratio), ratio, 0.0)
+        # Any ratio gives a bound: one whose square neither underflows nor overflows.
+        ratio = np.where((np.abs(ratio) > 1 / LARGEST) & (np.abs(ratio) < LARGEST), ratio, 0.0)
         weights = np.zeros_like(rows.c)
         weights[j] = 1.0
         weights[count + 2 * np.flatnonzero(of)] = -2 * ratio

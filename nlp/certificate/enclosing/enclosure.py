@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .intervals import TINY, ULP, interval_product, widen
+from .intervals import LARGEST, TINY, ULP, interval_product, widen
 from .tape import Op, Tape
 from .univariate import RULES
 
@@ -71,7 +71,8 @@ def midpoints(lower: FloatArray, upper: FloatArray) -> Midpoints:
     """Return the centres and radii of boxes with ends (n, B)."""
     centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
     radius = np.maximum(upper - centre, centre - lower)
-    return Midpoints(centre, np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0))
+    radius = np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0)
+    return Midpoints(centre, np.where(np.maximum(-lower, upper) < LARGEST, radius, np.inf))
 
 
 def enclose(tape: Tape, lower: FloatArray, upper: FloatArray) -> Enclosures:
@@ -141,7 +142,8 @@ def _second_order(one: _Factor, other: _Factor) -> _SecondOrder:
     first, second = ax * ry, ay * rx
     plus, minus = np.abs(first + second).sum(axis=0), np.abs(first - second).sum(axis=0)
     quarter = 0.25 / np.where(both > 0, both, 1.0)
-    most, least = np.minimum(most, plus * plus * quarter), np.minimum(least, minus * minus * quarter)
+    # In this order: the square of a sum may underflow.
+    most, least = np.minimum(most, plus * (plus * quarter)), np.minimum(least, minus * (minus * quarter))
     mx, my = np.maximum(-px, qx), np.maximum(-py, qy)
     mixed = rx * my + ry * mx + mx * my
     p = np.minimum(cx * py, cx * qy) + np.minimum(cy * px, cy * qx) - (least + mixed)
@@ -279,7 +281,7 @@ class _Interpreter:
         pn = w.p[x] - np.where(k >= 0, k * w.q[y], k * w.p[y])
         qn = w.q[x] - np.where(k >= 0, k * w.p[y], k * w.q[y])
         whole = np.abs(w.c[x]) + self.rad[x] + steepness * (np.abs(c) + self.rad[y])
-        sn = w.s[x] + steepness * w.s[y] + (self.slack * whole + TINY)
+        sn = w.s[x] + steepness * w.s[y] + (self.slack * whole + TINY * (1 + np.abs(c)))
         rn = np.abs(an).sum(axis=0)
         nothing = np.zeros_like(k)
         p, q, big, other = _second_order(
@@ -300,9 +302,10 @@ class _Interpreter:
         square = moved * moved
         p = np.minimum(slope * w.p[x], slope * w.q[x]) + np.minimum(least * square, 0.0)
         q = np.maximum(slope * w.p[x], slope * w.q[x]) + np.maximum(most * square, 0.0)
-        steep = np.abs(slope) + 2 * np.maximum(np.abs(least), np.abs(most)) * (moved + w.s[x])
+        bent = np.maximum(np.abs(least), np.abs(most))
+        steep = np.abs(slope) + 2 * bent * (moved + w.s[x])
         size = np.abs(slope) * moved + np.abs(value)
-        s = steep * w.s[x] + error * (1 + moved) + (self.slack * size + TINY)
+        s = steep * w.s[x] + (error + TINY * (1 + bent)) * (1 + moved) + self.slack * size
         return _Result(value, slope * w.a[x, span], p, q, s, lo, hi)
 
     def _write(self, to: int, result: _Result, span: slice) -> None:
@@ -314,7 +317,7 @@ class _Interpreter:
         p, q, s = np.minimum(p * grown, 0.0), np.maximum(q * grown, 0.0), s * grown
         ends = ULP * np.abs(c) + s
         down, up = (rad - p + ends) * grown, (rad + q + ends) * grown
-        good = (down < np.inf) & (up < np.inf) & (np.abs(c) < np.inf)
+        good = (down < LARGEST) & (up < LARGEST) & (np.abs(c) < LARGEST)
         low, high = c - down, c + up
         low, high = low - ULP * np.abs(low), high + ULP * np.abs(high)
         if not good.all():

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 ULP = 2.0**-51
 #: More than underflow can cost an operation. Additions are exact there.
 TINY = 1e-300
+#: A value of this size or more is poisoned, so that no square and no product of two overflows, and no inverse of a
+#: square underflows.
+LARGEST = 1e150
 #: Error, in parts of 2^-51, of sine, cosine, exponential, logarithm and arc tangent as libraries compute them.
 LIBRARY = 8.0
 

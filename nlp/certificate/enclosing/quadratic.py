@@ -25,6 +25,10 @@ _MULTIPLIER_ROUNDS = 8
 _TANGENT_ROUNDS = 3
 #: Part of its terms by which a quadratic's level is lowered before its roots: far more than their rounding.
 _ROOT_SLACK = 1e-12
+#: Least size of the terms of a quadratic whose roots are taken; its inverse is the largest.
+_LEAST_SIZE = 1e-140
+#: Largest weight of a condition: what underflow takes from its model, times the weight, is still less than ``TINY``.
+_LARGEST_WEIGHT = 1e20
 
 
 class Ends(NamedTuple):
@@ -159,8 +163,8 @@ class QuadraticModel:
         # A side without a solution has last < first: then the other side's first solution is the end.
         low = np.where(left_last >= left_first, -left_last, right_first)
         high = np.where(right_last >= right_first, right_last, -left_first)
-        # A number that is not finite excludes nothing.
-        known = np.isfinite(need) & np.isfinite(self.b) & np.isfinite(self.w) & np.isfinite(diagonal)
+        # Numbers that are not finite, or whose squares may underflow or overflow, exclude nothing.
+        known = (size > _LEAST_SIZE) & (size < 1 / _LEAST_SIZE)
         return Ends(np.where(known, low, -1.0), np.where(known, high, 1.0))
 
 
@@ -183,7 +187,8 @@ def affine_ends_reaching(value: Enclosures, r: int, sign: float, level: float) -
 def largest_on_unit_interval(linear: FloatArray, quadratic: FloatArray) -> FloatArray:
     """Return the largest ``linear t + 1/2 quadratic t^2`` for t in [0, 1], linear not negative."""
     inside = (quadratic < 0) & (linear < -quadratic)
-    peak = np.where(inside, linear * linear / np.where(inside, -2 * quadratic, 1.0), 0.0)
+    # In this order: the square of a small number may underflow.
+    peak = np.where(inside, linear * (linear / np.where(inside, -2 * quadratic, 1.0)), 0.0)
     return np.where(inside, peak, linear + 0.5 * quadratic)
 
 
@@ -302,7 +307,7 @@ def multipliers(
                 new = np.clip(new, 0.0, weights[r] + weights[0])
             elif not equation[r]:
                 new = np.minimum(new, 0.0)
-            new = np.where(usable[r] & np.isfinite(new), new, weights[r])
+            new = np.where(usable[r] & (np.abs(new) < _LARGEST_WEIGHT), new, weights[r])
             change = new - weights[r]
             left += change * np.where(usable[r], directions[r], 0.0)
             weights[r] = new
@@ -319,7 +324,7 @@ def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
     """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
     steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
     middle, error = model.value.c, model.value.s
-    spread = (error + steep) * (1 + ULP) + ULP * np.abs(middle)
+    spread = (error + (steep + TINY)) * (1 + ULP) + ULP * np.abs(middle)
     high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
     low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
     return low, high

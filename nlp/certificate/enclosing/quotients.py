@@ -33,7 +33,7 @@ from casadi import SX
 from ..kinks import without_ties
 from ..separation import terms_of
 from .enclosure import Enclosures
-from .intervals import TINY, ULP
+from .intervals import LARGEST, TINY, ULP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 #: Rounding of a sum of fewer than a hundred products, in parts of the sum of their sizes: several times the largest.
 _SUM = 64 * ULP
+#: Least D for a model of a quotient: what underflow takes from a product, over D, is less than ``TINY``.
+_LEAST = 1e-20
 
 
 class Quotient(NamedTuple):
@@ -191,7 +193,7 @@ def _ratio(N: RowModel, D: RowModel) -> _Ratio:
     # Sizes of all terms of E, which may cancel.
     terms = np.abs(N.c) + size * np.abs(D.c) + (np.abs(N.b) + size * np.abs(D.b)).sum(axis=0)
     terms = terms + (np.abs(N.H) + size * np.abs(D.H)).sum(axis=(0, 1)) + w
-    offset = N.s + size * D.s + _SUM * terms
+    offset = N.s + size * D.s + (_SUM * terms + TINY * (1 + np.abs(D.c)))
     rest = (0.5 * np.abs(HE).sum(axis=(0, 1)) + w + offset) * (1 + _SUM)
     reach = np.abs(a).sum(axis=0) * (1 + _SUM)
     error = 2 * size * offset + 3 * _SUM * size * terms + TINY
@@ -199,9 +201,9 @@ def _ratio(N: RowModel, D: RowModel) -> _Ratio:
     ends = np.stack([N.lo / D.lo, N.lo / D.hi, N.hi / D.lo, N.hi / D.hi])
     far = (reach + rest) / D.lo
     lo, hi = np.fmax(ends.min(axis=0), rho - far), np.fmin(ends.max(axis=0), rho + far)
-    lo, hi = lo - _SUM * (np.abs(lo) + size), hi + _SUM * (np.abs(hi) + size)
-    is_defined = (D.lo > 0) & (N.s < np.inf) & (D.s < np.inf)
-    is_defined &= np.isfinite(rho) & np.isfinite(reach) & np.isfinite(rest)
+    lo, hi = lo - (_SUM * (np.abs(lo) + size) + TINY), hi + (_SUM * (np.abs(hi) + size) + TINY)
+    is_defined = (D.lo > _LEAST) & (N.s < np.inf) & (D.s < np.inf)
+    is_defined &= ((size > 1 / LARGEST) & (size < LARGEST) | (rho == 0)) & np.isfinite(reach) & np.isfinite(rest)
     return _Ratio(N, D, rho, a, reach, rest, error, lo, hi, is_defined)
 
 
@@ -219,11 +221,13 @@ def _square(ratio: _Ratio, sign: int) -> SquareModel:
     high = sign * (rho * (2 * N.c - rho * D.c)) + more + error
     numerator = np.maximum(np.abs(N.c) - N.s, 0.0) if sign > 0 else np.abs(N.c) + N.s
     low = sign * numerator**2 / (D.c + D.s if sign > 0 else D.c - D.s)
-    low = low - _SUM * np.abs(low)
+    low = low - (_SUM * np.abs(low) + TINY)
     half = 0.5 * (high - low) + _SUM * (np.abs(high) + np.abs(low))
     is_defined = ratio.is_defined & ~np.isnan(half)
-    most = np.fmin(np.maximum(ratio.lo**2, ratio.hi**2) * D.hi, np.maximum(N.lo**2, N.hi**2) / D.lo) * (1 + _SUM)
-    fewest = np.where((ratio.lo > 0) | (ratio.hi < 0), np.minimum(ratio.lo**2, ratio.hi**2), 0.0) * D.lo * (1 - _SUM)
+    lost = TINY * (1 + D.hi)
+    most = np.fmin(np.maximum(ratio.lo**2, ratio.hi**2) * D.hi, np.maximum(N.lo**2, N.hi**2) / D.lo) * (1 + _SUM) + lost
+    fewest = np.minimum(ratio.lo**2, ratio.hi**2) * D.lo * (1 - _SUM) - lost
+    fewest = np.where((ratio.lo > 0) | (ratio.hi < 0), fewest, 0.0)
     return SquareModel(
         c=0.5 * (high + low),
         s=np.where(is_defined, half, np.inf),
@@ -335,5 +339,5 @@ def _product(
     """Return the ends of ``sign`` times the product of two intervals, outwards."""
     ends = np.stack([r_lo * g_lo, r_lo * g_hi, r_hi * g_lo, r_hi * g_hi])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    low, high = low - _SUM * np.abs(low), high + _SUM * np.abs(high)
+    low, high = low - (_SUM * np.abs(low) + TINY), high + (_SUM * np.abs(high) + TINY)
     return (low, high) if sign > 0 else (-high, -low)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .enclosure import midpoints
-from .intervals import TINY, ULP, Interval, interval_product, widen
+from .intervals import LARGEST, TINY, ULP, Interval, interval_product, widen
 from .tape import Op, Tape
 from .univariate import RULES, Rule
 
@@ -243,7 +243,7 @@ class _Interpreter:
         q = x.q - np.minimum(k * y.p, k * y.q) + higher
         whole = np.abs(k) + moved
         long = np.abs(x.c) + x.rad + (x.most - x.least)
-        s = x.s + whole * y.s + (self.slack * (long + whole * y.size) + TINY)
+        s = x.s + whole * y.s + (self.slack * (long + whole * y.size) + TINY * (1 + y.size))
         s = s / near + (self.slack * whole + TINY)
         p, q = np.where(positive, p, -q) / near, np.where(positive, q, -p) / near
         one, two = sign / far, sign / near
@@ -271,7 +271,8 @@ class _Interpreter:
         size = np.abs(rule.value) + np.abs(slope) * moved + np.abs(curve) * (moved * moved)
         # A rule without a value poisons the result.
         unknown = 0 * (least + most)
-        error = steep * s + rule.error * (1 + moved + moved * moved) + (self.slack * size + TINY) + unknown
+        lost = TINY * (1 + np.abs(curve) + np.abs(rule.least) + np.abs(rule.most))
+        error = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + self.slack * size + unknown
         products = x.a[at.first] * x.a[at.second]
         Q = slope * x.Q + np.where(at.is_square[:, None], curve, 2 * curve) * products
         return Forms(rule.value, slope * x.a, Q, low, high, error, rule.lo, rule.hi)
@@ -296,7 +297,7 @@ class _Interpreter:
         p, q, s = np.minimum(v.p * grown, 0.0), np.maximum(v.q * grown, 0.0), v.s * grown
         ends = ULP * np.abs(v.c) + s
         down, up = (rad - least - p + ends) * grown, (rad + most + q + ends) * grown
-        good = (down < np.inf) & (up < np.inf) & (np.abs(v.c) < np.inf)
+        good = (down < LARGEST) & (up < LARGEST) & (np.abs(v.c) < LARGEST)
         low, high = v.c - down, v.c + up
         low, high = low - ULP * np.abs(low), high + ULP * np.abs(high)
         # fmax and fmin ignore an end that is NaN, which bounds nothing.

@@ -27,7 +27,8 @@ static void load(const Form *form, const Report *report, const Py_ssize_t *list,
             middle = smaller(larger(middle, lo), hi);
             double half = larger(hi - middle, middle - lo);
             lower[i][l] = lo, upper[i][l] = hi, centre[i][l] = middle;
-            radius[i][l] = half > 0 ? half * (1 + ULP) + TINY : 0.0;
+            half = half > 0 ? half * (1 + ULP) + TINY : 0.0;
+            radius[i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
         }
     }
 }

@@ -5,6 +5,7 @@
 #include "quadratic.h"
 
 #define ROOT_SLACK 1e-12
+#define LEAST_SIZE 1e-140 /* quadratic.py */
 
 /* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first without one. */
 static void roots(double linear, double quadratic, double need, double *first, double *last)
@@ -51,7 +52,7 @@ static void reach_quadratic(Box *x, double sign, double middle, const double *b,
         double diagonal = sign * H[i * n + i], linear = b[i], need = level - (total - x->t[i]);
         double size = fabs(need) + fabs(linear) + w[i] + fabs(diagonal) + fabs(total) + fabs(level);
         need = need - (ROOT_SLACK * size + TINY);
-        if (!(isfinite(need) && isfinite(linear) && isfinite(w[i]) && isfinite(diagonal)))
+        if (!(size > LEAST_SIZE && size < 1 / LEAST_SIZE))
             continue;
         if (need <= 0 && linear + w[i] + 0.5 * diagonal >= need && -linear + w[i] + 0.5 * diagonal >= need)
             continue;

@@ -37,7 +37,8 @@ INLINE void second_order(Part x, Part y, const double *balance, const double *si
         double both = rx * ry, cross = both - sizes[l];
         double most = 0.5 * (sizes[l] + balance[l]) + cross, least = 0.5 * (sizes[l] - balance[l]) + cross;
         double quarter = 0.25 / (both > 0 ? both : 1.0);
-        double more = plus[l] * plus[l] * quarter, less = minus[l] * minus[l] * quarter;
+        /* In this order: the square of a sum may underflow. */
+        double more = plus[l] * (plus[l] * quarter), less = minus[l] * (minus[l] * quarter);
         most = more < most ? more : most, least = less < least ? less : least;
         double mx = larger(-px, qx), my = larger(-py, qy), mixed = rx * my + ry * mx + mx * my;
         out->p[l] = smaller(cx * py, cx * qy) + smaller(cy * px, cy * qx) - (least + mixed);
@@ -61,7 +62,7 @@ INLINE void settle(Value *restrict v, int n, int first, int last, double slack, 
         double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
         double s = from->s[l] * grown, ends = ULP * fabs(c) + s, rad = v->rad[l];
         double down = (rad - p + ends) * grown, up = (rad + q + ends) * grown;
-        int good = (down < INFINITY) & (up < INFINITY) & (fabs(c) < INFINITY);
+        int good = (down < LARGEST) & (up < LARGEST) & (fabs(c) < LARGEST);
         double low = c - down, high = c + up;
         low = low - ULP * fabs(low), high = high + ULP * fabs(high);
         double lo = from->lo[l] > low ? from->lo[l] : low, hi = from->hi[l] < high ? from->hi[l] : high;
@@ -215,7 +216,7 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
                 pn[l] = x->p[l] - (by >= 0 ? by * y->q[l] : by * y->p[l]);
                 qn[l] = x->q[l] - (by >= 0 ? by * y->p[l] : by * y->q[l]);
                 double all = fabs(x->c[l]) + x->rad[l] + steepness * (fabs(c) + y->rad[l]);
-                sn[l] = x->s[l] + steepness * y->s[l] + (slack * all + TINY);
+                sn[l] = x->s[l] + steepness * y->s[l] + (slack * all + TINY * (1 + fabs(c)));
                 double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / near;
                 double least = one < two ? one : two, most = one < two ? two : one;
                 low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
@@ -253,11 +254,11 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
                 r.c[l] = rule.value, r.lo[l] = rule.lo, r.hi[l] = rule.hi, slopes[l] = slope;
                 r.p[l] = smaller(down, up) + smaller(rule.least * square, 0.0);
                 r.q[l] = larger(down, up) + larger(rule.most * square, 0.0);
-                double steep = fabs(slope) + 2 * larger(fabs(rule.least), fabs(rule.most)) * (moved + x->s[l]);
+                double bent = larger(fabs(rule.least), fabs(rule.most)), steep = fabs(slope) + 2 * bent * (moved + x->s[l]);
                 double size = fabs(slope) * moved + fabs(rule.value);
                 /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
                 double unknown = 0 * (rule.least + rule.most);
-                r.s[l] = steep * x->s[l] + rule.error * (1 + moved) + (slack * size + TINY) + unknown;
+                r.s[l] = steep * x->s[l] + (rule.error + TINY * (1 + bent)) * (1 + moved) + slack * size + unknown;
             }
             for (int i = first; i < last; i++)
                 EACH t[i][l] = slopes[l] * ax[i][l];

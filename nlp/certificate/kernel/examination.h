@@ -67,7 +67,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         double steep = 0.0, middle = x->c[r], error = x->s[r];
         for (int i = 0; i < n; i++)
             steep += larger(fabs(x->slope_lo[r * n + i]), fabs(x->slope_hi[r * n + i]));
-        steep = steep * (1 + 64 * ULP);
+        steep = steep * (1 + 64 * ULP) + TINY;
         double ends = ULP * fabs(middle), spread = (error + steep) * (1 + ULP) + ends;
         double high = middle + (spread * (1 + ULP) + ends), low = middle - (spread * (1 + ULP) + ends);
         x->high[r] = high < x->hi[r] ? high : x->hi[r];

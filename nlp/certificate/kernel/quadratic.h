@@ -6,6 +6,7 @@
 
 #define MULTIPLIER_ROUNDS 8
 #define TANGENT_ROUNDS 3
+#define LARGEST_WEIGHT 1e20 /* quadratic.py */
 
 /* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
@@ -51,7 +52,7 @@ static void choose_multipliers(Box *x, const int *equation, int first)
                 new = smaller(larger(new, 0.0), weight + x->weights[0]);
             else if (!equation[r])
                 new = smaller(new, 0.0);
-            if (!isfinite(new))
+            if (!(fabs(new) < LARGEST_WEIGHT))
                 continue;
             double change = new - weight;
             for (int i = first; i < n; i++)
@@ -136,7 +137,7 @@ static void combine(Box *x)
 static double largest_of(double linear, double quadratic)
 {
     if (quadratic < 0 && linear < -quadratic)
-        return linear * linear / (-2 * quadratic);
+        return linear * (linear / (-2 * quadratic)); /* in this order: the square may underflow */
     return linear + 0.5 * quadratic;
 }
 

@@ -5,6 +5,7 @@
 #include "quadratic.h"
 
 #define SUM (64 * ULP)
+#define LEAST 1e-20 /* quotients.py */
 
 /* The model c + b e + 1/2 e'He +- w |e| +- s of one row, with its ends over the box. */
 typedef struct {
@@ -65,7 +66,7 @@ static void product(double r_lo, double r_hi, double g_lo, double g_hi, int sign
     double least = smaller(smaller(p, q), smaller(r, s)), most = larger(larger(p, q), larger(r, s));
     if (isnan(p + q + r + s))
         least = -INFINITY, most = INFINITY;
-    least -= SUM * fabs(least), most += SUM * fabs(most);
+    least -= SUM * fabs(least) + TINY, most += SUM * fabs(most) + TINY;
     *low = sign > 0 ? least : -most, *high = sign > 0 ? most : -least;
 }
 
@@ -106,7 +107,7 @@ static void take_ratio(Box *x, Ratio *to)
             curved += fabs(one - other), terms += fabs(one) + fabs(other);
         }
     }
-    double offset = N->s + size * D->s + SUM * terms;
+    double offset = N->s + size * D->s + (SUM * terms + TINY * (1 + fabs(D->c)));
     double rest = (0.5 * curved + w + offset) * (1 + SUM);
     reach *= 1 + SUM;
     to->rho = rho, to->reach = reach, to->rest = rest;
@@ -115,8 +116,9 @@ static void take_ratio(Box *x, Ratio *to)
     double lo = smaller(smaller(ends[0], ends[1]), smaller(ends[2], ends[3]));
     double hi = larger(larger(ends[0], ends[1]), larger(ends[2], ends[3]));
     lo = larger(lo, rho - far), hi = smaller(hi, rho + far);
-    to->lo = lo - SUM * (fabs(lo) + size), to->hi = hi + SUM * (fabs(hi) + size);
-    to->is_defined = D->lo > 0 && N->s < INFINITY && D->s < INFINITY && isfinite(rho) && isfinite(reach) && isfinite(rest);
+    to->lo = lo - (SUM * (fabs(lo) + size) + TINY), to->hi = hi + (SUM * (fabs(hi) + size) + TINY);
+    to->is_defined = D->lo > LEAST && N->s < INFINITY && D->s < INFINITY && isfinite(reach) && isfinite(rest);
+    to->is_defined = to->is_defined && (rho == 0 || (size > 1 / LARGEST && size < LARGEST));
 }
 
 /* Adds the model of a quotient to row j, whose linear part is in gb: its matrix to one of (n, n), and its remainder to
@@ -146,12 +148,13 @@ static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *ma
     double error = ratio->error + SUM * (more + added), high = sign * (rho * (2 * N->c - rho * D->c)) + more + error;
     double numerator = sign > 0 ? larger(fabs(N->c) - N->s, 0.0) : fabs(N->c) + N->s;
     double low = sign * (numerator * numerator) / (sign > 0 ? D->c + D->s : D->c - D->s);
-    low -= SUM * fabs(low);
+    low -= SUM * fabs(low) + TINY;
     double half = 0.5 * (high - low) + SUM * (fabs(high) + fabs(low));
     double r_lo = ratio->lo * ratio->lo, r_hi = ratio->hi * ratio->hi;
     double most = larger(r_lo, r_hi) * D->hi, other = larger(N->lo * N->lo, N->hi * N->hi) / D->lo;
-    double fewest = ratio->lo > 0 || ratio->hi < 0 ? smaller(r_lo, r_hi) * D->lo * (1 - SUM) : 0.0;
-    most = (other < most || isnan(most) ? other : most) * (1 + SUM);
+    double lost = TINY * (1 + D->hi);
+    double fewest = ratio->lo > 0 || ratio->hi < 0 ? smaller(r_lo, r_hi) * D->lo * (1 - SUM) - lost : 0.0;
+    most = (other < most || isnan(most) ? other : most) * (1 + SUM) + lost;
     x->c[j] += 0.5 * (high + low), x->s[j] += is_defined && !isnan(half) ? half : INFINITY;
     x->lo[j] += sign > 0 ? fewest : -most, x->hi[j] += sign > 0 ? most : -fewest;
     return 0.5 * whole * (1 + SUM);

@@ -77,7 +77,7 @@ INLINE void settle2(Form2 *restrict v, int n, int first, int last, double slack,
         double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
         double s = from->s[l] * grown, ends = ULP * fabs(c) + s;
         double down = (rad[l] - low[l] - p + ends) * grown, up = (rad[l] + high[l] + q + ends) * grown;
-        int good = (down < INFINITY) & (up < INFINITY) & (fabs(c) < INFINITY);
+        int good = (down < LARGEST) & (up < LARGEST) & (fabs(c) < LARGEST);
         double least = c - down, most = c + up;
         least = least - ULP * fabs(least), most = most + ULP * fabs(most);
         double lo = from->lo[l] > least ? from->lo[l] : least, hi = from->hi[l] < most ? from->hi[l] : most;
@@ -298,7 +298,7 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
                 double p = x->p[l] - larger(by * py, by * qy) - higher, q = x->q[l] - smaller(by * py, by * qy) + higher;
                 double whole = fabs(by) + moved, ylong = fabs(y->c[l]) + y->rad[l] + (y->sh[l] - y->sl[l]) + my;
                 double xlong = fabs(x->c[l]) + x->rad[l] + (x->sh[l] - x->sl[l]);
-                double s = x->s[l] + whole * y->s[l] + (slack * (xlong + whole * ylong) + TINY);
+                double s = x->s[l] + whole * y->s[l] + (slack * (xlong + whole * ylong) + TINY * (1 + ylong));
                 r.c[l] = by, r.s[l] = s / near[l] + (slack * whole + TINY);
                 r.p[l] = (positive ? p : -q) / near[l], r.q[l] = (positive ? q : -p) / near[l];
             }
@@ -328,7 +328,8 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
                 double size = fabs(rule.value) + fabs(slope) * moved + fabs(curve) * (moved * moved);
                 /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
                 double unknown = 0 * (least + most);
-                r.s[l] = steep * s + rule.error * (1 + moved + moved * moved) + (slack * size + TINY) + unknown;
+                double lost = TINY * (1 + fabs(curve) + fabs(rule.least) + fabs(rule.most));
+                r.s[l] = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + slack * size + unknown;
             }
             for (int i = first; i < last; i++) {
                 int at = n + row_of(n, i) + i;

@@ -95,7 +95,7 @@ static int take_tangents(const Form *form, Box *x)
             if (form->squared[k] != j)
                 continue;
             double D = value_of_row(x, N + 1, x->t), ratio = D > 0 ? value_of_row(x, N, x->t) / D : 0.0;
-            ratio = isfinite(ratio) ? ratio : 0.0;
+            ratio = fabs(ratio) > 1 / LARGEST && fabs(ratio) < LARGEST ? ratio : 0.0; /* any ratio gives a bound */
             add_row(x, j, N, -2 * ratio);
             add_row(x, j, N + 1, ratio * ratio);
         }

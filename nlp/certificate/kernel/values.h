@@ -17,6 +17,7 @@
 #define EACH for (int l = 0; l < LANES; l++)
 #define ULP 0x1p-51
 #define TINY 1e-300
+#define LARGEST 1e150 /* intervals.py */
 
 enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };
 

@@ -43,9 +43,11 @@ class LimbPoint:
     def value(self) -> float:
         """Value of the limb at the incumbent, the mean where it has copies; -inf without one."""
         if self._whole.x is not self._at and self._whole.x is not None:
-            at = self._at = self._whole.x
+            at = self._whole.x
             values = [each.form.value_at(at[list(each.own)]) for each in self._limbs]
+            # The point last: an interrupt before it leaves the value to be computed again.
             self._value = math.fsum(values) / len(values)
+            self._at = at
         return self._value
 
     def consider(self, point: FloatArray) -> None:

@@ -21,7 +21,7 @@ from ..boxes.openboxes import BoundedSearch
 from ..boxes.threads import Threads
 from ..enclosing.enclosure import midpoints
 from ..enclosing.quadratic import GradientModel, ranges
-from .limbmodels import LimbModels
+from .limbmodels import LimbEngine, LimbModels
 from .limbsums import LimbBound, bound_limb, first_largest, with_tilts
 from .ownboxes import OwnBoxes, SharedBoxes
 from .sharedcuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
@@ -85,12 +85,8 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         m = self._m = len(separation.shared)
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
-        self._engines = [limb_engine_for(limb.form, m, engine, 1) for limb in separation.limbs]
-        # Minus a limb's function, for lower models.
-        self._opposites = [
-            limb_engine_for(replace(limb.form, functions=(-limb.form.functions[0],)), m, engine, 1)
-            for limb in separation.limbs
-        ]
+        # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
+        self._engine, self._engines, self._opposites = engine, list[LimbEngine](), list[LimbEngine]()
         own = tuple(
             OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64))
             for limb in separation.limbs
@@ -118,21 +114,31 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         """Stop the threads."""
         self._threads.close()
 
-    def step(self, threshold: float) -> None:
-        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold."""
-        self._current = self._opened.pop(_BLOCK if self._turn else 1)
+    def _step(self, threshold: float) -> None:
+        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold.
+
+        The first steps prepare one limb each.
+        """
+        if len(self._engines) < len(self._separation.limbs):
+            form = self._separation.limbs[len(self._engines)].form
+            # Minus a limb's function, for lower models.
+            self._opposites.append(
+                limb_engine_for(replace(form, functions=(-form.functions[0],)), self._m, self._engine, 1)
+            )
+            self._engines.append(limb_engine_for(form, self._m, self._engine, 1))
+            return
+        current = self._opened.pop(_BLOCK if self._turn else 1)
         self._turn += 1
         before = self._incumbent.value
         with np.errstate(all="ignore"):
-            sums = self._examine(self._current)
-            self._improve(self._current, sums)
-            self._branch(self._current, sums, threshold)
+            sums = self._examine(current)
+            self._improve(current, sums)
+            self._branch(current, sums, threshold)
         if self._incumbent.value > before:
             # What was too small to bisect may be closed by the better point.
             for boxes in self._undivided:
                 self._opened.push(boxes)
             self._undivided.clear()
-        self._current = None
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""

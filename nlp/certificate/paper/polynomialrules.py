@@ -176,14 +176,14 @@ class _Boxes(Composed[Polynomial]):
         ratio = X[0] * inverse
         P = (X - ratio * Y) * inverse
         P[0] = ratio
-        _add_product(P, -P[at.linear] * inverse, Y[at.linear], at)
+        _add_product(P, -P[at.linear], Y[at.linear] * inverse, at)
         parts = np.abs(P)
         rad, curved = parts[at.linear].sum(axis=0), parts[at.squares.start :].sum(axis=0)
         size = np.abs(ratio) + rad + curved
         near = np.maximum(v.V[0], -v.V[1])
         near = np.where(near > 0, near, np.nan)
         rest = rad * v.curved + curved * (v.rad + v.curved) + u.s + size * v.s
-        rest = rest + (_QUOTIENT * (u.size + size * v.size) + _TINY)
+        rest = rest + (_QUOTIENT * (u.size + size * v.size) + _TINY * (1 + v.size))
         return self.settled(on, P, rest / near, ends.mul(u.V, ends.inverse(v.V)))
 
     def taylor(self, u: Polynomial, terms: Taylor, V: Ends) -> Polynomial:
@@ -197,8 +197,9 @@ class _Boxes(Composed[Polynomial]):
         s = steep * u.s + bent * ((2 * u.rad + u.curved) * u.curved + (2 * moved + u.s) * u.s)
         s = s + terms.third * (reach * reach * reach)
         far = moved + u.s
-        s = s + terms.error * (1 + far + far * far)
-        s = s + (_TAYLOR * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size)) + _TINY)
+        # Underflow takes less than _TINY from each power of what moved.
+        s = s + (terms.error + _TINY * (1 + bent + terms.third)) * (1 + far + far * far)
+        s = s + _TAYLOR * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size))
         return self.settled(u.on, P, s, V)
 
     def sqrt(self, u: Polynomial) -> Polynomial:

@@ -1,7 +1,8 @@
 """Proofs as JSON: the tree of boxes of a search, with the reason for closing each leaf.
 
-A proof holds the case as text, the statement of its program, the proven bound, and the tree in preorder, as bytes
-(compressed, in base64). The root is the box of the program's bounds. The nodes are
+A proof holds the case as text, which of the case's programs it is about, the proven bound, and the tree in preorder, as
+bytes (compressed, in base64). What it claims is shown for the program that the check builds from the case. The root is
+the box of the program's bounds. The nodes are
 
     half i             bisection of variable i at 0.5 lower + 0.5 upper: the lower half's tree, then the upper half's
     above i v, below i v    cut of variable i at v: the part above (below) v is a leaf, whose reason follows; then the
@@ -31,7 +32,7 @@ import hashlib
 import json
 import zlib
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -39,10 +40,14 @@ import numpy as np
 from ...errors import InputError
 from ...program.nlp import Nlp
 from ...program.pairs import with_all_pairs
+from ...system.strictjson import json_tree, object_of
 from ..standardform import standard_form
 
+File = TypeVar("File")
 _FORMAT = "screwsynth-proof"
-_VERSION = 2
+_VERSION = 3
+#: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
+_LARGEST_TREE = 2**28
 #: Points at which a fingerprint takes a program's values, and the number of its sums.
 _POINTS, _SUMS = 3, 4
 #: Difference of the sums of one program in two processes: far more than rounding, far less than any change of a case.
@@ -70,23 +75,17 @@ class ProofError(InputError):
 
 @dataclass(frozen=True)
 class Statement:
-    """The program of a case that a proof is about.
+    """Which of a case's programs a proof is about; everything else follows from the case.
 
     Attributes:
-        kind: one task by itself, or the combined program of several.
-        task: index of the task.
-        minimise: whether the task's sense is set to a minimum, to prove that F is above a value.
-        weights, best, ceiling: numbers of the combined program.
-        in_home_mode: whether it is about home's working mode alone.
+        is_minimum: whether the smallest F of a task that the case maximises is bounded.
+        in_home_mode: whether home's working mode alone is covered.
+        best: of tasks of both senses in their worst case, the value of F of each from which its loss is measured.
     """
 
-    kind: Literal["task", "weighted-sum", "worst-case"] = "task"
-    task: int = 0
-    minimise: bool = False
-    weights: tuple[float, ...] = ()
-    best: tuple[float, ...] = ()
-    ceiling: float = 0.0
+    is_minimum: bool = False
     in_home_mode: bool = False
+    best: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,6 @@ class Proof:
 
     def as_text(self) -> str:
         """Return the JSON text."""
-        packed = zlib.compress(self.tree, 9)
         content = {
             "format": _FORMAT,
             "version": _VERSION,
@@ -121,10 +119,24 @@ class Proof:
             "statement": asdict(self.statement),
             "graph": self.graph,
             "bound": self.bound,
-            "digest": hashlib.sha256(self.tree).hexdigest(),
-            "tree": base64.b64encode(packed).decode("ascii"),
+            **packed(self.tree),
         }
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+@dataclass(frozen=True)
+class _File:
+    """A proof as its file has it."""
+
+    format: str
+    version: int
+    name: str
+    case: str
+    statement: Statement
+    graph: str
+    bound: float | None
+    digest: str
+    tree: str
 
 
 def read_proof(text: str, source: str) -> Proof:
@@ -137,21 +149,60 @@ def read_proof(text: str, source: str) -> Proof:
     Raises:
         ProofError: the text is no proof, or is damaged.
     """
+    found = read_document(_File, text, source, (_FORMAT, _VERSION), "certify --proof")
+    tree = unpacked(found.tree, found.digest, f"{source}: is damaged")
+    return Proof(found.case, found.name, found.statement, found.graph, found.bound, tree)
+
+
+def read_document(kind: type[File], text: str, source: str, form: tuple[str, int], writer: str) -> File:
+    """Read a data class from a file of proofs.
+
+    Args:
+        kind: the data class, with the file's keys.
+        text: the JSON text.
+        source: its name, for messages.
+        form: name and version of the format.
+        writer: the command that writes such files.
+
+    Raises:
+        ProofError: the text is none of this version, or a value is not allowed.
+    """
     try:
-        content: dict[str, Any] = json.loads(text)
-        if content["format"] != _FORMAT or content["version"] != _VERSION:
-            raise ProofError(f"{source}: is no proof of this version")
-        stated = dict(content["statement"])
-        stated["weights"], stated["best"] = tuple(stated["weights"]), tuple(stated["best"])
-        statement = Statement(**stated)
-        tree = zlib.decompress(base64.b64decode(content["tree"], validate=True))
-        digest, bound = content["digest"], None if content["bound"] is None else float(content["bound"])
-        proof = Proof(str(content["case"]), str(content["name"]), statement, str(content["graph"]), bound, tree)
-    except (ValueError, KeyError, TypeError, zlib.error):
-        raise ProofError(f"{source}: is no proof as certify --proof writes it") from None
+        table = json_tree(text)
+        if isinstance(table, dict) and table.get("format") == form[0] and table.get("version") != form[1]:
+            raise ProofError(f"{source}: is no proof of this version, {form[1]}: write it again")
+        return object_of(kind, table)
+    except ValueError as error:
+        raise ProofError(f"{source}: is no proof as {writer} writes it: {error}") from None
+
+
+def packed(tree: bytes) -> dict[str, str]:
+    """Return the nodes of a tree as texts for JSON, with their digest."""
+    text = base64.b64encode(zlib.compress(tree, 9)).decode("ascii")
+    return {"digest": hashlib.sha256(tree).hexdigest(), "tree": text}
+
+
+def unpacked(text: str, digest: str, fault: str) -> bytes:
+    """Return the nodes of a tree from their text.
+
+    Args:
+        text: the compressed nodes in base64.
+        digest: of the nodes.
+        fault: first half of the message about a wrong text.
+
+    Raises:
+        ProofError: the text is no such tree, or the digest is another.
+    """
+    try:
+        reader = zlib.decompressobj()
+        tree = reader.decompress(base64.b64decode(text, validate=True), _LARGEST_TREE)
+    except (ValueError, zlib.error):
+        raise ProofError(f"{fault}: its tree cannot be unpacked") from None
+    if not reader.eof or reader.unused_data:
+        raise ProofError(f"{fault}: its tree is incomplete, or larger than {_LARGEST_TREE // 2**20} MB")
     if digest != hashlib.sha256(tree).hexdigest():
-        raise ProofError(f"{source}: is damaged: its digest is not that of its tree")
-    return proof
+        raise ProofError(f"{fault}: its digest is not that of its tree")
+    return tree
 
 
 def fingerprint(nlp: Nlp) -> str:

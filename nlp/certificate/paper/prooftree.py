@@ -78,7 +78,8 @@ def read_parts(tree: bytes, form: StandardForm, bound: float) -> list[Part]:
     if empty:
         return empty
     bounds = [*(part.bound for part in parts), separation.constant]
-    if not math.fsum(bounds) + _SUM * math.fsum(map(abs, bounds)) <= bound:
+    size = sum(map(abs, bounds))
+    if not (math.isfinite(size) and math.fsum(bounds) + _SUM * size <= bound):
         raise ProofError("the bounds of the limbs are more than the proven one together")
     return parts
 

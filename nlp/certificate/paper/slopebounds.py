@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Error of a sum of a few hundred rounded terms, in parts of their sizes.
 _SUMS = 1e-13
+#: More than underflow can cost a sum.
+_TINY = 1e-290
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class SumModel:
         # Where the sum rises along a variable on the whole box, it is largest on that face.
         margin = _SUMS * steep
         s = np.where(self.slope_low - margin > 0, 1.0, np.where(self.slope_high + margin < 0, -1.0, 0.0))
-        return np.asarray(np.fmin(mean, self.fixed + _largest(self.b, self.H, s)))
+        return np.asarray(np.fmin(mean, self.fixed + _largest(self.b, self.H, s)) + _TINY)
 
     def change(self) -> FloatArray:
         """Return how much (n, N) the bound can gain from halving each variable."""
@@ -114,7 +116,7 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
     diagonal = np.einsum("iib->ib", H)
     others = np.abs(H).sum(axis=1) - np.abs(diagonal)
     peak = (diagonal < 0) & (np.abs(b) < -diagonal)
-    alone = np.where(peak, b * b / np.where(peak, -2 * diagonal, 1.0), np.abs(b) + 0.5 * diagonal)
+    alone = np.where(peak, b * (b / np.where(peak, -2 * diagonal, 1.0)), np.abs(b) + 0.5 * diagonal)
     separate = (alone + 0.5 * others).sum(axis=0)
     shift = np.maximum(diagonal + others, 0.0)
     C = H.copy()

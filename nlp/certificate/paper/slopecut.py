@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 #: Error of a sum of a few hundred rounded terms, in parts of their sizes.
 _SUMS = 1e-13
+#: More than underflow can cost a sum.
+_TINY = 1e-290
 
 
 def cut_off(
@@ -32,7 +34,7 @@ def cut_off(
         total = reach.sum(axis=0)
         sizes = np.abs(centre_value) + total
         # The value is at least ``rest + S_i d`` with ``d = x_i - c_i``, so S_i d <= -rest must hold for some slope.
-        rest = (centre_value - (total - reach)) - _SUMS * sizes
+        rest = (centre_value - (total - reach)) - (_SUMS * sizes + _TINY)
         right = np.where(slope_low < 0, rest / -slope_low, np.inf) * (1 - _SUMS)
         left = np.where(slope_high > 0, rest / slope_high, np.inf) * (1 - _SUMS)
         known = (rest > 0) & np.isfinite(sizes)

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from .ends import Ends
 
 
+#: More than underflow can cost a sum.
+_TINY = 1e-300
+
+
 @dataclass(frozen=True, eq=False)
 class Slope:
     """A value over N boxes, each attribute a pair of ends.
@@ -92,7 +96,7 @@ class _Boxes(Composed[Slope]):
     def slope(self, V: Ends, C: Ends, S: Ends) -> Slope:
         """Return a value, its range intersected with the centred form."""
         reach = np.maximum(np.abs(S[0]), np.abs(S[1])) * self.radius
-        spread = reach.sum(axis=0) * (1 + 1e-14)
+        spread = reach.sum(axis=0) * (1 + 1e-14) + _TINY
         low, high = ends.out(C[0] - spread, C[1] + spread)
         return Slope((np.fmax(V[0], low), np.fmin(V[1], high)), C, S)
 

@@ -40,6 +40,7 @@ static double slack(const screwsynth_QP_data *q, int side, const double *d, cons
 
 static int is_equation(const screwsynth_QP_data *q, int side) {
     int j = side - 2 * q->n;
+    if (side < q->n) return q->lower[side] == q->upper[side];
     return j >= 0 && j < q->c && q->row_lower[j] == q->row_upper[j];
 }
 
@@ -102,7 +103,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
     double *J = work, *R = J + n * n, *t = R + n * n, *r = t + n, *u = r + n, *z = u + n, *products = z + n;
     int *active = iwork, *held = iwork + n;
     double lenient = LENIENT;
-    int count = 0, pass, i, k, side;
+    int count = 0, next = 0, pass, i, k, side;
 
     /* J = L^-T, from the columns of the inverse of L. */
     for (i = 0; i < n * n; ++i) J[i] = R[i] = 0.0;
@@ -124,24 +125,28 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
         multipliers[side] = 0.0;
         held[side] = 0;
     }
+    /* An equation enters as the lower one of its sides; the upper one never does. */
+    for (i = 0; i < n; ++i) held[n + i] = is_equation(q, i);
+    for (k = 0; k < q->c; ++k) held[2 * n + q->c + k] = is_equation(q, 2 * n + k);
 
     for (pass = 0; pass < most; ++pass) {
         int entering = -1;
         double worst = -VIOLATED, sign = 1.0, fresh = 0.0;
         for (k = 0; k < q->c; ++k) products[k] = screwsynth_QP_dot(q->rows + k * n, d, n);
-        /* The entering side: equations first, then the side with the largest violation. */
-        for (side = 2 * n; side < 2 * n + q->c && entering < 0; ++side) {
-            if (held[side] || !is_equation(q, side)) continue;
-            entering = side;
-            worst = slack(q, side, d, products);
+        /* The entering side: equations first, those of fixed variables before all others, because rows that these variables
+         * determine then hold but for rounding; then the side with the largest violation. Equations stay. */
+        for (; next < 2 * n + q->c && entering < 0; ++next) {
+            if (!is_equation(q, next)) continue;
+            entering = next;
+            worst = slack(q, next, d, products);
             if (worst > 0.0) {
                 worst = -worst;
                 sign = -1.0;
             }
         }
-        for (side = 0; side < sides && (entering < 0 || !is_equation(q, entering)); ++side) {
+        for (side = entering < 0 ? 0 : sides; side < sides; ++side) {
             double room;
-            if (held[side] || (side >= 2 * n + q->c && is_equation(q, side - q->c))) continue;
+            if (held[side]) continue;
             room = slack(q, side, d, products);
             if (room < worst) {
                 worst = room;
@@ -149,7 +154,13 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
             }
         }
         if (entering < 0) {
-            for (k = 0; k < count; ++k) multipliers[active[k]] = held[active[k]] * u[k];
+            for (k = 0; k < count; ++k) {
+                const double own = held[active[k]] * u[k];
+                if (active[k] < n && own < 0.0)
+                    multipliers[n + active[k]] = -own; /* a fixed variable: its upper bound */
+                else
+                    multipliers[active[k]] = own;
+            }
             return 0;
         }
         for (;; ++pass) {

@@ -24,6 +24,7 @@
 #define THIN 1e-12        /* half range below which bounds are within rounding error of each other */
 #define POOR 3            /* number of steps in turn that go a part of the way to violated bounds, after which the search ends */
 #define IDLE 2            /* likewise from feasible points: narrow bounds or rounding error leave a violation of them */
+#define HELD 1e-9         /* change of f within narrow bounds below which their multipliers alone make a point stationary */
 #define GOOD 0.7          /* part of the violation or residual to which a step must lessen it */
 #define TRIALS 30        /* number of lengths of a step that are tried, each half of the one before */
 #define DESCENT 1e-4      /* part of the predicted descent that is required (Armijo) */
@@ -47,8 +48,9 @@ static double residual_of(const screwsynth_SQP_problem *p, const point *at, cons
             for (i = 0; i < n; ++i) left[i] -= carried * at->rows[j * n + i];
     }
     most = screwsynth_SQP_largest(left, n);
-    for (i = 0; i < n; ++i) {
-        double product = u[i] * (at->s[i] - p->lower[i]) + u[n + i] * (p->upper[i] - at->s[i]);
+    for (i = 0; i < n; ++i) { /* an infinite bound has no multiplier */
+        double product = u[i] != 0.0 ? u[i] * (at->s[i] - p->lower[i]) : 0.0;
+        if (u[n + i] != 0.0) product += u[n + i] * (p->upper[i] - at->s[i]);
         if (!(product <= most)) most = product;
     }
     for (j = 0; j < c; ++j) {
@@ -113,7 +115,7 @@ static void set_up(search *of, const screwsynth_SQP_problem *p, double *s, doubl
     of->q.row_lower = of->row_low;
     of->q.row_upper = of->row_high;
     of->residual = of->last = HUGE_VAL;
-    of->unit = p->extent < NARROW ? fmax(p->extent, THIN) : 1.0;
+    of->unit = p->extent > 0.0 && p->extent < NARROW ? fmax(p->extent, THIN) : 1.0;
 }
 
 /* Marks the sides that are active at the start: those that the point lies on and towards which f falls. */
@@ -201,9 +203,23 @@ static double advance(search *of) {
 static void compare_with_last(search *of, double residual, double violation) {
     const int is_little = violation > GOOD * of->last;
     of->poor = is_little && of->part < 1.0 && !of->is_feasible ? of->poor + 1 : 0;
-    of->idle = is_little && residual > GOOD * of->residual && residual <= ENOUGH && of->is_feasible ? of->idle + 1 : 0;
+    /* A residual within its aim is rounding error, and may fall again and again. */
+    const int is_still = is_little && (residual > GOOD * of->residual || residual <= AIM);
+    of->idle = is_still && residual <= ENOUGH && of->is_feasible ? of->idle + 1 : 0;
     of->residual = residual;
     of->last = violation;
+}
+
+/* Whether the multipliers of the variables' bounds alone make the point stationary, because f changes by next to nothing
+ * within them. Then they are the point's multipliers. */
+static int is_held_by_bounds(search *of) {
+    const int n = of->p->n;
+    int i;
+    memset(of->bent_u, 0, (size_t)(2 * (n + of->p->c)) * sizeof *of->bent_u);
+    for (i = 0; i < n; ++i) of->bent_u[of->at.gradient[i] > 0.0 ? i : n + i] = fabs(of->at.gradient[i]);
+    if (!(residual_of(of->p, &of->at, of->bent_u, of->spare) <= HELD)) return 0;
+    memcpy(of->u, of->bent_u, (size_t)(2 * (n + of->p->c)) * sizeof *of->u);
+    return 1;
 }
 
 int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_end *end, double *work, int *iwork) {
@@ -260,6 +276,10 @@ int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_en
     end->f = of.at.f;
     end->violation = screwsynth_SQP_violation(p, of.at.g);
     end->residual = residual_of(p, &of.at, of.u, of.spare);
+    if (p->extent < NARROW && !(end->residual <= AIM && end->is_minimum) && is_held_by_bounds(&of)) {
+        end->residual = residual_of(p, &of.at, of.u, of.spare);
+        end->is_minimum = 1;
+    }
     end->multipliers = of.u;
     if (of.at.s != s) memcpy(s, of.at.s, (size_t)p->n * sizeof *s);
     return 0;

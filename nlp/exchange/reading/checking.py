@@ -33,7 +33,7 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
         allowed: largest difference.
 
     Raises:
-        InputError: the text is no robot file, or states another robot.
+        InputError: the text is no robot file, or states a robot with other work rates.
     """
     tables = tomllib.loads(text)
     try:
@@ -46,10 +46,9 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
     pairs = zip(_measures(again, size), _measures(mechanism, size), strict=True)
     difference = max(float(np.abs(found - expected).max() / np.abs(expected).max()) for found, expected in pairs)
     if not difference <= allowed:
-        fault = (
-            f"the robot file would state another robot: work rates differ by {difference:.2g}, {allowed:.2g} is allowed"
-        )
-        raise InputError(fault)
+        fault = "the robot file, read again, differs from the model: its work rates are off by"
+        advice = "--snap makes axes meet that nearly do"
+        raise InputError(f"{fault} {difference:.2g} of the largest, and {allowed:.2g} is allowed; {advice}")
     return difference
 
 

@@ -101,8 +101,10 @@ class Description:
         joints: at most one for each body; one that floats freely has none.
         closures: joints that close loops.
         couplings: linear relations of joint coordinates.
+        offsets: value of each coupling at the stated configuration, by its name; 0 where it has none.
         driven: names of the joints with an actuator.
         frames: named places on bodies, as name of the body and the frame in it.
+        keyframes: names of the configurations in which the file can be read.
         notes: sentences about what was left out or assumed.
     """
 
@@ -113,8 +115,10 @@ class Description:
     joints: tuple[TreeJoint, ...]
     closures: tuple[LoopClosure, ...]
     couplings: tuple[Coupling, ...] = ()
+    offsets: Mapping[str, float] = field(default_factory=dict)
     driven: frozenset[str] = frozenset()
     frames: Mapping[str, tuple[str, Frame]] = field(default_factory=dict)
+    keyframes: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def place_of(self, name: str) -> Frame:

@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ....models.mechanism import Mechanism, MechanismError, robot_tables
-from ...errors import InputError
+from ....models.mechanism import (
+    Mechanism,
+    MechanismError,
+    SingularityType,
+    generic_ranks,
+    robot_tables,
+    singularities_of,
+    wrenches_of,
+)
+from ...errors import InputError, listing
 from .description import Description
 from .meeting import with_meeting_joints
 from .mjcf import read_mjcf
-from .newton import Gap, close
+from .newton import CLOSED, LEAST, Closed, Gap, close
 from .reduction import Ends, Reduced, reduce
+from .snapping import near_misses, snapped
 from .universal import with_universal_joints
 from .urdf import read_urdf
 from .xmltext import read_xml
 
-#: Loops that are open by more than this, in parts of the robot's size, are refused: decimals of six digits are nearer.
+#: Loops that are open by more than this, in parts of the robot's size, are closed only if asked for: decimals of six
+#: digits are nearer.
 OPEN = 1e-6
+#: Most names that a message lists.
+_MOST_NAMES = 12
 #: Entries below this are rounding of rotations, and are written as 0; lengths in parts of the robot's size.
 _ROUNDING = 1e-14
 #: Keys whose values hold tables.
@@ -36,12 +48,16 @@ class Request:
         ends: base, platform and actuators.
         closes: whether Newton's method closes the loops.
         loops: YAML file of a URDF file's loops; None for the one beside it.
+        keyframe: of an MJCF file, by its name; empty for its reference configuration.
+        snap: largest distance by which axes are moved so that they meet or are parallel, length; 0 for none.
     """
 
     path: Path
     ends: Ends
     closes: bool = False
     loops: Path | None = None
+    keyframe: str = ""
+    snap: float = 0.0
 
 
 class Imported(NamedTuple):
@@ -71,21 +87,28 @@ def import_robot(request: Request) -> Imported:
     given = _read(request)
     reduced = reduce(given, request.ends)
     gaps, notes = reduced.gaps, list(reduced.notes)
-    if request.closes:
-        closed = close(given, reduced.size)
-        reduced = reduce(closed.description, request.ends)
-        moved = f"joints moved by up to {math.degrees(closed.turn):.3g} deg"
-        moved += f" and {closed.way:.3g}" if closed.way else ""
-        kept = "driven joints stayed" if closed.kept else "driven joints moved too"
-        notes.append(f"loops were closed by Newton's method: {moved}; {kept}")
-    _refuse_open(given, reduced, closes=request.closes)
-    met = with_meeting_joints(reduced.mechanism, reduced.size)
+    worst = _worst(reduced)
+    if worst > OPEN and not request.closes:
+        raise InputError(f"{_open_loop(given, reduced)}{_advice(given, request.keyframe)}")
+    if worst > CLOSED:
+        closed = close(_with_loops(given, gaps), reduced.size)
+        moved_to = replace(closed.description, closures=given.closures, couplings=given.couplings)
+        reduced = reduce(moved_to, request.ends)
+        if _worst(reduced) > LEAST:
+            raise InputError(f"{_open_loop(given, reduced)}; Newton's method did not close it")
+        notes.append(_closed_words(closed, reduced))
+    mechanism = reduced.mechanism
+    if request.snap:
+        mechanism, note = snapped(mechanism, reduced.size, request.snap)
+        notes.append(note)
+    met = with_meeting_joints(mechanism, reduced.size)
     try:
         tables = robot_tables(met.mechanism)
     except MechanismError as error:
         raise InputError(f"{given.source}: {error}") from None
+    more = [*near_misses(met.mechanism, reduced.size), *_singular(met.mechanism, reduced.size)]
     tables = _without_rounding(with_universal_joints(tables, reduced.size), reduced.size)
-    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, (*notes, *met.notes))
+    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, (*notes, *met.notes, *more))
 
 
 def _read(request: Request) -> Description:
@@ -94,25 +117,74 @@ def _read(request: Request) -> Description:
     if root.tag in ("mujoco", "mujocoinclude"):
         if request.loops is not None:
             raise InputError(f"--loops {request.loops}: is for URDF files; {request.path} is MJCF")
-        return read_mjcf(root, request.path)
+        return read_mjcf(root, request.path, request.keyframe)
     if root.tag == "robot":
+        if request.keyframe:
+            raise InputError(f"--keyframe {request.keyframe}: is for MJCF files; {request.path} is URDF")
         return read_urdf(root, request.path, request.loops)
     tag = root.tag[:40]
     raise InputError(f"{request.path}: begins with <{tag}>; <mujoco> of MJCF or <robot> of URDF is needed")
 
 
-def _refuse_open(given: Description, reduced: Reduced, *, closes: bool) -> None:
-    """Refuse loops that are open, with the largest of them.
+def _worst(reduced: Reduced) -> float:
+    """Return by how much the loops are open at most, in parts of the size."""
+    return max((gap_share(gap, reduced.size) for gap in reduced.gaps), default=0.0)
 
-    Raises:
-        InputError: a loop is open by more than the tolerance.
-    """
-    worst = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size), default=None)
-    if worst is None or gap_share(worst, reduced.size) <= OPEN:
+
+def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
+    """Return a description with the loops of the mechanism alone: those of side chains stay as they are."""
+    names = {gap.name for gap in gaps}
+    return replace(
+        given,
+        closures=tuple(each for each in given.closures if each.name in names),
+        couplings=tuple(each for each in given.couplings if each.name in names),
+    )
+
+
+def _open_loop(given: Description, reduced: Reduced) -> str:
+    """Return the sentence that says which loop is open most."""
+    worst = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
+    fault = f"the loop {worst.name} is open by {gap_words(worst)}"
+    return f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}"
+
+
+def _advice(given: Description, keyframe: str) -> str:
+    """Return what to do about open loops."""
+    others = [each for each in given.keyframes if each != keyframe][:_MOST_NAMES]
+    more = f", --keyframe takes another configuration: {listing(others)}" if others else ""
+    return f"; --close closes it by Newton's method{more}"
+
+
+def _closed_words(closed: Closed, reduced: Reduced) -> str:
+    """Return the note on loops that were closed."""
+    moved = f"joints moved by up to {math.degrees(closed.turn):.3g} deg"
+    moved += f" and {closed.way:.3g}" if closed.way else ""
+    kept = "driven joints stayed" if closed.kept else "driven joints moved too"
+    words = f"loops were closed by Newton's method: {moved}; {kept}"
+    left = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
+    if gap_share(left, reduced.size) <= CLOSED:
+        return words
+    fault = f"{left.name} stays open by {gap_words(left)}, the least squares of numbers that contradict each other"
+    return f"{words}; {fault}: the robot file has the joint where its first body has it"
+
+
+def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
+    """Yield a note for each singularity that a mechanism is in where it stands."""
+    try:
+        generic = generic_ranks(mechanism)
+    except MechanismError:
+        fault = "its loops close nowhere else near where the model stands"
+        yield f"{fault}: the robot cannot move, or its numbers contradict each other"
         return
-    fault = f"the loop {worst.name} is open by {worst.distance:.3g} and {math.degrees(worst.angle):.3g} deg"
-    advice = "Newton's method did not close it" if closes else "--close closes it by Newton's method"
-    raise InputError(f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}; {advice}")
+    for each in singularities_of(wrenches_of(mechanism, size).ranks, generic):
+        where = "" if each.type is SingularityType.ARCHITECTURE else " where it stands"
+        whose = "the robot" if each.member is None else f"member {each.member + 1}"
+        yield f"{whose} is singular{where}: {each.type.value}"
+
+
+def gap_words(gap: Gap) -> str:
+    """Return how far a loop is open in words."""
+    return f"{gap.distance:.3g} and {math.degrees(gap.angle):.3g} deg"
 
 
 def gap_share(gap: Gap, size: float) -> float:

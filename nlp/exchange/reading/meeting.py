@@ -1,7 +1,6 @@
 """Hinges that stand for one joint: several about one axis, and three through one point, which are a ball.
 
-What a limb carries depends on axes that meet exactly. Joints are replaced only where they do; axes that almost meet get
-a note.
+What a limb carries depends on axes that meet exactly. Joints are replaced only where they do.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ class Met(NamedTuple):
 
     Attributes:
         mechanism: the mechanism.
-        notes: sentences about joints that were replaced, and about axes that almost meet.
+        notes: sentences about joints that were replaced.
     """
 
     mechanism: Mechanism
@@ -58,7 +57,7 @@ def with_meeting_joints(given: Mechanism, size: float) -> Met:
         balls.append(words)
     notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
     notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
-    return Met(given, (*notes, *_almost(given, size)))
+    return Met(given, tuple(notes))
 
 
 def _some(words: list[str]) -> str:
@@ -146,9 +145,11 @@ def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
         point = meeting_point(one, two)
         off = [np.linalg.norm(np.cross(each.axis, point - each.point)) for each in run]
         if max(off) < SAME_POINT * size:
+            common = common_name([each.name for each in run])
+            is_own = common and not any(each.name.startswith(common) for each in given.joints if each not in run)
             ball = replace(
                 one,
-                name=common_name([each.name for each in run]) or run[0].name,
+                name=common if is_own else run[0].name,
                 kind="S",
                 point=point,
                 axis=np.zeros(3),
@@ -180,16 +181,3 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
             new if each.name == first else each for each in given.joints if each.name == first or each.name not in names
         ),
     )
-
-
-def _almost(given: Mechanism, size: float) -> list[str]:
-    """Return notes on passive hinges whose axes almost meet."""
-    notes = []
-    for one, other in _runs(given, 2):
-        distance, sine = axes_gap(one, other)
-        if sine >= ALMOST and SAME_POINT * size <= distance < ALMOST * size:
-            share = f"{distance / size:.1g}"
-            notes.append(f"the axes of {one.name} and {other.name} miss each other by {share} of the robot's size")
-        elif SAME_POINT <= sine < ALMOST:
-            notes.append(f"the axes of {one.name} and {other.name} are parallel but for {sine:.1g}")
-    return notes

@@ -23,37 +23,36 @@ from .mjcfclean import clean_model
 if TYPE_CHECKING:
     from ....models.mechanism.graph import ElementaryKind
 
-#: Offset of a joint equality below which it holds at the stated configuration: rounding of decimals.
-_OFFSET = 1e-9
 
-
-def read_mjcf(root: Element, path: Path) -> Description:
-    """Return the robot that a MuJoCo model states, at its reference configuration ``qpos0``.
+def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
+    """Return the robot that a MuJoCo model states, at a keyframe or at its reference configuration ``qpos0``.
 
     Args:
         root: of the main file.
         path: of the main file.
+        keyframe: name of the keyframe, or its number from 1 on; empty for ``qpos0``.
 
     Raises:
         InputError: MuJoCo is not installed, or the model cannot be read.
     """
     mujoco = required("mujoco", "MJCF files")
-    clean = clean_model(with_includes(root, path), str(path))
+    clean = clean_model(with_includes(root, path), str(path), keyframe)
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)
     try:
         with _quiet():
             model = mujoco.MjModel.from_xml_string(tostring(clean.root, encoding="unicode"))
             data = mujoco.MjData(model)
+            if keyframe:
+                mujoco.mj_resetDataKeyframe(model, data, 0)
             mujoco.mj_kinematics(model, data)
     except (ValueError, mujoco.FatalError) as error:
         reason = str(error).strip().splitlines() or ["no reason given"]
         raise InputError(f"{path}: MuJoCo cannot read it: {reason[0].removeprefix('XML Error: ')}") from None
     finally:
         mujoco.set_mju_user_warning(None)
-    return _Reader(mujoco, model, data, str(path)).description(
-        root.get("model") or path.stem, clean.driven, (*clean.notes, *warnings)
-    )
+    name, notes = root.get("model") or path.stem, (*clean.notes, *warnings)
+    return _Reader(mujoco, model, data, str(path)).description(name, clean.driven, clean.keyframes, notes)
 
 
 @contextmanager
@@ -72,7 +71,7 @@ def _quiet() -> Iterator[None]:
 
 
 class _Reader:
-    """A compiled model at its reference configuration."""
+    """A compiled model at a configuration."""
 
     def __init__(self, mujoco: Any, model: Any, data: Any, source: str) -> None:  # noqa: ANN401 - no stubs
         self.mujoco, self.model, self.data, self.source = mujoco, model, data, source
@@ -80,6 +79,7 @@ class _Reader:
         self.body_names = self._names(model.nbody, model.body, "body")
         self.taken = set()
         self.joint_names = self._names(model.njnt, model.joint, "joint")
+        self.mocap = {self.body_names[k] for k in range(model.nbody) if model.body_mocapid[k] >= 0}
         self.bodies: list[Body] = []
         self.joints: list[TreeJoint] = []
         self.notes: list[str] = []
@@ -94,12 +94,14 @@ class _Reader:
             names.append(chosen)
         return names
 
-    def description(self, name: str, driven: tuple[str, ...], notes: tuple[str, ...]) -> Description:
+    def description(
+        self, name: str, driven: tuple[str, ...], keyframes: tuple[str, ...], notes: tuple[str, ...]
+    ) -> Description:
         """Return the robot."""
         self.bodies.append(Body(self.body_names[0], "", Frame()))
         for k in range(1, self.model.nbody):
             self._add_body(k)
-        closures, couplings = self._equalities()
+        closures, couplings, offsets = self._equalities()
         known = {joint.name for joint in self.joints}
         for joint in driven:
             if joint not in known:
@@ -112,8 +114,10 @@ class _Reader:
             joints=tuple(self.joints),
             closures=tuple(closures),
             couplings=tuple(couplings),
+            offsets=offsets,
             driven=frozenset(driven),
             frames=self._sites(),
+            keyframes=keyframes,
             notes=(*notes, *self.notes),
         )
 
@@ -147,7 +151,7 @@ class _Reader:
             axis = np.zeros(3) if kind == "S" else data.xaxis[j].copy()
             limits = None
             if model.jnt_limited[j] and kind != "S":
-                low, high = model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]
+                low, high = model.jnt_range[j] - data.qpos[model.jnt_qposadr[j]]
                 limits = (float(low), float(high))
             self.joints.append(TreeJoint(self.joint_names[j], kind, moved, data.xanchor[j].copy(), axis, limits))
             self.bodies.append(Body(moved, parent, place))
@@ -166,23 +170,30 @@ class _Reader:
         rotation = rotation_from_quaternion(self.model.site_quat[k])
         return self.body_names[self.model.site_bodyid[k]], Frame(self.model.site_pos[k].copy(), rotation)
 
-    def _equalities(self) -> tuple[list[LoopClosure], list[Coupling]]:
-        """Return the model's equalities as joints that close loops, and as couplings."""
+    def _equalities(self) -> tuple[list[LoopClosure], list[Coupling], dict[str, float]]:
+        """Return the model's equalities as joints that close loops, as couplings, and what these are open by."""
         model, kinds = self.model, self.mujoco.mjtEq
         closures: list[LoopClosure] = []
         couplings: list[Coupling] = []
+        offsets: dict[str, float] = {}
         taken = set(self.joint_names)
         for k in range(model.neq):
-            if not model.eq_active0[k]:
-                self.notes.append(f"the equality {model.equality(k).name or k + 1} is not active and was left out")
-                continue
             name = unique_name(self._name_of_equality(k), taken)
-            taken.add(name)
-            if model.eq_type[k] == int(kinds.mjEQ_JOINT):
-                couplings.append(self._coupling(k, name))
+            is_joint = model.eq_type[k] == int(kinds.mjEQ_JOINT)
+            closure = None if is_joint else self._closure(k, name)
+            if not model.eq_active0[k]:
+                self.notes.append(f"the equality {name} is not active and was left out")
+            elif closure is not None and {closure.first, closure.second} & self.mocap:
+                self.notes.append(f"the equality {name} with a mocap body, which the simulation moves, was left out")
+            elif closure is not None:
+                closures.append(closure)
+                taken.add(name)
             else:
-                closures.append(self._closure(k, name))
-        return closures, couplings
+                coupling, offset = self._coupling(k, name)
+                couplings.append(coupling)
+                offsets[name] = offset
+                taken.add(name)
+        return closures, couplings, offsets
 
     def _name_of_equality(self, k: int) -> str:
         """Return the name of an equality; without one, what the names of its sites have in common."""
@@ -203,20 +214,25 @@ class _Reader:
         else:
             one, other, numbers = self.body_names[first], self.body_names[second], model.eq_data[k]
             if is_weld:
-                one_frame, other_frame = Frame(numbers[3:6].copy(), rotation_from_quaternion(numbers[6:10])), Frame()
+                # The anchor's place comes in both frames, the first body's behind; the rotation is the second body's.
+                one_frame = Frame(numbers[3:6].copy(), rotation_from_quaternion(numbers[6:10]))
+                other_frame = Frame(numbers[0:3].copy())
             else:
                 one_frame, other_frame = Frame(numbers[0:3].copy()), Frame(numbers[3:6].copy())
         return LoopClosure(name, closing, one, other, one_frame, other_frame)
 
-    def _coupling(self, k: int, name: str) -> Coupling:
-        """Return the linear relation of a joint equality."""
+    def _coupling(self, k: int, name: str) -> tuple[Coupling, float]:
+        """Return the linear relation of a joint equality, and its value at the configuration.
+
+        Coordinates of the relation are counted from there, those of MuJoCo's polynomial from ``qpos0``.
+        """
         model = self.model
-        first, second = model.eq_obj1id[k], model.eq_obj2id[k]
-        offset, *factors = (float(each) for each in model.eq_data[k][:5])
-        if abs(offset) > _OFFSET or any(factors[1:]):
-            fault = "has a polynomial; only 0 and a factor as the first two of its polycoef are read"
+        joints = [int(each) for each in (model.eq_obj1id[k], model.eq_obj2id[k]) if each >= 0]
+        constant, factor, *higher = (float(each) for each in model.eq_data[k][:5])
+        if any(higher) and len(joints) == 2:
+            fault = "has a polynomial; only a constant and a factor as the first two of its polycoef are read"
             raise InputError(f"{self.source}: the equality {name} of joints {fault}")
-        driven = (self.joint_names[first], 1.0)
-        if second < 0:
-            return Coupling(name, (driven,))
-        return Coupling(name, (driven, (self.joint_names[second], -factors[0])))
+        factors = tuple((self.joint_names[j], value) for j, value in zip(joints, (1.0, -factor), strict=False))
+        places = [model.jnt_qposadr[j] for j in joints]
+        moved = [float(self.data.qpos[at] - model.qpos0[at]) for at in places]
+        return Coupling(name, factors), sum(f * q for (_, f), q in zip(factors, moved, strict=True)) - constant

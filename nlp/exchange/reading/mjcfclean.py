@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from ...errors import InputError
+from ...errors import InputError, nearest
 
 #: Elements that remain, by the element that holds them; of a body's children those of ``body``.
 _KEPT = {
@@ -19,6 +19,15 @@ _KEPT = {
 _COMPILER = ("angle", "eulerseq", "coordinate", "autolimits")
 #: Attributes that name something that is left out, or whose length depends on it.
 _DROPPED = ("material", "user")
+#: Attributes of a keyframe that say where bodies are.
+_KEYFRAME = ("name", "qpos", "mpos", "mquat")
+#: What actuators that drive no joint act on, by the attribute that names it.
+_TRANSMISSIONS = {
+    "tendon": "the tendon",
+    "site": "the site",
+    "body": "the body",
+    "cranksite": "the slider-crank at the site",
+}
 #: Most copies that ``replicate`` may make in all: a robot has dozens of bodies.
 _MOST_COPIES = 2000
 
@@ -29,23 +38,26 @@ class CleanModel(NamedTuple):
     Attributes:
         root: elements that MuJoCo compiles without any further file.
         driven: names of the joints that actuators drive, in order.
+        keyframes: names of the model's keyframes, or their numbers from 1 on; of these the wanted one alone remains.
         notes: sentences about what was left out.
     """
 
     root: Element
     driven: tuple[str, ...]
+    keyframes: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def clean_model(root: Element, source: str) -> CleanModel:
+def clean_model(root: Element, source: str, keyframe: str = "") -> CleanModel:
     """Return a model without what does not matter for its geometry.
 
     Args:
         root: the model, with its included files.
         source: name of the file, for messages.
+        keyframe: name or number of the keyframe that is wanted; empty for none.
 
     Raises:
-        InputError: the model is put together from other models, or copies bodies too often.
+        InputError: the model is put together from other models, copies bodies too often, or has no such keyframe.
     """
     for element in root.iter("attach"):
         fault = f"attaches {element.get('model', 'another model')!r}; write the model as one file first"
@@ -53,13 +65,20 @@ def clean_model(root: Element, source: str) -> CleanModel:
     notes: list[str] = []
     driven = _driven_joints(root, notes)
     for element in root.iter("equality"):
-        other = sorted({each.tag for each in element if each.tag not in _KEPT["equality"]})
-        notes += [f"equalities of the kind {tag} were left out" for tag in other]
+        other = [each for each in element if each.tag not in _KEPT["equality"]]
+        notes += [f"the equality {each.get('name', '(unnamed)')} of the kind {each.tag} was left out" for each in other]
     if any(True for tag in ("composite", "flexcomp", "flex") for _ in root.iter(tag)):
         notes.append("soft bodies were left out")
     result = Element("mujoco", {key: value for key, value in root.attrib.items() if key == "model"})
     _copy_children(root, result, "mujoco", 1, source)
-    return CleanModel(result, driven, tuple(dict.fromkeys(notes)))
+    keys = {key.get("name") or str(k): key for k, key in enumerate(root.iterfind("keyframe/key"), 1)}
+    if keyframe:
+        if keyframe not in keys:
+            hint = nearest(keyframe, list(keys)) if keys else "the model has none"
+            raise InputError(f"{source}: --keyframe {keyframe}: no such keyframe; {hint}")
+        attributes = {key: value for key, value in keys[keyframe].attrib.items() if key in _KEYFRAME}
+        SubElement(SubElement(result, "keyframe"), "key", attributes)
+    return CleanModel(result, driven, tuple(keys), tuple(dict.fromkeys(notes)))
 
 
 def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:
@@ -71,7 +90,11 @@ def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:
             if joint:
                 driven.append(joint)
             else:
-                notes.append(f"the actuator {each.get('name', 'without a name')!r} drives no joint and was left out")
+                on = next((f"{words} {each.get(key)!r}" for key, words in _TRANSMISSIONS.items() if each.get(key)), "")
+                fault = f"acts on {on}, which is not read" if on else "acts on nothing that is read"
+                notes.append(
+                    f"the actuator {each.get('name', 'without a name')!r} {fault}; --actuated names what it drives"
+                )
     return tuple(dict.fromkeys(driven))
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....models.arrays import FloatArray
+from ....models.mechanism import Coupling
 from .description import Body, Closing, Description, LoopClosure, TreeJoint
 from .frames import Frame, cross_matrix, rotation_about, rotation_vector
 
@@ -18,8 +19,13 @@ CLOSED = 1e-12
 _MOST_STEPS = 60
 #: Shortest part of a step that is tried.
 _SHORTEST = 2.0**-12
-#: Singular values below this share of the largest count as zero: dependent equations of overconstrained robots.
-_RANK = 1e-9
+#: Singular values below this share of the largest count as zero, in the order in which they are tried. By its decimals,
+#: dependent equations of an overconstrained robot are independent, which no motion of its joints is to make up for.
+_RANKS = (1e-5, 1e-9)
+#: Largest equation that least squares may leave of loops that do not close, in parts of the size: typed decimals.
+LEAST = 1e-4
+#: Driven joints move only where this makes the least squares so much smaller.
+_WORTH = 0.1
 
 
 class Gap(NamedTuple):
@@ -58,6 +64,17 @@ def gap_of(closure: LoopClosure, places: Mapping[str, Frame]) -> Gap:
     equations = _equations(closure, A, B, None)
     lengths = {Closing.SLIDE: 2, Closing.CYLINDER: 2}.get(closure.closing, 3)
     return Gap(closure.name, float(np.linalg.norm(equations[:lengths])), float(np.linalg.norm(equations[lengths:])))
+
+
+def gap_of_coupling(given: Description, coupling: Coupling) -> Gap:
+    """Return by how much a coupling does not hold: in the unit of the coordinate of its first joint."""
+    value = abs(given.offsets.get(coupling.name, 0.0))
+    return Gap(coupling.name, value, 0.0) if _is_length(given, coupling) else Gap(coupling.name, 0.0, value)
+
+
+def _is_length(given: Description, coupling: Coupling) -> bool:
+    """Return whether the first joint of a coupling is a slide."""
+    return any(joint.name == coupling.factors[0][0] and joint.kind == "P" for joint in given.joints)
 
 
 def _sides(closure: LoopClosure) -> tuple[tuple[str, Frame], tuple[str, Frame]]:
@@ -174,8 +191,10 @@ class _Mover:
             for name, factor in coupling.factors:
                 body = next(joint.body for joint in self.given.joints if joint.name == name)
                 row[self.index[body]] = factor
-            values.append(np.array([sum(factor * self.coordinates[name] for name, factor in coupling.factors)]))
-            rows.append(row[None])
+            change = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
+            unit = self.size if _is_length(self.given, coupling) else 1.0
+            values.append(np.array([change + self.given.offsets.get(coupling.name, 0.0)]) / unit)
+            rows.append(row[None] / unit)
         return np.concatenate([np.zeros(0), *values]), np.vstack([np.zeros((0, self.count)), *rows])
 
     def _screws(self, moved: Mapping[str, Frame]) -> dict[str, FloatArray]:
@@ -237,6 +256,8 @@ def _about(point: FloatArray, rotation: FloatArray) -> Frame:
 def close(given: Description, size: float) -> Closed:
     """Return a description with its loops closed by Newton's method, with driven joints kept where that is possible.
 
+    Loops of an overconstrained robot whose numbers do not fit each other are closed by least squares.
+
     Args:
         given: the description.
         size: of the robot, by which lengths become plain numbers.
@@ -244,10 +265,17 @@ def close(given: Description, size: float) -> Closed:
     Returns:
         The best that was reached; the gaps of its closures say how good it is.
     """
-    for keeps_driven in (True, False):
-        mover = _Mover(given, size, keeps_driven=keeps_driven)
-        if _solve(mover) <= CLOSED:
+    found: list[tuple[float, _Mover, bool]] = []
+    for rank in _RANKS:
+        for keeps_driven in (True, False):
+            mover = _Mover(given, size, keeps_driven=keeps_driven)
+            error = _solve(mover, rank)
+            found.append((error if keeps_driven or error <= CLOSED else error / _WORTH, mover, keeps_driven))
+            if error <= CLOSED:
+                break
+        if min(found, key=_first)[0] <= LEAST:
             break
+    _, mover, keeps_driven = min(found, key=_first)
     turns = [rotation_vector(mover.own[j.body].rotation) for j in given.joints if j.kind in ("R", "S")]
     ways = [abs(mover.coordinates[j.name]) for j in given.joints if j.kind == "P"]
     return Closed(
@@ -258,14 +286,18 @@ def close(given: Description, size: float) -> Closed:
     )
 
 
-def _solve(mover: _Mover) -> float:
+def _first(found: tuple[float, _Mover, bool]) -> float:
+    return found[0]
+
+
+def _solve(mover: _Mover, rank: float) -> float:
     """Move the joints until the loops are closed, or no step makes them closer; return the largest equation."""
     values, derivatives = mover.state()
     for _ in range(_MOST_STEPS):
         error = float(np.linalg.norm(values))
         if not values.size or np.abs(values).max() <= CLOSED / 100:
             break
-        way = -np.linalg.pinv(derivatives, rcond=_RANK) @ values
+        way = -np.linalg.pinv(derivatives, rcond=rank) @ values
         length = 1.0
         before = dict(mover.own), dict(mover.coordinates)
         while length >= _SHORTEST:
@@ -292,11 +324,16 @@ def _moved(given: Description, mover: _Mover) -> Description:
         point, axis = carried.position + carried.rotation @ each.point, carried.rotation @ each.axis
         return replace(each, point=point, axis=axis, range=limits)
 
+    offsets = {
+        each.name: given.offsets.get(each.name, 0.0) + sum(f * mover.coordinates[name] for name, f in each.factors)
+        for each in given.couplings
+    }
     return replace(
         given,
         bodies=tuple(replace(body, place=moved[body.name] @ body.place) for body in given.bodies),
         joints=tuple(joint(each) for each in given.joints),
+        offsets=offsets,
     )
 
 
-__all__ = ["CLOSED", "Closed", "Gap", "close", "gap_of"]
+__all__ = ["CLOSED", "Closed", "Gap", "close", "gap_of", "gap_of_coupling"]

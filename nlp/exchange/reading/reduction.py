@@ -14,7 +14,7 @@ from .blocks import between
 from .description import LARGEST, Description
 from .elements import Element, bodies_of, elements_of, place_in, rigid_groups
 from .frames import Frame
-from .newton import Gap, gap_of
+from .newton import Gap, gap_of, gap_of_coupling
 
 #: Most names that a message lists.
 _MOST_NAMES = 12
@@ -113,6 +113,7 @@ def reduce(given: Description, ends: Ends) -> Reduced:
         for each in given.closures
         if _closes(each.name, own) or _merges(given, each.name, leader, names)
     ]
+    gaps += [gap_of_coupling(given, each) for each in given.couplings if _holds(given, each, own, leader, names)]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
 
 
@@ -125,6 +126,15 @@ def _merges(given: Description, name: str, leader: dict[str, str], names: dict[s
     """Return whether a closure welds bodies of a link that is kept, or is a further ball of a hinge there."""
     closure = next(each for each in given.closures if each.name == name)
     return leader[closure.first] in names and leader[closure.second] in names
+
+
+def _holds(
+    given: Description, coupling: Coupling, own: set[str], leader: dict[str, str], names: dict[str, str]
+) -> bool:
+    """Return whether a coupling ties joints that are kept, or fixes a joint within a link that is kept."""
+    tied = [name for name, _ in coupling.factors]
+    bodies = [joint.body for joint in given.joints if joint.name in tied]
+    return own.issuperset(tied) if len(tied) > 1 else all(leader[body] in names for body in bodies)
 
 
 def check_names(given: Description) -> None:

@@ -15,7 +15,14 @@ from ...errors import InputError, listing
 from .description import Body, Description, LoopClosure, TreeJoint, unique_name
 from .frames import Frame, perpendiculars
 from .urdfelements import axis_of, link_of, name_of, number_of, origin_of
-from .urdfloops import LoopFile, closures_of_constraints, closures_of_frames, closures_of_pairs, read_loop_file
+from .urdfloops import (
+    LoopFile,
+    closures_of_constraints,
+    closures_of_frames,
+    closures_of_loop_joints,
+    closures_of_pairs,
+    read_loop_file,
+)
 
 if TYPE_CHECKING:
     from ....models.mechanism.graph import ElementaryKind
@@ -105,6 +112,7 @@ class _Reader:
                 f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root"
             )
         closures, notes = self._closures()
+        couplings = self._couplings()
         return Description(
             name=self.name,
             source=self.source,
@@ -112,7 +120,8 @@ class _Reader:
             bodies=tuple(self.bodies),
             joints=tuple(self.joints),
             closures=tuple(closures),
-            couplings=tuple(self._couplings()),
+            couplings=tuple(couplings),
+            offsets={each.name: value for each, value in couplings.items()},
             driven=frozenset(self._driven()),
             notes=tuple(notes),
         )
@@ -181,6 +190,8 @@ class _Reader:
         taken = {joint.name for joint in self.joints}
         closures = closures_of_constraints(self.root, self.links, taken, self.source)
         taken |= {each.name for each in closures}
+        closures += closures_of_loop_joints(self.root, self.links, taken, self.source)
+        taken |= {each.name for each in closures}
         if self.loops is not None:
             return [*closures, *closures_of_pairs(self.loops, {**links, **joints})], []
         # A frame is a link without size that is fixed to its parent.
@@ -190,9 +201,9 @@ class _Reader:
         # A hinge's second pair of frames lies on other links than the first, fixed to the same ones.
         return [*closures, *found], notes
 
-    def _couplings(self) -> list[Coupling]:
-        """Return the joints that follow others (``mimic``), with the offset that URDF allows refused."""
-        found = []
+    def _couplings(self) -> dict[Coupling, float]:
+        """Return the joints that follow others (``mimic``), each with its value with all joints at 0."""
+        found = {}
         for name, element in self.elements.items():
             mimic = element.find("mimic")
             if mimic is None:
@@ -201,10 +212,9 @@ class _Reader:
             other = mimic.get("joint", "")
             if other not in self.elements or other == name:
                 raise InputError(f'{place} = "{other[:60]}": must be another joint')
-            if number_of(mimic, "offset", 0.0, place) != 0:
-                raise InputError(f"{place}, offset: must be 0: with all joints at 0 it would not hold")
             factor = number_of(mimic, "multiplier", 1.0, place)
-            found.append(Coupling(f"{name} mimic", ((name, 1.0), (other, -factor))))
+            coupling = Coupling(f"{name} mimic", ((name, 1.0), (other, -factor)))
+            found[coupling] = -number_of(mimic, "offset", 0.0, place)
         return found
 
     def _driven(self) -> set[str]:

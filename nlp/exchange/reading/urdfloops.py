@@ -1,4 +1,4 @@
-"""The three ways in which URDF files state closed loops.
+"""The four ways in which URDF files state closed loops.
 
 - a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the driven joints
   ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
@@ -6,7 +6,9 @@
 - frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair ``closing_NAME_1_z`` for a hinge
   (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
 - elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the same for ``child``, as
-  github.com/ros/urdfdom/pull/264 proposes (open: which types there are is not agreed).
+  github.com/ros/urdfdom/pull/264 proposes (open: which types there are is not agreed),
+- elements ``<loop_joint>`` with ``link1`` and ``link2``, each with ``link``, ``xyz`` and ``rpy``, as in Isaac
+  Sim, and with an ``axis`` in both, as Drake had.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from ....models.arrays import FloatArray
 from ...errors import InputError, listing
 from ...system.reading import read_limited
 from .description import Closing, LoopClosure, axis_frame, common_name, unique_name
@@ -182,17 +185,49 @@ def closures_of_constraints(root: Element, links: set[str], taken: set[str], sou
         kind = element.get("type", "")
         if kind not in _CONSTRAINTS:
             raise InputError(f'{place}, type = "{kind[:60]}": must be one of {listing(_CONSTRAINTS)}')
-        first = link_of(element, "parent", links, place)
-        second = link_of(element, "child", links, place)
-        frames = []
-        for side in ("parent", "child"):
-            origin = origin_of(element, f"{side}_origin", place)
-            axis = axis_of(element, f"{side}_axis", place)
-            frames.append(Frame(origin.position, origin.rotation @ axis_frame(np.zeros(3), axis).rotation))
-        closing = _CONSTRAINTS[kind]
-        if closing is Closing.WELD:
-            frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
-        found.append(
-            LoopClosure(unique_name(name, taken | {each.name for each in found}), closing, first, second, *frames)
-        )
+        sides = [link_of(element, side, links, place) for side in ("parent", "child")]
+        frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
+        axes = [axis_of(element, f"{side}_axis", place) for side in ("parent", "child")]
+        found.append(_closure(_CONSTRAINTS[kind], name, sides, frames, axes, taken | {each.name for each in found}))
     return found
+
+
+def closures_of_loop_joints(root: Element, links: set[str], taken: set[str], source: str) -> list[LoopClosure]:
+    """Return the closures of the elements ``<loop_joint>``.
+
+    Raises:
+        InputError: a link or type is unknown, a hinge or slide has no axis, or a number is none.
+    """
+    found: list[LoopClosure] = []
+    for element in root.findall("loop_joint"):
+        name = name_of(element, source)
+        place = f"{source}: loop_joint {name}"
+        kind = element.get("type", "")
+        allowed = [key for key in _CONSTRAINTS if key != "universal"]
+        if kind not in allowed:
+            raise InputError(f'{place}, type = "{kind[:60]}": must be one of {listing(allowed)}')
+        sides = [link_of(element, side, links, place) for side in ("link1", "link2")]
+        frames = [origin_of(element, side, place) for side in ("link1", "link2")]
+        closing = _CONSTRAINTS[kind]
+        if closing not in (Closing.BALL, Closing.WELD) and element.find("axis") is None:
+            raise InputError(
+                f"{place}, axis: is missing; a joint of the type {kind} needs it, in the frame of each link"
+            )
+        axes = [axis_of(element, "axis", place)] * 2
+        found.append(_closure(closing, name, sides, frames, axes, taken | {each.name for each in found}))
+    return found
+
+
+def _closure(
+    closing: Closing,
+    name: str,
+    sides: Sequence[str],
+    frames: Sequence[Frame],
+    axes: Sequence[FloatArray],
+    taken: set[str],
+) -> LoopClosure:
+    """Return a closure between two links, given a frame on each and the joint's axis in that frame."""
+    if closing is not Closing.WELD:
+        turned = [axis_frame(np.zeros(3), axis).rotation for axis in axes]
+        frames = [Frame(each.position, each.rotation @ turn) for each, turn in zip(frames, turned, strict=True)]
+    return LoopClosure(unique_name(name, taken), closing, sides[0], sides[1], frames[0], frames[1])

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator
 
 from ....models.arrays import FloatArray
 from ....models.mechanism import wrenches_of
 from ...errors import listing
-from .importing import OPEN, Imported, gap_share
-from .newton import Gap
+from .importing import Imported, gap_share, gap_words
+from .newton import CLOSED
 from .symmetry import SAME, Offers
 
 #: Most names that a line lists.
@@ -50,12 +49,9 @@ def _loops(found: Imported) -> str:
         return "closed by the description's own joints"
     worst = max(found.gaps, key=lambda gap: gap_share(gap, found.size))
     share = gap_share(worst, found.size)
-    most = f"{share:.2g} of the size, where {OPEN:g} is allowed"
-    return f"open in the file by up to {_gap(worst)} ({most})"
-
-
-def _gap(gap: Gap) -> str:
-    return f"{gap.distance:.3g} and {math.degrees(gap.angle):.3g} deg"
+    if share <= CLOSED:
+        return "closed in the file, to rounding"
+    return f"open in the file by up to {gap_words(worst)} ({share:.2g} of the size)"
 
 
 def offer_lines(offers: Offers, size: float) -> Iterator[tuple[str, str]]:

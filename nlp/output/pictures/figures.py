@@ -15,6 +15,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from ...results.robottables import rate_word
 from ...units import rate_unit
 from .canvas import INK, MUTED, RED
 from .drawing import Drawing
@@ -152,7 +153,7 @@ def _add_colour_bar(
     scale = ScalarMappable(Normalize(-largest, largest), rate_colour_map())
     bar = figure.colorbar(scale, cax=axes)
     unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
-    bar.set_label(legible(f"rate of each limb, {unit}"), color=INK, fontsize=9, parse_math=False)
+    bar.set_label(legible(f"{rate_word(drawing.model)} of each limb, {unit}"), color=INK, fontsize=9, parse_math=False)
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.outline.set_edgecolor(MUTED)
     rates = [row.rate for row in drawing.rows]

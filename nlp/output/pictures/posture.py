@@ -9,7 +9,18 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, Substitution, displacement, frozen_array, jacobian, reporting_matrix
+from ....models import (
+    FloatArray,
+    Model,
+    Substitution,
+    Velocities,
+    displacement,
+    driven,
+    frozen_array,
+    jacobian,
+    rate_relations,
+    reporting_matrix,
+)
 from ...program.kernel import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
@@ -31,8 +42,8 @@ class Posture:
         marks: points of each mark, (k, 3) each.
         joints: of each joint, (1 + a, 3) its place and the unit vectors of its axes.
         jacobian: (m, 6) unit wrenches, couple rows scaled by the characteristic length.
-        driving: (m,) work rate of each row in the actuated joints of its limb, each at unit rate; zero for a
-            constraint, and for a robot without actuated joints.
+        driving: (m,) largest work rate of each row for a unit rate of an actuator; zero for a constraint, and for a
+            robot without actuated joints.
         quantities: each of the model's quantities, radians for angles.
     """
 
@@ -65,7 +76,8 @@ class Linkage:
         outputs = [
             ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
             jacobian(model.wrenches, SX(characteristic_length), model.members),
-            ca.horzcat(SX(6, 0), *[each.screw for each in model.actuators]),
+            driven(model.wrenches, model.actuators, SX(characteristic_length), model.members),
+            rate_relations(model.actuators),
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
@@ -83,8 +95,9 @@ class Linkage:
         """
         scene = self.model.scene
         arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
-        columns, rows, screws, *quantities = self._drawing(*arguments)
-        rows = reporting_matrix(self.model, rows, screws) @ rows
+        columns, rows, works, relations, *quantities = self._drawing(*arguments)
+        matrix = reporting_matrix(self.model, Velocities(rows, works, relations), position)
+        rows, works = matrix @ rows, np.abs(matrix @ works)
         sizes = [mark.kind.size for mark in scene.marks]
         counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions), sum(sizes)]
         points, circles, directions, marks, joints = np.split(columns.T, np.cumsum(counts))
@@ -101,16 +114,9 @@ class Linkage:
             marks=tuple(frozen_array(part, part.shape) for part in np.split(marks, ends)) if scene.marks else (),
             joints=_joints(joints, [1 + len(each.axes) for each in scene.joints]),
             jacobian=frozen_array(rows, (len(self.model.rows), 6)),
-            driving=frozen_array(self._driving(rows, screws), (len(self.model.rows),)),
+            driving=frozen_array(works.max(axis=1, initial=0.0), (len(self.model.rows),)),
             quantities=tuple(frozen_array(each.ravel(), (each.size,)) for each in quantities),
         )
-
-    def _driving(self, rows: FloatArray, screws: FloatArray) -> FloatArray:
-        """Return the largest work rate (m,) of each row (m, 6) in one of the actuated joints (6, a) of its limb."""
-        works = np.abs(rows @ np.vstack([screws[3:], screws[:3]]))
-        owners = np.array([each.limb for each in self.model.actuators], dtype=object)
-        own = [works[k, owners == row.limb] for k, row in enumerate(self.model.rows)]
-        return np.array([each.max(initial=0.0) for each in own])
 
     def posture_after(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
         """Return the drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.

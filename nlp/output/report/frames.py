@@ -9,6 +9,7 @@ import numpy as np
 
 from ....models import Dimension, FloatArray
 from ...evidence.state import ZERO_F
+from ...results.robottables import rate_word
 from ...results.rounding import settled
 from ...units import Units, objective_unit, rate_unit
 from ..pictures.drawing import Drawing, Motion
@@ -94,6 +95,7 @@ class ViewData(TypedDict):
     headline: str
     is_answer: bool
     measure: MeasureData
+    rate_word: str
     rate_unit: str
     objective_unit: str
     unit: str
@@ -171,6 +173,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "is_answer": drawing.is_answer,
         "measure": measure_data(drawing, units),
         "unit": units.length,
+        "rate_word": rate_word(drawing.model),
         "rate_unit": "" if motion is None else rate_unit(motion.twist, units),
         "objective_unit": unit_of_F,
         "size": drawing.size,

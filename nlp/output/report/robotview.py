@@ -98,7 +98,7 @@ def _rates(view: ViewData) -> Markup:
         "limb",
         *(["wrench"] if couples else []),
         _measure_header(view),
-        f"rate, {view['rate_unit']}",
+        f"{view['rate_word']}, {view['rate_unit']}",
         "",
         "share of F",
     ]

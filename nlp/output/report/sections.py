@@ -13,7 +13,7 @@ from ...results.parts import LimitData, MarginData, RobotData
 from ...results.point import task_data
 from ...results.robottables import robot_tables
 from ...results.rounding import number, size_of_F
-from ...results.tables import limit_table, margin_table, origin_table, outcome_table
+from ...results.tables import limit_table, limits_title, margin_table, origin_table, outcome_table
 from ...results.wording import (
     costliest_words,
     counted,
@@ -170,6 +170,9 @@ def _limits(report: Report) -> Markup:
     if not limits:
         return Markup("")
     caption = "How near the robot comes to each limit, and what the limit costs"
+    proof = report.result.workspace if isinstance(report.result, SolveResult) else None
+    held = limits_title(report.case, proof)
+    caption += f": {held}" if held else ""
     robot = _robot_of(report)
     size = 0.0 if robot is None else size_of_F(robot, _F_of(report))
     parts = [html_table(limit_table(limits, size), caption, id="limit")]

@@ -13,10 +13,10 @@ from ...errors import EvaluationError
 from ...results.jsondata import json_data
 from ...results.text import Line, TextTable
 from ...results.workspace import WorkspacePose, WorkspaceResult
+from ...results.workspacedigest import verdict_words
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, workspace_summary
 from ...workspace.slices.slices import Slice
-from ...workspace.verdict import Outcome
 from ..pictures.figures import picture
 from ..pictures.workspacepose import drawing_at
 from ..pictures.workspaceslices import Kind, slice_images, slices_legend, slices_notes
@@ -76,12 +76,8 @@ def workspace_page(report: WorkspaceReport) -> str:
 
 def _answer(result: WorkspaceResult) -> str:
     """Return the verdict in one sentence."""
-    if result.proved:
-        return "Everything is proved for every pose."
-    outcomes = [each.outcome for each in result.extremes]
-    outcomes.append(Outcome.OPEN if result.regular is None else result.regular.outcome)
-    counts = [f"{outcomes.count(each)} {each.value}" for each in (Outcome.REFUTED, Outcome.OPEN)]
-    return f"Not everything is proved: {' and '.join(counts)} of {len(outcomes)} claims."
+    words = verdict_words(result)
+    return f"{words[0].upper()}{words[1:]}."
 
 
 def _verdicts(report: WorkspaceReport) -> Markup:

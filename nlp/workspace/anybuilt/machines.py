@@ -11,15 +11,16 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension, Model, Substitution
+from ....models.joints.closedform import ClosedForm
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.task import Sense
 from ...errors import UncoveredError
 from ...program.layout import Layout
-from ..claims import Claim, claims_of
+from ..claims import REACH, Claim, claims_of
 from ..general.family import BuiltModel, Family, built_model, family_of
 from ..general.machinenumber import MachineMinimum, smallest_of_machines
-from ..general.problem import build_problem
+from ..general.problem import NotJudgedError, build_problem
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
 from ..posebox import PoseBox
 from ..verdict import Outcome
@@ -115,6 +116,40 @@ def machine_extremes(
         yield found
 
 
+def shown_extremes(
+    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], effort: Effort, *, with_objective: bool
+) -> Iterator[Extreme]:
+    """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
+
+    Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is singular.
+    The design is searched as the only machine within a tolerance of nothing. None is yielded of a robot without loops,
+    or one whose loops cannot be followed.
+
+    Args:
+        case: with fixed dimensions.
+        closed: its robot without unknowns in closed form.
+        box: the poses.
+        quantities: names of measures.
+        effort: how they are proved.
+        with_objective: whether F of each task is bounded.
+
+    Raises:
+        InputError: the robot has no measure of a name.
+    """
+    if not closed.model.unknowns:
+        return
+    built = BuiltModel(closed.model, (), closed.reaches)
+    try:
+        family = family_of(case, built, build_problem(case, closed.model, box), 0.0)
+    except NotJudgedError:
+        return
+    machines = Machines(case, closed.model, built, family)
+    layout = machine_layout(case, built, family)
+    for claim in claims_of(layout, quantities, with_objective=with_objective):
+        if claim.limit is None:
+            yield _extreme(machines, None, claim, in_family(layout, family, claim.expression), effort)
+
+
 def not_bounded(claim: Claim, reason: str) -> Extreme:
     """Return the extreme of a claim of which nothing is proved."""
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
@@ -135,7 +170,7 @@ def _reach_claims(machines: Machines, layout: Layout) -> list[Claim]:
     values = ca.Function("reach", own.all, [each.value for each in reaches]).call(given.all)
     reading = Reading(Dimension.NUMBER)
     return [
-        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, "reach", 0.0)
+        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
         for each, value in zip(reaches, values, strict=True)
     ]
 
@@ -222,7 +257,8 @@ def _of_minimum(family: Family, claim: Claim, found: MachineMinimum, slack: floa
     pose, centres = None, None
     if found.z is not None:
         problem = family.problem
-        pose, centres = problem.box.pose(problem.pose_of(found.z)), family.errors_of(found.z)
+        pose = problem.box.pose(problem.pose_of(found.z))
+        centres = family.errors_of(found.z) if family.names else None
     return Extreme(
         name=claim.name,
         sense=claim.sense,

@@ -24,7 +24,7 @@ from ...case.limits.relation import Relations
 from ...case.task import Sense
 from ...case.workspace import Workspace
 from ...program.layout import Layout
-from ..claims import Claim, claims_of_items
+from ..claims import Claim, claims_of_items, with_limits
 from ..machine import LEGS, Legs
 from ..posebox import PoseNumbers, pose_box
 from ..worstnumber import Worst
@@ -83,8 +83,7 @@ def built_claims(
     known = {each.name for each in claims if each.key}
     missing = [each for name, each in limited.items() if name not in known and each.changes]
     added = [context.built(each, limited) for each in claims_of_items([each.item for each in missing])]
-    first_without = next((k for k, each in enumerate(claims) if not each.key or each.leg is not None), len(claims))
-    return [*found[:first_without], *added, *found[first_without:]]
+    return with_limits(found, added)
 
 
 class _Context:

@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from ...certificate.boxes.firstpass import MOST_VARIABLES
 from ..regular.inverse import inverses
 from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .family import Family
 from .problem import Problem
 from .rank import RankTest, Tested
-from ...certificate.boxes.firstpass import MOST_VARIABLES
 from .relation import Relation, are_contractions, by_centres, relation_of
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ _LEAST = 1e-10
 _MOST = 1.0
 #: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
 _ROUNDING = 1e-14
+#: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
+_CLOSE = 1e-9
 #: Contractions of the closed point at the common face of two boxes: each one squares its width.
 _CONTRACTIONS = 3
 
@@ -64,6 +66,13 @@ def joined(parts: Sequence[Cells]) -> Cells:
     """Return boxes one after the other."""
     lower, upper, near, is_known = zip(*parts, strict=True)
     return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
+
+
+def are_between(z: FloatArray, cells: Cells, dependent: Sequence[int]) -> NDArray[np.bool_]:
+    """Return whether closed points (B, n) are those of boxes: others may be of another assembly of the joints."""
+    lower, upper, own = cells.lower[:, dependent], cells.upper[:, dependent], z[:, dependent]
+    room = _CLOSE * (upper - lower)
+    return np.asarray(((own >= lower - room) & (own <= upper + room)).all(axis=1))
 
 
 class Examined(NamedTuple):

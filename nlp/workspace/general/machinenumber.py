@@ -15,11 +15,13 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
+from ...interruption import reason_of, reason_to_stop
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
 from .covering import in_workspace, whole_workspace, widths_of
@@ -117,6 +119,18 @@ def smallest_of_machines(
     return search.run(gap, limit, slack, time_limit, interrupted)
 
 
+class _State(NamedTuple):
+    """What is left after a step: open boxes, and the smallest bound of those that are closed."""
+
+    open: Examined
+    closed: float
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lower bounds of the open boxes; nothing is known of a box in which dependent coordinates are not."""
+        return np.where(self.open.cells.is_known, self.open.smallest, -np.inf)
+
+
 class _Search:
     """The state of a search."""
 
@@ -130,39 +144,35 @@ class _Search:
         self._roots: list[Cells] = []
         self._best = PointValue(math.inf, family.start)
         self._boxes = 0
-        self._open = self._examined(whole)
+        self._state = _State(self._examined(whole), math.inf)
 
     def run(
         self, gap: float, limit: float | None, slack: float, time_limit: float | None, interrupted: Callable[[], bool]
     ) -> MachineMinimum:
         """Search until the gap is met and the limit decided."""
-        closed, reason = math.inf, ""
-        while len(self._open.smallest):
-            bounds = self._bounds
-            if min(closed, float(bounds.min())) >= self._target(gap, limit, slack):
-                break
-            seconds = time.perf_counter() - self._began
-            if interrupted() or (time_limit is not None and seconds >= time_limit):
-                reason = "interrupted" if interrupted() else f"stopped after {seconds:.3g} s"
-                break
-            order = np.argpartition(bounds, min(_BLOCK, len(bounds)) - 1)
-            now, later = self._open.some(order[:_BLOCK]), self._open.some(order[_BLOCK:])
-            width = widths_of(now.cells, self._independent, self._whole)
-            if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
-                reason = "the boxes that are left are too small to be divided"
-                break
-            score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-            split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
-            self._open = later.followed_by(self._examined(self._examiner.halves(now, split)))
-            done = self._bounds >= self._target(gap, limit, slack)
-            closed = min(closed, float(self._bounds[done].min(initial=math.inf)))
-            self._open = self._open.some(np.flatnonzero(~done))
-        return self._result(closed, reason)
 
-    @property
-    def _bounds(self) -> FloatArray:
-        """Lower bounds of the open boxes; nothing is known of a box in which dependent coordinates are not."""
-        return np.where(self._open.cells.is_known, self._open.smallest, -np.inf)
+        def run() -> str:
+            while len(self._state.open.smallest):
+                (found, closed), bounds = self._state, self._state.bounds
+                if min(closed, float(bounds.min())) >= self._target(gap, limit, slack):
+                    break
+                reason = reason_to_stop(time.perf_counter() - self._began, time_limit, interrupted)
+                if reason:
+                    return reason
+                order = np.argpartition(bounds, min(_BLOCK, len(bounds)) - 1)
+                now, later = found.some(order[:_BLOCK]), found.some(order[_BLOCK:])
+                width = widths_of(now.cells, self._independent, self._whole)
+                if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
+                    return "the boxes that are left are too small to be divided"
+                score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
+                split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+                following = _State(later.followed_by(self._examined(self._examiner.halves(now, split))), closed)
+                done = following.bounds >= self._target(gap, limit, slack)
+                least = float(following.bounds[done].min(initial=math.inf))
+                self._state = _State(following.open.some(np.flatnonzero(~done)), min(closed, least))
+            return ""
+
+        return self._result(reason_of(run))
 
     def _target(self, gap: float, limit: float | None, slack: float) -> float:
         """Return the bound at which the search ends."""
@@ -189,10 +199,9 @@ class _Search:
                 self._best = best
         return found
 
-    def _result(self, closed: float, reason: str) -> MachineMinimum:
+    def _result(self, reason: str) -> MachineMinimum:
         """Return the result at this state of the search."""
-        open_bounds = self._bounds
-        bound = min(closed, float(open_bounds.min(initial=math.inf)), self._best.value)
+        bound = min(self._state.closed, float(self._state.bounds.min(initial=math.inf)), self._best.value)
         if (
             self._dependent
             and math.isfinite(bound)

@@ -11,11 +11,9 @@ from casadi import SX
 from ....models import FloatArray
 from ..machine import INSIDE
 from ..regular.inverse import inverses
-from .cells import Cells
+from .cells import Cells, are_between
 from .family import Family
 
-#: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
-_CLOSE = 1e-9
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
 _INSIDE = 1e-13
 
@@ -113,9 +111,7 @@ class MachinePoints:
     def _are_inside(self, z: FloatArray, cells: Cells) -> FloatArray:
         """Return whether points are in the workspace, with closed loops in the assembly of their boxes."""
         D, problem = self._dependent, self._family.problem
-        room = _CLOSE * (cells.upper - cells.lower)[:, D]
-        within = (z[:, D] >= cells.lower[:, D] - room) & (z[:, D] <= cells.upper[:, D] + room)
-        own = np.asarray(within.all(axis=1))
+        own = are_between(z, cells, D)
         return np.array(
             [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
         )

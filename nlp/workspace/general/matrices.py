@@ -5,9 +5,10 @@ With actuators locked, the platform's twist x is resisted unless each row ``L`` 
 are ``M (x, w) = 0`` with entries that are rows and screws themselves, neither normalised nor made orthogonal. J has
 full rank, and the passive screws of every member are independent, exactly where M has full column rank.
 
-With free actuators of rates ``u`` and screws ``A``, rows and members see ``x - A u`` in the place of x: the null space
-of this matrix N has as many dimensions as the robot has freedoms, more only where the constraint wrenches lose their
-rank, or passive screws theirs.
+With free actuators of rates ``u``, each row and member sees ``x - A u`` in the place of x, with the screws ``A`` of
+those actuators that move its member; and the relations of rates that loops demand are rows of their own. The null space
+of this matrix N has as many dimensions as the robot has freedoms and rates of actuators without a motion, more only
+where the constraint wrenches lose their rank, or passive screws theirs.
 
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 """
@@ -20,7 +21,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import SX
 
-from ....models import Member, Wrench, WrenchKind
+from ....models import Actuator, Member, Wrench, WrenchKind, rate_relations
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class RankMatrix:
 
     Attributes:
         matrix: (m, c) sparse: the first six columns are the platform's twist.
-        nullity: dimension of its null space at almost all poses: 0, or the robot's freedoms.
+        nullity: dimension of its null space at almost all poses: 0, or the robot's freedoms and idle rates.
     """
 
     matrix: SX
@@ -43,14 +44,14 @@ class Limbs:
     Attributes:
         wrenches: rows.
         members: members; those columns of each that are independent.
-        actuators: (6, 1) screw of each actuator as a twist, the world's origin as reference, by name of the limb.
+        actuators: actuated joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length.
     """
 
     wrenches: Sequence[Wrench]
     members: Sequence[Member]
-    actuators: Sequence[tuple[str, SX]]
+    actuators: Sequence[Actuator]
     position: SX
     length: float
 
@@ -75,12 +76,12 @@ def locked_matrix(limbs: Limbs) -> SX:
 def free_matrix(limbs: Limbs) -> SX:
     """Return N, with the actuators free; of a robot given by its rows the couples alone, which are its constraints."""
     if limbs.actuators:
-        return _matrix(limbs, list(limbs.actuators))
+        return _matrix(limbs, limbs.actuators)
     couples = [row for row in limbs.wrenches if row.kind is WrenchKind.COUPLE]
     return _matrix(Limbs(couples, (), (), limbs.position, limbs.length), [])
 
 
-def _matrix(limbs: Limbs, driven: list[tuple[str, SX]]) -> SX:
+def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), sparse, with one column for each driven joint at its end."""
     p, length = limbs.position, limbs.length
     rates = sum(member.screws.shape[1] for member in limbs.members)
@@ -90,8 +91,9 @@ def _matrix(limbs: Limbs, driven: list[tuple[str, SX]]) -> SX:
         left = ca.horzcat(row.force.T, moment.T / length)
         block = SX(1, columns)
         block[0, :6] = left
-        for k, (limb, screw) in enumerate(driven):
-            if limb == row.limb:
+        for k, actuator in enumerate(driven):
+            screw = actuator.screw_in(row.label.member)
+            if screw is not None:
                 block[0, 6 + rates + k] = -left @ _twist(screw, p, length)
         blocks.append(block)
     for member in limbs.members:
@@ -105,11 +107,14 @@ def _matrix(limbs: Limbs, driven: list[tuple[str, SX]]) -> SX:
         block[:, :6] = seen
         for j, twist in enumerate(own):
             block[:, at + j] = -seen @ twist
-        for k, (limb, screw) in enumerate(driven):
-            if limb == member.limb:
+        for k, actuator in enumerate(driven):
+            screw = actuator.screw_in(member.label)
+            if screw is not None:
                 block[:, 6 + rates + k] = -seen @ _twist(screw, p, length)
         blocks.append(block)
         at += count
+    relations = rate_relations(driven)
+    blocks.append(ca.horzcat(SX(relations.shape[0], columns - len(driven)), relations))
     return ca.sparsify(ca.vertcat(*blocks))
 
 

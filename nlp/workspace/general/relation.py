@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 #: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
 #: terms, each with a rounding of 2^-53.
 ROUNDING = 1e-13
+#: More than underflow can take from a sum of squares.
+_TINY = 1e-300
 #: Steps of the power method for a vector that proves a contraction.
 _POWERS = 12
 
@@ -62,7 +64,7 @@ class Relation(NamedTuple):
 def by_centres(slopes: FloatArray) -> FloatArray:
     """Return the largest sizes (...) of linear parts (..., 3 m) in the errors of m centres, each of at most size 1."""
     parts = slopes.reshape(*slopes.shape[:-1], slopes.shape[-1] // 3, 3)
-    return np.asarray(np.sqrt((parts * parts).sum(axis=-1)).sum(axis=-1) * (1 + ROUNDING))
+    return np.asarray(np.sqrt((parts * parts).sum(axis=-1) + _TINY).sum(axis=-1) * (1 + ROUNDING))
 
 
 def relation_of(equations: Forms, independent: list[int], dependent: list[int], errors: list[int]) -> Relation:

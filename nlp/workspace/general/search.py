@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ...interruption import Milestone, reached
-from ..regular.search import REPORT_EVERY, RankProgress, reason_to_stop
+from ...interruption import Milestone, reached, reason_of, reason_to_stop
+from ..regular.search import REPORT_EVERY, RankProgress
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
@@ -50,6 +51,7 @@ def prove_rank(
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
+    is_shown: Callable[[FloatArray], bool] = lambda _: True,
 ) -> Regularity:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -62,16 +64,26 @@ def prove_rank(
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
+        is_shown: whether a singular point (n,), or (n + 3 m,) of another machine, is one in home's assembly.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, family, engine, recorder)
-    try:
-        reason = search.run(time_limit, most_boxes, progress)
-    except KeyboardInterrupt:
-        reason = "interrupted"
-    return search.verdict(reason)
+    search = _Search(problem, matrix, family, engine, recorder, is_shown)
+    return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
+
+
+class _State(NamedTuple):
+    """What is left of the workspace after a step: blocks to examine, those too small to bisect, and boxes examined."""
+
+    stack: list[Cells]
+    small: list[Cells]
+    boxes: int
+
+    @property
+    def open(self) -> int:
+        """Number of boxes that are left."""
+        return sum(len(each.lower) for each in (*self.stack, *self.small))
 
 
 class _Search:
@@ -83,10 +95,11 @@ class _Search:
         matrix: RankMatrix,
         family: Family | None,
         engine: str | None,
-        recorder: TreeRecord | None = None,
+        recorder: TreeRecord | None,
+        is_shown: Callable[[FloatArray], bool],
     ) -> None:
         self._began = time.perf_counter()
-        self._problem, self._family, self._recorder = problem, family, recorder
+        self._problem, self._family, self._recorder, self._is_shown = problem, family, recorder, is_shown
         self._newton, self._machine = (
             SingularPose(problem, matrix),
             None if family is None else SingularMachine(family, family.matrix(matrix)),
@@ -99,55 +112,47 @@ class _Search:
         self._independent = list(problem.independent)
         whole = whole_workspace(problem)
         self._whole = (whole.upper - whole.lower)[0, self._independent]
-        self._stack = [whole]
-        self._small: list[Cells] = []
+        self._state = _State([whole], [], 0)
         # The boxes in which dependent coordinates became known.
         self._roots: list[Cells] = []
-        self._boxes, self._attempts, self._last = 0, 0, _SMALL
+        self._attempts, self._last = 0, _SMALL
         # Number of boxes from which a singular machine is looked for, although no pose of the design is near to one.
         self._due = _FIRST
         self._singular: FloatArray | None = None
-        self._is_one = True
-
-    @property
-    def _open(self) -> int:
-        return sum(len(each.lower) for each in (*self._stack, *self._small))
 
     def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
-        while self._stack:
+        while self._state.stack:
+            (*stack, cells), small, boxes = self._state
             seconds = time.perf_counter() - self._began
-            reason = reason_to_stop(seconds, self._boxes, time_limit, most_boxes)
+            reason = reason_to_stop(seconds, time_limit, boxes=boxes, most_boxes=most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
-                progress(seconds, self._boxes, self._open)
-            cells = self._in_workspace(self._next())
+                progress(seconds, boxes, self._state.open)
+            if len(cells.lower) > _BLOCK:
+                stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
+            cells = self._in_workspace(cells.some(np.arange(min(_BLOCK, len(cells.lower)))))
+            boxes += len(cells.lower)
             if not len(cells.lower):
+                self._state = _State(stack, small, boxes)
                 continue
-            self._boxes += len(cells.lower)
             found = self._examiner.examine(cells)
             new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
             if new.size:
                 self._roots.append(found.cells.some(new))
-            if self._is_refuted(found):
+            if self._is_refuted(found, boxes):
+                self._state = self._state._replace(boxes=boxes)
                 return ""
-            self._branch(found)
-        if self._small:
+            halves, undivided = self._halves(found)
+            self._state = _State(stack + halves, small + undivided, boxes)
+        if self._state.small:
             return "the boxes that are left are too small to be divided"
-        self._is_one = not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
-        return "" if self._is_one else "the assemblies in two neighbouring boxes are not proved to be the same"
-
-    def _next(self) -> Cells:
-        """Return the next boxes, and take them off the stack."""
-        cells = self._stack.pop()
-        if len(cells.lower) > _BLOCK:
-            self._stack.append(cells.some(np.arange(_BLOCK, len(cells.lower))))
-            cells = cells.some(np.arange(_BLOCK))
-        return cells
+        is_one = not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
+        return "" if is_one else "the assemblies in two neighbouring boxes are not proved to be the same"
 
     def _in_workspace(self, before: Cells) -> Cells:
         """Return the boxes that hold poses of the workspace, contracted to them."""
@@ -166,7 +171,7 @@ class _Search:
                 lower[:, free[j]], upper[:, free[j]] = cells.lower[:, j], cells.upper[:, j]
         return lower, upper
 
-    def _is_refuted(self, found: Examined) -> bool:
+    def _is_refuted(self, found: Examined, boxes: int) -> bool:
         """Return whether a singular pose is found from the worst of these boxes."""
         values = np.where(found.is_regular, np.inf, found.smallest)
         order = np.argsort(values)[:2]
@@ -174,15 +179,21 @@ class _Search:
             if not values[k] < self._last or self._attempts >= _MOST:
                 break
             self._attempts += 1
-            self._last = _SMALLER * float(values[k])
-            self._singular = self._newton.search(self._middle(found.cells, k))
+            near = self._newton.search(self._middle(found.cells, k))
+            self._singular = self._if_shown(near)
             if self._singular is not None:
                 return True
-        if self._machine is None or self._boxes < self._due or not np.isfinite(values[order[0]]):
+            # A singular pose of another assembly says nothing about where one of home's is.
+            self._last = _SMALLER * float(values[k]) if near is None else self._last
+        if self._machine is None or boxes < self._due or not np.isfinite(values[order[0]]):
             return False
-        self._due = 2 * self._boxes
-        self._singular = self._machine.search(self._middle(found.cells, order[0]))
+        self._due = 2 * boxes
+        self._singular = self._if_shown(self._machine.search(self._middle(found.cells, order[0])))
         return self._singular is not None
+
+    def _if_shown(self, z: FloatArray | None) -> FloatArray | None:
+        """Return a singular point if it is one in home's assembly: Newton's method may end in another one."""
+        return z if z is not None and self._is_shown(z) else None
 
     def _middle(self, cells: Cells, k: np.int64) -> FloatArray:
         """Return a point (n,) in the middle of a box, with closed loops or near them."""
@@ -191,11 +202,11 @@ class _Search:
         z[own] = cells.centre[k, own]
         return z
 
-    def _branch(self, found: Examined) -> None:
-        """Bisect the open boxes."""
+    def _halves(self, found: Examined) -> tuple[list[Cells], list[Cells]]:
+        """Return the halves of the open boxes, and those that are too small to bisect."""
         rows = np.flatnonzero(~found.is_regular)
         if not rows.size:
-            return
+            return [], []
         part = found.some(rows)
         own = self._independent
         width = widths_of(part.cells, own, self._whole)
@@ -204,19 +215,19 @@ class _Search:
         low, high = (each[every, np.array(own)[split]] for each in (part.cells.lower, part.cells.upper))
         middle = 0.5 * low + 0.5 * high
         small = (width.max(axis=1) < _LEAST_WIDTH) | ~((low < middle) & (middle < high))
-        if small.any():
-            self._small.append(part.cells.some(np.flatnonzero(small)))
-        if (~small).any():
-            if self._recorder is not None:
-                along = np.array([self._problem.free[own[k]] for k in split[~small]])
-                self._recorder.cuts(*self._ends(part.cells.some(~small)), along)
-            halves = self._examiner.halves(part, split)
-            self._stack.append(halves.some(np.concatenate([~small, ~small])))
+        undivided = [part.cells.some(np.flatnonzero(small))] * bool(small.any())
+        if small.all():
+            return [], undivided
+        if self._recorder is not None:
+            along = np.array([self._problem.free[own[k]] for k in split[~small]])
+            self._recorder.cuts(*self._ends(part.cells.some(~small)), along)
+        halves = self._examiner.halves(part, split)
+        return [halves.some(np.concatenate([~small, ~small]))], undivided
 
     def verdict(self, reason: str) -> Regularity:
         """Return the verdict at this state of the search."""
         problem = self._problem
-        outcome, y, share, left = Outcome.PROVED, None, 0.0, [*self._stack, *self._small]
+        outcome, y, share, left = Outcome.PROVED, None, 0.0, [*self._state.stack, *self._state.small]
         centres = None
         if self._singular is not None:
             outcome, reason = Outcome.REFUTED, BY_NEWTON
@@ -231,7 +242,7 @@ class _Search:
             widest = int(np.argmax(widths.max(axis=1, initial=0.0)))
             z = np.where(np.isfinite(cells.centre[widest]), cells.centre[widest], cells.near[widest])
             y = problem.pose_of(z)
-        elif not self._is_one:
+        elif reason:
             outcome, y = Outcome.OPEN, problem.pose_of(problem.start)
         return Regularity(
             outcome=outcome,
@@ -239,8 +250,8 @@ class _Search:
             y=None if y is None else frozen_array(y, (6,)),
             sides=None,
             engine=self._examiner.engine,
-            boxes=self._boxes,
-            open=self._open,
+            boxes=self._state.boxes,
+            open=self._state.open,
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,

@@ -11,10 +11,10 @@ import numpy as np
 
 from ....models import Dimension, Model
 from ...case.case import Case
-from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ...case.limits.singular_values import ConditionNumber
 from ...case.task import Sense
 from ...errors import UncoveredError
-from ..claims import asked_name
+from ..claims import asked_name, asked_spectra
 from ..general.family import Family
 from ..general.problem import NotJudgedError
 from ..machine import legs_of
@@ -28,8 +28,6 @@ from .singular import SingularValues
 if TYPE_CHECKING:
     from ..paper.record import PaperRecord
 
-#: Names of the measures that are no quantities of a robot.
-SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 #: Reason for a measure of which nothing is known of every machine.
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
@@ -58,7 +56,7 @@ def spectral_extremes(
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
         box: the poses.
-        names: of :data:`SPECTRAL`.
+        names: measures that are asked for, of which the others are left out.
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for each search.
         interrupted: whether the work is requested to stop.
@@ -67,7 +65,7 @@ def spectral_extremes(
         unknown: reason why the machines that are meant are not judged; else empty.
         paper: records the searches for a proof.
     """
-    for name in names:
+    for name in asked_spectra(case, names):
         is_condition = name == ConditionNumber.key
         sense = Sense.MAX if is_condition else Sense.MIN
         sign = -1.0 if is_condition else 1.0
@@ -75,7 +73,7 @@ def spectral_extremes(
             oracle = _oracle(case, model, box, shortest, family, unknown, is_condition=is_condition)
         except (UncoveredError, NotJudgedError) as error:
             nothing = (sign * -math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, str(error))
-            yield Extreme(name, sense, Dimension.NUMBER, "", None, *nothing)
+            yield Extreme(asked_name(case, name), sense, Dimension.NUMBER, "", None, *nothing)
             continue
         middle = abs(float(oracle.values((0.5 * (box.lower + box.upper))[None])[0]))
         allowed, is_of_legs = gap * (middle or 1.0), isinstance(oracle, SingularValues)
@@ -94,7 +92,8 @@ def spectral_extremes(
             box.pose(found.y),
             Outcome.OPEN if reason else Outcome.PROVED,
         )
-        extreme = Extreme(name, sense, Dimension.NUMBER, "", None, *reached, found.boxes, found.seconds, reason)
+        ended = (*reached, found.boxes, found.seconds, reason)
+        extreme = Extreme(asked_name(case, name), sense, Dimension.NUMBER, "", None, *ended)
         if case.joint_centre_tolerance and isinstance(oracle, SingularValues):
             extreme = replace(extreme, errors=oracle.errors(found.y))
         yield extreme

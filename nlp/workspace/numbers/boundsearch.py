@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ....models import FloatArray
+from ...interruption import reason_of, reason_to_stop
 from ..posebox import PoseBox
 
 if TYPE_CHECKING:
@@ -95,51 +96,83 @@ def prove_minimum(
     """
     began = time.perf_counter()
     y, value = _good_point(oracle, box)
-    lower, upper, bound = box.lower[None], box.upper[None], np.array([-math.inf])
-    shares = oracle.bounds(lower, upper).shares
-    closed, boxes, reason = math.inf, 0, ""
-    while len(bound):
-        least = min(closed, float(bound.min()))
-        target = _target(value, gap, limit, slack)
-        if least >= target:
-            break
-        if interrupted():
-            reason = "interrupted"
-            break
-        if time_limit is not None and time.perf_counter() - began >= time_limit:
-            reason = f"stopped after {time.perf_counter() - began:.3g} s"
-            break
-        order = np.argpartition(bound, min(_BLOCK, len(bound)) - 1)
-        now, later = order[:_BLOCK], order[_BLOCK:]
-        part_lower, part_upper, parents = lower[now], upper[now], bound[now]
-        split = np.argmax(np.where(part_upper > part_lower, shares[now], -1.0), axis=1)
-        lower, upper, bound, shares = lower[later], upper[later], bound[later], shares[later]
-        every = np.arange(len(now))
-        middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
-        left, right = part_upper.copy(), part_lower.copy()
-        left[every, split] = right[every, split] = middle
-        halves = np.concatenate([part_lower, right]), np.concatenate([left, part_upper])
-        children = box.contracted(*halves)
-        if recorder is not None:
-            recorder.cuts(part_lower, part_upper, split)
-            recorder.contractions(halves, (children.lower, children.upper), children.outside)
-        kept = ~children.outside
-        new_lower, new_upper = children.lower[kept], children.upper[kept]
-        at = oracle.bounds(new_lower, new_upper)
-        found = np.fmax(at.lower, np.concatenate([parents, parents])[kept])
-        boxes += len(found)
-        centres = box.clipped(0.5 * new_lower + 0.5 * new_upper)
-        values = oracle.values(centres)
-        if len(values) and float(np.nanmin(values)) < value:
-            y, value = centres[int(np.nanargmin(values))], float(np.nanmin(values))
-        done = found >= max(value - gap, _target(value, gap, limit, slack))
-        if done.any():
-            closed = min(closed, float(found[done].min()))
-        lower = np.concatenate([lower, new_lower[~done]])
-        upper = np.concatenate([upper, new_upper[~done]])
-        bound, shares = np.concatenate([bound, found[~done]]), np.concatenate([shares, at.shares[~done]])
-    least = min(closed, float(bound.min()) if len(bound) else math.inf, value)
-    return Minimum(least, value, y, boxes, len(bound), time.perf_counter() - began, reason)
+    lower, upper = box.lower[None], box.upper[None]
+    nothing = Bounds(np.array([-math.inf]), oracle.bounds(lower, upper).shares)
+    state = _State(lower, upper, nothing, math.inf, y, value, 0)
+
+    def run() -> str:
+        nonlocal state
+        while len(state.bounds.lower) and state.least < _target(state.value, gap, limit, slack):
+            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
+            if reason:
+                return reason
+            state = _after_step(state, oracle, box, gap, limit, slack, recorder)
+        return ""
+
+    reason, count = reason_of(run), len(state.bounds.lower)
+    least = min(state.least, state.value)
+    return Minimum(least, state.value, state.y, state.boxes, count, time.perf_counter() - began, reason)
+
+
+class _State(NamedTuple):
+    """A search after a step: open boxes, the smallest bound of the closed ones, the best pose, and boxes examined."""
+
+    lower: FloatArray
+    upper: FloatArray
+    bounds: Bounds
+    closed: float
+    y: FloatArray
+    value: float
+    boxes: int
+
+    @property
+    def least(self) -> float:
+        """The smallest bound of all boxes."""
+        return min(self.closed, float(self.bounds.lower.min(initial=math.inf)))
+
+
+def _after_step(
+    state: _State,
+    oracle: Oracle,
+    box: PoseBox,
+    gap: float,
+    limit: float | None,
+    slack: float,
+    recorder: TreeRecord | None,
+) -> _State:
+    """Return the state after the boxes with the smallest bounds were bisected."""
+    lower, upper, (bound, shares), closed, y, value, boxes = state
+    order = np.argpartition(bound, min(_BLOCK, len(bound)) - 1)
+    now, later = order[:_BLOCK], order[_BLOCK:]
+    part_lower, part_upper, parents = lower[now], upper[now], bound[now]
+    split = np.argmax(np.where(part_upper > part_lower, shares[now], -1.0), axis=1)
+    every = np.arange(len(now))
+    middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
+    left, right = part_upper.copy(), part_lower.copy()
+    left[every, split] = right[every, split] = middle
+    halves = np.concatenate([part_lower, right]), np.concatenate([left, part_upper])
+    children = box.contracted(*halves)
+    if recorder is not None:
+        recorder.cuts(part_lower, part_upper, split)
+        recorder.contractions(halves, (children.lower, children.upper), children.outside)
+    kept = ~children.outside
+    new_lower, new_upper = children.lower[kept], children.upper[kept]
+    at = oracle.bounds(new_lower, new_upper)
+    found = np.fmax(at.lower, np.concatenate([parents, parents])[kept])
+    centres = box.clipped(0.5 * new_lower + 0.5 * new_upper)
+    values = oracle.values(centres)
+    if len(values) and float(np.nanmin(values)) < value:
+        y, value = centres[int(np.nanargmin(values))], float(np.nanmin(values))
+    done = found >= max(value - gap, _target(value, gap, limit, slack))
+    return _State(
+        np.concatenate([lower[later], new_lower[~done]]),
+        np.concatenate([upper[later], new_upper[~done]]),
+        Bounds(np.concatenate([bound[later], found[~done]]), np.concatenate([shares[later], at.shares[~done]])),
+        min(closed, float(found[done].min(initial=math.inf))),
+        y,
+        value,
+        boxes + len(found),
+    )
 
 
 def _target(value: float, gap: float, limit: float | None, slack: float) -> float:

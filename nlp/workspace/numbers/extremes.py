@@ -81,6 +81,11 @@ class Extreme:
     errors: JointErrors | None = None
     centres: CentreErrors | None = None
 
+    @property
+    def fails(self) -> bool:
+        """Whether it has a limit that is not proved to hold; a number without a limit is information."""
+        return self.limit is not None and self.outcome is not Outcome.PROVED
+
 
 def prove_extreme(
     layout: Layout,

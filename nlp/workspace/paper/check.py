@@ -21,7 +21,7 @@ from ...certificate.paper.proof import Proof, ProofError, Statement
 from ...certificate.paper.proofcheck import check_proof
 from ...errors import ScrewsynthError
 from ...program.layout import Layout
-from ..machine import legs_of, workspace_of_case
+from ..machine import check_leg_error, legs_of, workspace_of_case
 from ..posed import extreme_program
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
@@ -29,8 +29,8 @@ from .anyrobot.signchange import show_sign_change
 from .ballrows import Joints
 from .built.built import Built
 from .clearanceclaim import ClearanceClaim
-from .comparing import compare_legs, keep_limit
-from .document import COORDINATES, PaperClaim, PaperProof, Unproved, workspace_numbers
+from .comparing import hold_premises, keep_limit
+from .document import COORDINATES, PaperClaim, PaperProof, Unproved
 from .errorclaim import ErrorClaim, whole_errors
 from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
 from .pieces import BoxClaim, show
@@ -81,30 +81,39 @@ class CheckedPaper:
 
     Attributes:
         claims: what it proves.
-        unproved: claims of the case that it does not prove.
+        unproved: claims of the case that it does not prove, with the reasons that the file gives.
+        numbers_at: assemblies that the claims about numbers cover; empty for a robot without loops.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
 
     claims: tuple[CheckedClaim, ...]
     unproved: tuple[Unproved, ...]
+    numbers_at: str
     leaves: int
     pieces: int
 
 
-def check_paper(proof: PaperProof, case: Case, progress: PaperProgress | None = None) -> CheckedPaper:
+def check_paper(
+    proof: PaperProof, case: Case, progress: PaperProgress | None = None, *, leg_error: float = 0.0
+) -> CheckedPaper:
     """Check a proof of a workspace, by showing each of its claims again.
 
     Args:
         proof: the proof.
         case: the case that it is about.
         progress: called before each claim.
+        leg_error: largest error of a leg's length, length.
 
     Raises:
         ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
         CaseError: the case has no workspace, or a free dimension.
+        InputError: the error of legs is negative, or the robot is not six straight legs.
     """
-    checker = _Checker(proof, case)
+    if not proof.claims:
+        raise ProofError("the proof claims nothing")
+    check_leg_error(case, leg_error)
+    checker = _Checker(proof, case, leg_error)
     given = {(each.name, each.sense): each for each in proof.claims}
     others = [(each.name, each.sense) for each in proof.unproved]
     expected = {each.key: each for each in checker.expected}
@@ -124,7 +133,7 @@ def check_paper(proof: PaperProof, case: Case, progress: PaperProgress | None = 
             claims.append(checker.check(each, given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return CheckedPaper(tuple(claims), proof.unproved, checker.leaves, checker.pieces)
+    return CheckedPaper(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
 
 
 class _Checker:
@@ -133,17 +142,16 @@ class _Checker:
     Args:
         proof: the proof.
         case: the case.
+        leg_error: largest error of a leg's length, length.
 
     Raises:
-        ProofError: the proof is for another workspace, or for other joint centres.
+        ProofError: the proof is for another workspace, other joint centres or other errors.
     """
 
-    def __init__(self, proof: PaperProof, case: Case) -> None:
+    def __init__(self, proof: PaperProof, case: Case, leg_error: float) -> None:
         workspace = workspace_of_case(case)
-        if workspace_numbers(workspace) != proof.workspace:
-            raise ProofError("the proof is for another workspace than this case's")
         self._case, self._proof, self._legs = case, proof, legs_of(case)
-        compare_legs(self._legs, proof)
+        hold_premises(case, workspace, self._legs, leg_error, proof)
         if self._legs is None and case.joint_centre_tolerance and proof.claims:
             raise ProofError("claims about every machine within a tolerance have no proof for this robot")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
@@ -151,15 +159,12 @@ class _Checker:
         self._model = robot.model
         self._root: PoseRoot = pose_root(workspace)
         self._tolerance = case.joint_centre_tolerance or 0.0
-        if self._tolerance != proof.tolerance:
-            raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
-        self._eps = leg_error_of(case, proof.leg_error)
+        self._eps = leg_error_of(case, leg_error)
+        self.numbers_at = robot.numbers_at
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
-            self.expected = expected_claims(
-                case, self._layout, self._legs, proof.quantities, proof.leg_error, robot.more
-            )
+            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, leg_error, robot.more)
         except ProofError:
             raise
         except ScrewsynthError as error:

@@ -1,13 +1,16 @@
-"""Comparison of a proof with its case: joint centres, and limits that a bound must keep."""
+"""Comparison of a proof with its case: premises, and limits that a bound must keep."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...case.case import Case
 from ...case.task import Sense
+from ...case.workspace import Workspace
 from ...certificate.paper.proof import ProofError
+from ...certificate.paper.statement import exact
 from ..machine import Legs
-from .document import PaperProof
+from .document import PaperProof, workspace_numbers
 from .expected import ExpectedClaim
 
 #: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
@@ -16,7 +19,30 @@ _ON_LIMIT = 1e-9
 _SAME = 1e-9
 
 
-def compare_legs(legs: Legs | None, proof: PaperProof) -> None:
+def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: PaperProof) -> None:
+    """Refuse a proof whose file names other premises than those of the case; the check does without the file's.
+
+    Args:
+        case: the case.
+        workspace: its poses.
+        legs: its joint centres; None for a robot that is not six straight legs.
+        leg_error: largest error of a leg's length.
+        proof: the proof.
+
+    Raises:
+        ProofError: it is for another workspace, other joint centres or other errors.
+    """
+    if workspace_numbers(workspace) != proof.workspace:
+        raise ProofError("the proof is for another workspace than this case's")
+    if proof.leg_error != leg_error:
+        stated = f"the proof is for legs that are off by at most {exact(proof.leg_error)} {case.units.length}"
+        raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
+    _compare_legs(legs, proof)
+    if (case.joint_centre_tolerance or 0.0) != proof.tolerance:
+        raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
+
+
+def _compare_legs(legs: Legs | None, proof: PaperProof) -> None:
     """Refuse a proof for other joint centres.
 
     Raises:

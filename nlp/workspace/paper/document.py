@@ -19,23 +19,19 @@ Lemmas are claims of their own that others rest on: the shortest lengths of the 
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
-import zlib
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
 from ...case.pose import Free
 from ...case.workspace import Workspace
-from ...certificate.paper.proof import ProofError
+from ...certificate.paper.proof import packed, read_document, unpacked
+from ...system.strictjson import json_tree
 
 FORMAT = "screwsynth-workspace-proof"
 _VERSION = 2
 #: Number of coordinates of a pose.
 COORDINATES = 6
-#: Reasons of claims.
-REASONS = ("regular", "singular", "program", "boxes", "lengths", "one machine", "singular machine")
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class PaperClaim:
     Attributes:
         name: in the words of the command.
         sense: ``min`` or ``max`` for a number, else empty.
-        reason: one of :data:`REASONS`.
+        reason: how it is proved, in the words of this module's docstring.
         bound: bound of the number in the unit of its search: of a program's objective, of a distance, of a singular
             value or a condition number, or, for errors of a pose, of their part of first order for legs that are one
             unit of length off; None without a number.
@@ -72,8 +68,7 @@ class PaperClaim:
             "bound": self.bound,
             "graph": self.graph,
             "sides": self.sides,
-            "digest": hashlib.sha256(self.tree).hexdigest(),
-            "tree": base64.b64encode(zlib.compress(self.tree, 9)).decode("ascii"),
+            **packed(self.tree),
         }
 
 
@@ -89,6 +84,9 @@ class Unproved:
 @dataclass(frozen=True)
 class PaperProof:
     """Proofs of claims about a workspace.
+
+    The check derives all premises from the case and from its own arguments. Those in the file, ``workspace``, ``legs``,
+    ``leg_error`` and ``tolerance``, tell a proof for other ones at once.
 
     Attributes:
         case: the case file's text.
@@ -142,10 +140,51 @@ def workspace_numbers(workspace: Workspace) -> object:
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
 
 
+@dataclass(frozen=True)
+class _ClaimTable:
+    """A claim as the file has it."""
+
+    name: str
+    sense: str
+    reason: Literal["regular", "singular", "program", "boxes", "lengths", "one machine", "singular machine"]
+    bound: float | None
+    graph: str
+    sides: tuple[tuple[float, ...], ...]
+    digest: str
+    tree: str
+
+    def claim(self, source: str) -> PaperClaim:
+        """Return the claim.
+
+        Raises:
+            ProofError: its tree is not the one of its digest.
+        """
+        tree = unpacked(self.tree, self.digest, f"{source}: is damaged at '{self.name}'")
+        return PaperClaim(self.name, self.sense, self.reason, self.bound, self.graph, tree, self.sides)
+
+
+@dataclass(frozen=True)
+class _File:
+    """A proof as its file has it."""
+
+    format: str
+    version: int
+    name: str
+    case: str
+    workspace: object
+    legs: tuple[tuple[float, ...], ...]
+    quantities: tuple[str, ...]
+    leg_error: float
+    joint_centre: float
+    claims: tuple[_ClaimTable, ...]
+    lemmas: tuple[_ClaimTable, ...]
+    not_on_paper: tuple[Unproved, ...]
+
+
 def is_paper(text: str) -> bool:
     """Return whether a text is a proof of a workspace, and not one of ``certify``."""
     try:
-        content = json.loads(text)
+        content = json_tree(text)
     except ValueError:
         return False
     return isinstance(content, dict) and content.get("format") == FORMAT
@@ -161,44 +200,19 @@ def read_paper(text: str, source: str) -> PaperProof:
     Raises:
         ProofError: the text is no proof, or is damaged.
     """
-    try:
-        content: dict[str, Any] = json.loads(text)
-        if content["format"] != FORMAT or content["version"] != _VERSION:
-            raise ProofError(f"{source}: is no proof of this version")
-        claims = tuple(_claim(each, source) for each in content["claims"])
-        return PaperProof(
-            case=str(content["case"]),
-            name=str(content["name"]),
-            workspace=_tuples(content["workspace"]),
-            legs=tuple(tuple(map(float, each)) for each in content["legs"]),
-            quantities=tuple(map(str, content["quantities"])),
-            leg_error=float(content["leg_error"]),
-            claims=claims,
-            tolerance=float(content["joint_centre"]),
-            lemmas=tuple(_claim(each, source) for each in content["lemmas"]),
-            unproved=tuple(
-                Unproved(str(each["name"]), str(each["sense"]), str(each["reason"])) for each in content["not_on_paper"]
-            ),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError, zlib.error):
-        raise ProofError(f"{source}: is no proof as workspace --proof writes it") from None
-
-
-def _claim(content: dict[str, Any], source: str) -> PaperClaim:
-    """Return a claim from its JSON object.
-
-    Raises:
-        ProofError: its tree is not the one of its digest.
-    """
-    tree = zlib.decompress(base64.b64decode(content["tree"], validate=True))
-    name = str(content["name"])
-    if content["digest"] != hashlib.sha256(tree).hexdigest():
-        raise ProofError(f"{source}: is damaged: the digest of '{name}' is not that of its tree")
-    if content["reason"] not in REASONS:
-        raise ProofError(f"{source}: gives '{content['reason']}' as the reason of '{name}', which is none")
-    sides = tuple(tuple(map(float, each)) for each in content["sides"])
-    bound = None if content["bound"] is None else float(content["bound"])
-    return PaperClaim(name, str(content["sense"]), content["reason"], bound, str(content["graph"]), tree, sides)
+    found = read_document(_File, text, source, (FORMAT, _VERSION), "workspace --proof")
+    return PaperProof(
+        case=found.case,
+        name=found.name,
+        workspace=_tuples(found.workspace),
+        legs=found.legs,
+        quantities=found.quantities,
+        leg_error=found.leg_error,
+        claims=tuple(each.claim(source) for each in found.claims),
+        tolerance=found.joint_centre,
+        lemmas=tuple(each.claim(source) for each in found.lemmas),
+        unproved=found.not_on_paper,
+    )
 
 
 def _tuples(value: object) -> object:

@@ -71,7 +71,7 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
         along = p + reach * w
         if not along < shortest:
             return math.inf, math.inf
-        needed = 0.5 * (along**2 / (shortest - along) + reach * w**2)
+        needed = 0.5 * (along * along / (shortest - along) + reach * w * w)  # infinite where a power would overflow
         if needed <= r and _is_enough(r, position, rotation, eps, shortest, reach):
             return p * (1 + 8 * UNIT), w * (1 + 8 * UNIT)
         r = needed * (1 + _ENLARGED)

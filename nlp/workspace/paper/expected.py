@@ -11,7 +11,7 @@ from ...case.limits.clearance import LegClearance
 from ...case.limits.legs import Actuator
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...program.layout import Layout
-from ..claims import REGULAR, Claim, asked_name, claims_of
+from ..claims import REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
 from ..machine import Legs
 from .built.statement import with_further
 
@@ -77,19 +77,12 @@ def expected_claims(
         InputError: the robot has no measure of a name.
     """
     found = [ExpectedClaim(REGULAR, "", "regular"), *more]
-    # A measure that is asked for may have been named before, with a limit: the first claim is the stronger one.
-    numbers: dict[tuple[str, str], Claim] = {}
-    spectral = (SmallestSingularValue.key, ConditionNumber.key)
-    claims = claims_of(layout, [name for name in quantities if name not in spectral])
-    for each in with_further(layout, claims) if legs is not None and legs.tolerance else claims:
-        numbers.setdefault((each.name, each.sense.value), each)
-    found += [ExpectedClaim(*key, "number", each.limit, each) for key, each in numbers.items()]
+    claims = claims_of(layout, [name for name in quantities if name not in SPECTRAL])
+    claims = with_further(layout, claims) if legs is not None and legs.tolerance else claims
+    found += [ExpectedClaim(each.name, each.sense.value, "number", each.limit, each) for each in claims]
     if legs is None:
         return found
-    strokes = list(_of_strokes(case))
-    # At one pose the limits on a leg's stroke say less: those over all poses take their place.
-    over_all = {each.key for each in strokes}
-    found = [each for each in found if each.key not in over_all] + strokes
+    found += _of_strokes(case)
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
             name = "smallest_singular_value"
@@ -102,7 +95,7 @@ def expected_claims(
                 name = f"leg_clearance limbs {names[pair[0]]} and {names[pair[1]]}"
                 found.append(ExpectedClaim(name, "min", "clearance", limit.min, legs=pair))
     length = case.characteristic_length
-    for name in dict.fromkeys(name for name in quantities if name in spectral):
+    for name in asked_spectra(case, quantities):
         sense, kind = ("max", "condition") if name == ConditionNumber.key else ("min", "singular value")
         found.append(ExpectedClaim(asked_name(case, name), sense, kind, length=length))
     if leg_error_of(case, leg_error) > 0:

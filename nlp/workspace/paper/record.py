@@ -140,6 +140,7 @@ class PaperRecord:
         programs: of numbers, by name and sense.
         boxes: of searches of their own, by name.
         firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
+        elsewhere: names and senses of limits that are proved in home's assembly, and not in every one as on paper.
         directions: fixed directions (3,) of a leg, in the world frame and in the platform frame, by the name of lengths
             of one machine.
     """
@@ -148,6 +149,7 @@ class PaperRecord:
     programs: dict[tuple[str, str], ProgramRecord] = field(default_factory=dict)
     boxes: dict[str, TreeRecord] = field(default_factory=dict)
     firsts: dict[str, float] = field(default_factory=dict)
+    elsewhere: set[tuple[str, str]] = field(default_factory=set)
     directions: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def own(self, name: str) -> TreeRecord:

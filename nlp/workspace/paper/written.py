@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...certificate.paper.proof import fingerprint
-from ..claims import asked_name, exact_length_name, one_machine_name
+from ..claims import REACH, asked_name, exact_length_name, one_machine_name
 from ..machine import Legs, legs_of
 from ..verdict import Outcome, Regularity
 from .anyrobot.robotclaims import RobotClaims, robot_claims
@@ -29,6 +29,7 @@ _AS_BUILT = "it is about every machine within the tolerance of joint centres, wh
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
 _NO_BOUND = "its search has no bound"
+_ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"
 #: Reasons of claims about other robots than six straight legs.
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
@@ -133,7 +134,7 @@ class _Robot(NamedTuple):
 
 def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     """Return the claims about the robot of a judgement, with the symbols in which its numbers were bounded."""
-    reaches = [each for each in judged.extremes if each.key == "reach"]
+    reaches = [each for each in judged.extremes if each.key == REACH]
     proved = {each.name for each in reaches if each.outcome is Outcome.PROVED}
     on_paper = {each for each in proved if (found := record.programs.get((each, "min"))) and found.tree is not None}
     # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
@@ -200,6 +201,8 @@ def _number(
 def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
     """Return a claim with a tree of the search of ``certify``, or why there is none."""
     program = record.programs.get(each.key)
+    if each.key in record.elsewhere:
+        return _ONE_ASSEMBLY
     if program is None or program.tree is None:
         return _NO_BOUND
     return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)

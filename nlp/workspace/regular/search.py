@@ -17,12 +17,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ...interruption import Milestone, is_requested, reached
+from ...interruption import Milestone, reached, reason_of, reason_to_stop
 from ..built.builtrank import SingularMachine, singular_machine
 from ..machine import Legs
 from ..posebox import PoseBox
@@ -69,22 +69,29 @@ def prove_regular(
         ValueError: there is no engine of that name here.
     """
     search = _Search(legs, box, rank_engine(legs, box, engine), recorder)
-    try:
-        reason = search.run(time_limit, most_boxes, progress)
-    except KeyboardInterrupt:
-        reason = "interrupted"
-    return search.verdict(reason)
+    return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
 
 
-def reason_to_stop(seconds: float, boxes: int, time_limit: float | None, most_boxes: int | None) -> str:
-    """Return the reason for stopping a search before its end; empty for none."""
-    if is_requested():
-        return "interrupted"
-    if time_limit is not None and seconds >= time_limit:
-        return f"stopped after {seconds:.3g} s"
-    if most_boxes is not None and boxes >= most_boxes:
-        return f"stopped after {boxes:,} boxes"
-    return ""
+#: Lower and upper ends (B, 6) of boxes.
+_Ends = tuple[FloatArray, FloatArray]
+
+
+class _State(NamedTuple):
+    """What is left of the whole box after a step: blocks to examine, those too small to bisect, and boxes examined."""
+
+    stack: list[_Ends]
+    small: list[_Ends]
+    boxes: int
+
+    @property
+    def left(self) -> list[_Ends]:
+        """All blocks that are left."""
+        return [*self.stack, *self.small]
+
+    @property
+    def open(self) -> int:
+        """Number of boxes that are left."""
+        return sum(len(lower) for lower, _ in self.left)
 
 
 class _Search:
@@ -100,64 +107,51 @@ class _Search:
     def __init__(self, legs: Legs, box: PoseBox, engine: RankEngine, recorder: TreeRecord | None = None) -> None:
         self._legs, self._box, self._engine, self._recorder = legs, box, engine, recorder
         self._began = time.perf_counter()
-        self._stack: list[tuple[FloatArray, FloatArray]] = [(box.lower[None], box.upper[None])]
-        self._small: list[tuple[FloatArray, FloatArray]] = []
-        self._boxes = 0
+        self._state = _State([(box.lower[None], box.upper[None])], [], 0)
         self._points: dict[int, FloatArray] = {}
         self._sides: FloatArray | None = None
         self._built: SingularMachine | None = None
-
-    @property
-    def _open(self) -> int:
-        return sum(len(lower) for lower, _ in (*self._stack, *self._small))
 
     def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
-        while self._stack:
+        while self._state.stack:
+            (*stack, (lower, upper)), small, boxes = self._state
             seconds = time.perf_counter() - self._began
-            reason = reason_to_stop(seconds, self._boxes, time_limit, most_boxes)
+            reason = reason_to_stop(seconds, time_limit, boxes=boxes, most_boxes=most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:
                 reported = seconds
-                progress(seconds, self._boxes, self._open)
-            lower, upper = self._stack[-1]
+                progress(seconds, boxes, self._state.open)
             block = self._engine.block
             if len(lower) > block:
-                self._stack[-1:] = [(lower[block:], upper[block:]), (lower[:block], upper[:block])]
-            # The boxes stay where they are until their parts are there too: an interrupt between leaves them open.
-            place = len(self._stack) - 1
+                stack.append((lower[block:], upper[block:]))
             found = self._engine.examine(lower[:block], upper[:block])
-            self._boxes += len(found.verdict)
             if self._recorder is not None:
                 self._recorder.ranks(lower[:block], upper[:block], found)
-            self._branch(found)
-            del self._stack[place]
+            halves, undivided = self._halves(found)
+            self._state = _State(stack + halves, small + undivided, boxes + len(found.verdict))
             if self._is_refuted(found) or self._is_refuted_as_built(found):
                 return ""
-        return "boxes are left that are too small to bisect" if self._small else ""
+        return "boxes are left that are too small to bisect" if self._state.small else ""
 
-    def _branch(self, found: RankExamination) -> None:
-        """Bisect the open boxes."""
+    def _halves(self, found: RankExamination) -> tuple[list[_Ends], list[_Ends]]:
+        """Return the halves of the open boxes, and those that are too small to bisect."""
         rows = np.flatnonzero(found.verdict == Rank.OPEN)
-        if not rows.size:
-            return
         lower, upper, split = found.lower[rows], found.upper[rows], found.split[rows]
         whole = np.where(self._box.upper > self._box.lower, self._box.upper - self._box.lower, np.inf)
         every = np.arange(rows.size)
         low, high = lower[every, split], upper[every, split]
         middle = 0.5 * low + 0.5 * high
         small = (((upper - lower) / whole).max(axis=1) < _LEAST_WIDTH) | ~((low < middle) & (middle < high))
-        if small.any():
-            self._small.append((lower[small], upper[small]))
         cut = ~small
         left, right = upper[cut].copy(), lower[cut].copy()
         columns = np.arange(len(left))
         left[columns, split[cut]] = right[columns, split[cut]] = middle[cut]
-        if len(left):
-            self._stack.append((np.concatenate([lower[cut], right]), np.concatenate([left, upper[cut]])))
+        halves = np.concatenate([lower[cut], right]), np.concatenate([left, upper[cut]])
+        return [halves] * bool(len(left)), [(lower[small], upper[small])] * bool(small.any())
 
     def _is_refuted(self, found: RankExamination) -> bool:
         """Return whether two poses with determinants of opposite sign are known, from this block or an earlier one."""
@@ -183,31 +177,27 @@ class _Search:
 
     def verdict(self, reason: str) -> Regularity:
         """Return the verdict at this state of the search."""
-        outcome, y = Outcome.PROVED, None
+        outcome, y, left = Outcome.OPEN if reason else Outcome.PROVED, None, self._state.left
         if self._sides is not None:
             outcome = Outcome.REFUTED
             y = singular_between(self._legs, self._box, *self._sides)
         elif self._built is not None:
             outcome, y = Outcome.REFUTED, self._built.y
-        elif self._open:
-            outcome = Outcome.OPEN
-            lower, upper = max((*self._stack, *self._small), key=lambda each: float((each[1] - each[0]).max()))
+        elif left:
+            lower, upper = max(left, key=lambda each: float((each[1] - each[0]).max()))
             widest = int(np.argmax((upper - lower).max(axis=1)))
             y = 0.5 * lower[widest] + 0.5 * upper[widest]
         free = list(self._box.free)
         whole = (self._box.upper - self._box.lower)[free]
-        share = sum(
-            float(((upper - lower)[:, free] / whole).prod(axis=1).sum())
-            for lower, upper in (*self._stack, *self._small)
-        )
+        share = sum(float(((upper - lower)[:, free] / whole).prod(axis=1).sum()) for lower, upper in left)
         return Regularity(
             outcome=outcome,
             box=self._box,
             y=None if y is None else frozen_array(y, (6,)),
             sides=self._sides,
             engine=self._engine.name,
-            boxes=self._boxes,
-            open=self._open,
+            boxes=self._state.boxes,
+            open=self._state.open,
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,

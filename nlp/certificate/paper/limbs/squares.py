@@ -62,10 +62,12 @@ class SquareSlopes:
     def high(self) -> FloatArray:
         """Upper bound (N,) of the term from the ranges of N and D, where it is defined."""
         low, high = self.N.V
+        one, other = np.abs(low), np.abs(high)
         if self.factor > 0:
-            return np.asarray(self.factor * np.maximum(low * low, high * high) / self.D.V[0] * (1 + _SUMS) + _TINY)
-        least = np.where((low <= 0) & (high >= 0), 0.0, np.minimum(low * low, high * high))
-        return np.asarray(self.factor * least / self.D.V[1] * (1 - _SUMS) + _TINY)
+            most = np.maximum(one, other)
+            return np.asarray(self.factor * most * (most / self.D.V[0]) * (1 + _SUMS) + _TINY)
+        least = np.where((low <= 0) & (high >= 0), 0.0, np.minimum(one, other))
+        return np.asarray(self.factor * least * (least / self.D.V[1]) * (1 - _SUMS) + _TINY)
 
     @property
     def middle(self) -> FloatArray:
@@ -145,18 +147,18 @@ def add_square(model: SumModel, each: SquareSlopes, lower: FloatArray, upper: Fl
     with np.errstate(all="ignore"):
         t = np.where(reach > 0, rest / reach, 0.0)
         if f > 0:
-            scale, grow, more = size / each.D.V[0], 1 + t, rest * (rest + reach)
+            scale, grow, far = size / each.D.V[0], 1 + t, rest + reach
         else:
             useful = (reach > 0) & (rest < reach)
             scale = np.where(useful, -size / each.D.V[1], 0.0)
-            grow, more = np.where(useful, 1 - t, 0.0), np.where(useful, -rest * (reach - rest), 0.0)
+            grow, far = np.where(useful, 1 - t, 0.0), np.where(useful, rest - reach, 0.0)
         curved = 2 * scale * grow * E.b[:, None] * E.b[None]
         # The weights of N and D are rounded, and so are the terms of E's square.
         largest = [np.maximum(np.abs(one.V[0]), np.abs(one.V[1])) for one in rows]
         rounding = size * (2 * np.abs(rho) * largest[0] + rho * rho * largest[1]) * _SUMS
-        rounding = rounding + _SUMS * np.abs(scale) * (rest + reach) ** 2 + _TINY
+        rounding = rounding + _SUMS * np.abs(scale) * (rest + reach) * (rest + reach) + _TINY * (1 + largest[1])
         low, high = slopes_of_square(each)
-        fixed = np.where(each.is_defined, linear.fixed + scale * more + rounding, np.inf)
+        fixed = np.where(each.is_defined, linear.fixed + scale * rest * far + rounding, np.inf)
         # A mean value form begins at an upper bound of the value at the centre.
         error = np.maximum(np.abs(E.total), np.abs(other.total))
         at_centre = scale * error * error * (1 + _SUMS) if f > 0 else 0.0

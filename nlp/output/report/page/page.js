@@ -49,7 +49,7 @@
     for (const [row, k] of rows) {
       const rate = frame.rates[k], share = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} % of F` : "no share of F";
       const wrench = frame.jacobian[k].map((value) => shown(Math.abs(value) < 1e-12 ? 0 : value));
-      text.push(`${row.member === limb ? "" : `${plain(row.member)}, `}${row.kind}: rate ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
+      text.push(`${row.member === limb ? "" : `${plain(row.member)}, `}${row.kind}: ${view.rate_word} ${shown(rate, 6, true)} ${plain(view.rate_unit)}, ${share}`);
       text.push(`wrench (${wrench.slice(0, 3).join(", ")}; ${wrench.slice(3).join(", ")})`);
     }
     return text.join("<br>");
@@ -120,7 +120,7 @@
       found.push({
         type: "scatter3d", mode: "markers", name: "scale", x: [points[0][0]], y: [points[0][1]], z: [points[0][2]], hoverinfo: "skip", showlegend: false,
         marker: { size: 0.1, opacity: 0, color: [0], cmin: -top, cmax: top, colorscale: view.colours.map((each, k) => [k / (view.colours.length - 1), each]),
-          showscale: byId("view").clientWidth > 620, colorbar: { exponentformat: "e", x: 0.99, xanchor: "right", title: { text: `rate, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
+          showscale: byId("view").clientWidth > 620, colorbar: { exponentformat: "e", x: 0.99, xanchor: "right", title: { text: `${view.rate_word}, ${plain(view.rate_unit)}`, side: "right" }, thickness: 14, len: 0.7 } },
       });
     }
     return found;

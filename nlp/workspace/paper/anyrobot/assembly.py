@@ -25,7 +25,7 @@ from .....models import FloatArray
 from ....certificate.paper.slopes import SlopeArithmetic
 from ..positive import contraction, inverses
 from .interval import PRODUCT, UP, balls, half_widths, middle_and_radius, off_identity
-from .looppoints import LoopPoints, dependent_coordinates
+from .looppoints import LoopPoints, dependent_coordinates, is_home
 from .posedrobot import PosedRobot
 
 if TYPE_CHECKING:
@@ -79,10 +79,14 @@ class Assembly:
     """
 
     def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray) -> None:
-        self.start, self._size, self._count = start, robot.size, int(equations.numel())
+        self._size, self._count = robot.size, int(equations.numel())
         self.points = LoopPoints(robot, equations)
         self.dependent = dependent_coordinates(self.points, robot, start, self._count) if self._count else []
         self.independent = [k for k in range(len(start)) if k not in self.dependent]
+        # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
+        to = robot.centre[None][:, self.independent]
+        (middle,) = self.points.moved(start[None], to, self.independent, self.dependent)
+        self.start = middle if is_home(robot, middle) else start
         columns = ca.jacobian(equations, robot.z)
         slopes = [ca.densify(columns[:, j]) for j in self.dependent]
         vector = ca.vertcat(SX(0, 1), equations, *slopes)

@@ -16,6 +16,8 @@ from .posedrobot import PosedRobot
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
+#: Largest residual of further equations of a loop: in another assembly it is of order 0.1.
+_OTHER = 1e-6
 #: Steps of Newton's method at most, and steps on a way from one closed point to another.
 _STEPS, _WAY = 12, 8
 #: Steps from home's assembly to closed loops at another pose.
@@ -91,6 +93,9 @@ class LoopPoints:
         """Return closed loops on a way along which the residuals at a point fall to 0; None where it ends before."""
         z, own = z.copy(), list(moving)
         first = self.at(z[None])[0][0]
+        if float(np.abs(first).max(initial=0.0)) <= _CLOSED:
+            # Slopes of equations that hold by themselves are rounding, along which there is no step.
+            return z
         for step in range(1, _FROM_HOME + 1):
             for _ in range(2):
                 g, J = (each[0] for each in self.at(z[None]))
@@ -102,20 +107,24 @@ class LoopPoints:
 
 
 def start_of(robot: PosedRobot) -> FloatArray:
-    """Return closed loops (n,) in the middle of the workspace, or near it, reached from home's assembly.
+    """Return closed loops (n,) in home's assembly, in the middle of the workspace or near it.
 
     Raises:
         ProofError: none are found.
     """
-    if not robot.equations.numel():
-        return robot.centre
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(robot.centre)
     # Numbers of the pose move only where the unknowns alone do not close the loops.
     for moving in [range(count, n)] * (n > count) + [range(n)]:
         found = points.from_home(robot.centre, moving)
-        if found is not None:
+        if found is not None and is_home(robot, found):
             return found
-    raise ProofError("no closed loops are found in the middle of the workspace")
+    raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
+
+
+def is_home(robot: PosedRobot, z: FloatArray) -> bool:
+    """Return whether a closed point (n,) fulfils all loop equations, in home's working mode; not where it is NaN."""
+    loops, signs = (each.full() for each in ca.Function("mode", [robot.z], [robot.loops, robot.signs])(z))
+    return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
 
 
 def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:

@@ -7,9 +7,10 @@ of joints. Each row of the matrix is a condition that it keeps:
 * the motion is one of the passive joints of each member, ``x - sum_j w_j S_j = 0`` with rates w; of a pinned member the
   velocity of its centre alone.
 
-With the actuators free, x minus the motion ``sum_k u_k A_k`` of the limb's own actuators stands for x in the conditions
-of a limb. With locked actuators the matrix has full column rank where J has full rank, and the passive screws of each
-member are independent. With free ones its null space has as many dimensions as the robot has freedoms, and more only
+With the actuators free, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member stands for x in its
+conditions, and relations ``B u = 0`` that loops demand of the actuators alone are conditions too. With locked actuators
+the matrix has full column rank where J has full rank, and the passive screws of each member are independent. With free
+ones its null space has as many dimensions as the robot has freedoms and rates ``u`` without a motion, and more only
 where the constraint wrenches lose their rank, or passive screws theirs.
 """
 
@@ -22,7 +23,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Member, Model, Wrench, WrenchKind
+from .....models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind, rate_relations
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....certificate.paper.proof import ProofError
@@ -38,7 +39,7 @@ class Motions:
 
     Attributes:
         matrix: (m, c) sparse, m not below c less the freedoms; its first six columns are those of the platform.
-        freedoms: dimensions of its null space that are claimed to be all.
+        freedoms: dimensions of its null space that are claimed to be all: the robot's freedoms and idle rates.
     """
 
     matrix: SX
@@ -75,13 +76,13 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
         couples = [row for row in robot.rows if row.kind is WrenchKind.COUPLE]
         matrix = _matrix(robot, couples, (), ())
     if model.generic is not None:
-        freedoms = 6 - model.generic.constraints
+        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
     else:
         values = np.linalg.svd(ca.Function("free", [robot.z], [ca.densify(matrix)])(start).full(), compute_uv=False)
-        freedoms = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0]))
+        freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
-    return Motions(matrix, freedoms)
+    return Motions(matrix, freedoms + idle)
 
 
 def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
@@ -104,22 +105,20 @@ def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
     return members
 
 
-def _matrix(
-    robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member], actuators: Sequence[tuple[str, SX]]
-) -> SX:
+def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member], actuators: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), with columns of the platform, of passive joints and of actuators."""
     passive = sum(each.screws.shape[1] for each in members)
     blocks, at = [], 6
 
-    def driven(limb: str, seen: SX) -> list[SX]:
-        """Return the columns of all actuators: those of other limbs are 0."""
-        none = SX(seen.shape[0], 1)
-        return [-seen @ _motion(robot, screw) if own == limb else none for own, screw in actuators]
+    def driven(member: str, seen: SX) -> list[SX]:
+        """Return the columns of all actuators: those that do not move a member are 0."""
+        screws = [each.screw_in(member) for each in actuators]
+        return [SX(seen.shape[0], 1) if screw is None else -seen @ _motion(robot, screw) for screw in screws]
 
     for row in rows:
         moment = row.moment - ca.cross(robot.position, row.force)
         work = ca.horzcat(row.force.T, moment.T / robot.length)
-        blocks.append(ca.horzcat(work, SX(1, passive), *driven(row.limb, work)))
+        blocks.append(ca.horzcat(work, SX(1, passive), *driven(row.label.member, work)))
     for each in members:
         # The velocity of a pinned member's centre is v + omega x arm.
         arm = (each.centre - robot.position) / robot.length
@@ -127,8 +126,10 @@ def _matrix(
         count = each.screws.shape[1]
         own = [-seen @ _motion(robot, each.screws[:, j]) for j in range(count)]
         before, after = SX(each.size, at - 6), SX(each.size, 6 + passive - at - count)
-        blocks.append(ca.horzcat(seen, before, *own, after, *driven(each.limb, seen)))
+        blocks.append(ca.horzcat(seen, before, *own, after, *driven(each.label, seen)))
         at += count
+    relations = rate_relations(actuators)
+    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
     return ca.sparsify(ca.vertcat(SX(0, 6 + passive + len(actuators)), *blocks))
 
 

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Member, Model, Substitution, Wrench
+from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
@@ -25,9 +25,11 @@ class PosedRobot:
         middle: (6,) the middle of the workspace: the values of the others.
         size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
         equations: (k, 1) that are 0 where the loops are closed, of order 1.
+        loops: (l, 1) further equations of the same loops, which other assemblies of the joints do not fulfil.
+        signs: (s, 1) numbers that are positive in home's working mode.
         rows: rows of limbs, one wrench each.
         members: members of limbs.
-        actuators: (6, 1) screws of actuators as twists with the world's origin as reference, by name of the limb.
+        actuators: actuated joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length: any positive number.
     """
@@ -37,9 +39,11 @@ class PosedRobot:
     middle: FloatArray
     size: FloatArray
     equations: SX
+    loops: SX
+    signs: SX
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
-    actuators: tuple[tuple[str, SX], ...]
+    actuators: tuple[Actuator, ...]
     position: SX
     length: float
 
@@ -72,8 +76,9 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment)],
         *[part for member in model.members for part in (member.centre, member.screws)],
-        *[each.screw for each in model.actuators],
-        *[each.scaled for each in model.closure],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
+        *[each.scaled for each in (*model.closure, *model.loops)],
+        *[each.value for each in model.signs],
         *[each.size for each in model.unknowns],
     ]
     following = iter(ca.Function("robot", Substitution.identity(model).all, outputs).call(given.all))
@@ -86,8 +91,10 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         members=tuple(
             replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
         ),
-        actuators=tuple((each.limb, next(following)) for each in model.actuators),
+        actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
         equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
+        loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
+        signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
         position=position,
         length=case.characteristic_length,
     )

@@ -25,11 +25,13 @@ class RobotClaims(NamedTuple):
             closed form, where all limbs reach every pose.
         model: the robot without these unknowns, over whose poses its ranks are claimed.
         more: claims about constraint wrenches and reach; none about six straight legs.
+        numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
     """
 
     layout: Layout
     model: Model
     more: tuple[ExpectedClaim, ...]
+    numbers_at: str = ""
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
@@ -54,7 +56,11 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         more += own
         if all(each.name in reached for each in own):
             layout = closed_layout(case, closed, workspace)
-    return RobotClaims(layout or posed_layout(case, workspace), closed.model, tuple(more))
+    numbers_at = "every assembly" if case.model.unknowns else ""
+    if layout is not None:
+        partly = "every assembly in which limbs in closed form are as at home"
+        numbers_at = partly if closed.model.unknowns else "the assembly of home"
+    return RobotClaims(layout or posed_layout(case, workspace), closed.model, tuple(more), numbers_at)
 
 
 def has_constraints(model: Model) -> bool:

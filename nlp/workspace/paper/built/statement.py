@@ -23,7 +23,7 @@ from ....case.limits.relation import Relations
 from ....case.task import Sense
 from ....certificate.paper.proof import ProofError
 from ....program.layout import Layout
-from ...claims import Claim, claims_of_items
+from ...claims import Claim, claims_of_items, with_limits
 from .rules import Machines, TaskRates, angle, minus_cosine, radius_ratio, task_rates
 
 #: Limits on numbers that change with the pose: where those of two legs are the same number of the exact machine, they
@@ -55,8 +55,7 @@ def with_further(layout: Layout, claims: Sequence[Claim]) -> list[Claim]:
     """
     known = {each.name for each in claims if each.key}
     items = [item for item, _, _ in _changing(layout) if item.constraint.name not in known]
-    place = next((k for k, each in enumerate(claims) if not each.key or each.leg is not None), len(claims))
-    return [*claims[:place], *claims_of_items(items), *claims[place:]]
+    return with_limits(claims, list(claims_of_items(items)))
 
 
 class _Changing(NamedTuple):

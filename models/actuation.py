@@ -1,0 +1,156 @@
+"""Rates of actuators: the equations ``J chi = D qdot`` and ``B qdot = 0`` of a limb, whatever its topology.
+
+Each row of ``J`` has a work rate in the platform's twist ``chi``, and one in a unit rate of each actuator: ``D``. Loops
+that more actuators drive than they have freedoms demand ``B qdot = 0`` of the actuators alone. The limb lets the
+platform make the twists for which both equations have a solution: with ``Z`` a basis of the rates that ``B`` allows,
+those in which the wrenches ``n'J`` with ``n'D Z = 0`` do no work. They are the constraints. The rates are the least
+squares solution of the first equation among those of the second. Where both have a solution of no motion, the rates of
+the actuators that take part in it are undetermined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .arrays import FloatArray
+from .member import pseudo_inverse
+from .parts import Dimension
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+#: Work rates below this part of those of unit size are zero: a closed loop is known to the root of rounding at worst.
+RANK_TOLERANCE = 1e-7
+#: Rates below this part of the largest are rounding errors of a solution: such an actuator takes no part.
+_TAKES_PART = 1e-6
+
+
+class Velocities(NamedTuple):
+    """Numbers of a robot's velocity equations.
+
+    Attributes:
+        jacobian: (m, 6) ``J``: the rows of a :class:`~.instance.RobotInstance`, force, then moment about the origin.
+        driven: (m, a) ``D``: work rate of each row for a unit rate of each actuator.
+        relations: (r, a) ``B``.
+    """
+
+    jacobian: FloatArray
+    driven: FloatArray
+    relations: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The actuators of a limb at a point, with rates of order 1: those of angles are times a length of the robot's.
+
+    Attributes:
+        works: (m, a) ``D`` on the rates that ``B`` allows, and 0 on those orthogonal to them.
+        driving: (r, m) orthonormal combinations of rows by which the actuators drive.
+        constraints: (k, m) the others, which do no work in the actuated joints.
+        idle: (a, d) orthonormal rates of no motion.
+        is_zero: (a,) whether an actuator can move while the platform and all other actuators stand still.
+    """
+
+    works: FloatArray
+    driving: FloatArray
+    constraints: FloatArray
+    idle: FloatArray
+    is_zero: Flags
+    _unit: FloatArray
+    _inverse: FloatArray
+
+    def rates(self, resisted: FloatArray) -> FloatArray:
+        """Return the rates (a,) that leave least of the work rates (m,) of the rows.
+
+        They are infinite for an actuator that cannot drive the platform, and otherwise not a number where they are
+        undetermined.
+        """
+        found = self._unit * (self._inverse @ resisted)
+        found[self.is_undetermined] = np.nan
+        return np.where(self.is_zero, np.inf, found)
+
+    @property
+    def is_undetermined(self) -> Flags:
+        """Whether each actuator (a,) has a rate of no motion."""
+        return np.asarray(np.linalg.norm(self.idle, axis=1) > _TAKES_PART)
+
+    def driven_part(self, resisted: FloatArray) -> FloatArray:
+        """Return the part (m,) of the rows' work rates that the actuators can move with."""
+        return np.asarray(self.driving.T @ (self.driving @ resisted))
+
+
+def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: float) -> Drive:
+    """Return the actuators of a limb.
+
+    Args:
+        driven: (m, a) ``D``.
+        relations: (r, a) ``B``; rows of zeros say nothing.
+        unit: (a,) rates that move the platform with a velocity of order 1.
+        size: of the rows, for unit forces 1: smaller work rates are measured by it.
+    """
+    scaled = relations * unit
+    sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
+    scaled = np.divide(scaled, sizes, out=np.zeros_like(scaled), where=sizes > 0)
+    _, values, right = np.linalg.svd(scaled)
+    kept = right[: int(np.count_nonzero(values > RANK_TOLERANCE))]
+    works = driven * unit
+    works = works - (works @ kept.T) @ kept
+    left, values, right = np.linalg.svd(works)
+    rank = int(np.count_nonzero(values > RANK_TOLERANCE * size))
+    inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
+    _, every, right = np.linalg.svd(np.vstack([works / size, kept]))
+    idle = right[int(np.count_nonzero(every > RANK_TOLERANCE)) :].T
+    is_zero = np.linalg.norm(driven * unit, axis=0) <= RANK_TOLERANCE * size
+    is_zero = is_zero & (np.linalg.norm(kept, axis=0) <= RANK_TOLERANCE)
+    return Drive(works, left[:, :rank].T, left[:, rank:].T, idle, is_zero, unit, inverse)
+
+
+class LimbDrive(NamedTuple):
+    """The actuators of a limb of a model: indices of its rows and of its actuators, and how these drive it."""
+
+    rows: list[int]
+    actuators: list[int]
+    drive: Drive
+
+
+def limb_drive(model: Model, velocities: Velocities, centre: FloatArray, limb: str) -> LimbDrive:
+    """Return the actuators of a limb of a model.
+
+    Args:
+        model: the robot.
+        velocities: at a point.
+        centre: (3,) the platform's origin there, length.
+        limb: name of the limb.
+    """
+    J = velocities.jacobian
+    moments = J[:, 3:] - np.cross(np.ravel(centre), J[:, :3])
+    reach = float(np.abs(moments[np.isfinite(moments)]).max(initial=0.0)) or 1.0
+    rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
+    own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
+    unit = np.array([1.0 if model.actuators[k].dimension is Dimension.LENGTH else 1.0 / reach for k in own])
+    size = float(np.abs(np.hstack([J[rows, :3], moments[rows] / reach])).max(initial=0.0)) or 1.0
+    drive = drive_of(velocities.driven[np.ix_(rows, own)], velocities.relations[:, own], unit, size)
+    return LimbDrive(rows, own, drive)
+
+
+def rates_expression(driven: SX, relations: SX, resisted: SX) -> SX:
+    """Return the rates (a, n) of a limb's actuators for work rates (m, n) of its rows, where they are determined.
+
+    Args:
+        driven: (m, a) ``D``.
+        relations: (r, a) ``B`` of full rank.
+        resisted: (m, n).
+    """
+    if not relations.shape[0]:
+        return ca.inv_minor(driven.T @ driven) @ (driven.T @ resisted)
+    r, a = relations.shape
+    works = driven - driven @ (pseudo_inverse(relations, r) @ relations)
+    return pseudo_inverse(works, a - r) @ resisted

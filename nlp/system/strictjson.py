@@ -1,0 +1,215 @@
+"""Strict reading of JSON: plain values first, then typed values by their annotations.
+
+What is read may come from anybody: it is not nested without end, every number is finite, no key stands twice, and every
+text can be written again. A fault is a ``ValueError`` of one sentence.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import json
+import math
+from collections.abc import Callable, Iterable
+from types import MappingProxyType, NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from ..errors import listing, nearest
+
+#: Largest number of lists and objects within each other.
+_DEPTH = 64
+#: Integers up to this size are numbers without loss.
+_LARGEST_INTEGER = 2**53
+_WORDS: dict[object, str] = {
+    bool: "true or false",
+    int: "an integer",
+    float: "a number",
+    str: "a text",
+    NoneType: "null",
+}
+
+Kind = TypeVar("Kind")
+#: Reads an object of a class, from its value and its dotted key.
+ObjectReader = Callable[[type, object, str], object]
+
+
+class Size(NamedTuple):
+    """Mark of an annotated list: the number of its entries."""
+
+    entries: int
+
+
+class WrongValueError(ValueError):
+    """A value that its type does not allow.
+
+    Attributes:
+        key: dotted key of the value.
+    """
+
+    def __init__(self, key: str, fault: str) -> None:
+        self.key = key
+        super().__init__(f"{key}: {fault}" if key else fault)
+
+
+def json_tree(content: str | bytes) -> object:
+    """Return the value of a JSON text, which may begin with a byte order mark.
+
+    Raises:
+        ValueError: it is no JSON, or is refused as this module's docstring says.
+    """
+    try:
+        text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
+        tree = json.loads(
+            text, parse_constant=_number, parse_float=_number, parse_int=_integer, object_pairs_hook=_unique
+        )
+        # An escape may be half of a character, which no file takes.
+        if "\\ud" in text.lower():
+            json.dumps(tree, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise ValueError("a text holds half of a character") from None
+    except RecursionError:
+        raise ValueError("lists or objects are nested too deeply") from None
+    level = [tree]
+    for _ in range(_DEPTH):
+        level = [part for each in level if isinstance(each, list | dict) for part in _parts(each)]
+        if not any(isinstance(each, list | dict) for each in level):
+            return tree
+    raise ValueError("lists or objects are nested too deeply")
+
+
+def _parts(value: list[object] | dict[str, object]) -> Iterable[object]:
+    return value.values() if isinstance(value, dict) else value
+
+
+def _number(text: str) -> float:
+    """Return a finite number; ``NaN`` and ``Infinity`` are no JSON."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{_short(text)} is no finite number")
+    return value
+
+
+def _integer(text: str) -> int:
+    """Return an integer of a size that some other number type has."""
+    if len(text) > len(str(-_LARGEST_INTEGER)) or abs(int(text)) > _LARGEST_INTEGER:
+        raise ValueError(f"the integer {_short(text)} is too large")
+    return int(text)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 24 else f"{text[:21]}..."
+
+
+def _unique(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """Return an object, each of whose keys stands once."""
+    found: dict[str, object] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"the key {_short(key)!r} stands twice in an object")
+        found[key] = value
+    return found
+
+
+def value_of(kind: object, value: object, key: str = "", read: ObjectReader | None = None) -> Any:  # noqa: ANN401 - kind's
+    """Return a value of JSON as an annotation has it; a list becomes a tuple.
+
+    Args:
+        kind: the annotation: a plain type, an enumeration, a data class, ``Literal``, a union, a tuple of one kind, or
+            a mapping from texts.
+        value: as :func:`json_tree` returns it.
+        key: its dotted key, for messages.
+        read: reads objects of classes; :func:`object_of` if left out.
+
+    Raises:
+        WrongValueError: the annotation does not allow the value.
+    """
+    if kind is object:
+        return value
+    if kind in _WORDS:
+        return _plain(kind, value, key)
+    if isinstance(kind, type) and get_origin(kind) is None:
+        return (read or object_of)(kind, value, key) if not issubclass(kind, enum.Enum) else _member(kind, value, key)
+    return _compound(kind, value, key, read)
+
+
+def _plain(kind: object, value: object, key: str) -> object:
+    """Return a number, a text, true, false or null; the errors are those of :func:`value_of`."""
+    if kind is float and type(value) is int and abs(value) <= _LARGEST_INTEGER:
+        return float(value)
+    if type(value) is not kind or (isinstance(value, float) and not math.isfinite(value)):
+        raise WrongValueError(key, f"must be {_WORDS[kind]}")
+    return value
+
+
+def _member(kind: type[enum.Enum], value: object, key: str) -> enum.Enum:
+    """Return the member of an enumeration with a value; the errors are those of :func:`value_of`."""
+    words = {member.value: member for member in kind}
+    if not isinstance(value, str) or value not in words:
+        raise WrongValueError(key, f"must be one of {listing(map(repr, words))}")
+    return words[value]
+
+
+def _compound(kind: object, value: object, key: str, read: ObjectReader | None) -> object:
+    """Return a value of an annotation with arguments; the errors are those of :func:`value_of`."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        found = value_of(arguments[0], value, key, read)
+        for mark in arguments[1:]:
+            if isinstance(mark, Size) and isinstance(found, tuple) and len(found) != mark.entries:
+                raise WrongValueError(key, f"must have {mark.entries} entries, got {len(found)}")
+        return found
+    if origin is Literal:
+        if not any(type(value) is type(each) and value == each for each in arguments):
+            raise WrongValueError(key, f"must be one of {listing(map(repr, arguments))}")
+        return value
+    if origin in (Union, UnionType):
+        return _one_of(arguments, value, key, read)
+    if origin is tuple:
+        if not isinstance(value, list):
+            raise WrongValueError(key, "must be a list")
+        return tuple(value_of(arguments[0], each, f"{key}[{index}]", read) for index, each in enumerate(value))
+    if not isinstance(value, dict):
+        raise WrongValueError(key, "must be an object")
+    return MappingProxyType(
+        {name: value_of(arguments[1], each, below(key, name), read) for name, each in value.items()}
+    )
+
+
+def _one_of(kinds: tuple[object, ...], value: object, key: str, read: ObjectReader | None) -> object:
+    """Return a value of the first of several annotations that allows it.
+
+    Raises:
+        WrongValueError: none does; the fault that lies deepest is the one of the annotation that was meant.
+    """
+    faults = []
+    # An exact type goes before a number that an integer could become.
+    for kind in sorted(kinds, key=lambda each: each is not type(value)):
+        try:
+            return value_of(kind, value, key, read)
+        except WrongValueError as error:
+            faults.append(error)
+    raise max(faults, key=lambda error: len(error.key))
+
+
+def object_of(kind: type[Kind], table: object, key: str = "") -> Kind:
+    """Return a data class from an object with the keys of its fields, of which those with defaults may be missing.
+
+    Raises:
+        WrongValueError: a key is missing or unknown, or a value is not allowed.
+    """
+    if not isinstance(table, dict):
+        raise WrongValueError(key, "must be an object")
+    fields: Any = kind
+    hints = get_type_hints(kind)
+    for name in table:
+        if name not in hints:
+            raise WrongValueError(below(key, name), f"no such key; {nearest(name, hints)}")
+    for each in dataclasses.fields(fields):
+        if each.name not in table and each.default is dataclasses.MISSING:
+            raise WrongValueError(below(key, each.name), "is missing")
+    return kind(**{name: value_of(hints[name], value, below(key, name)) for name, value in table.items()})
+
+
+def below(key: str, name: str) -> str:
+    """Return the dotted key of a name in the object with a key."""
+    return f"{key}.{name}" if key else name

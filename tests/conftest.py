@@ -1,0 +1,48 @@
+"""What all tests share: children that can be interrupted, and searches whose time is counted in looks at the clock."""
+
+import itertools
+import signal
+import threading
+from collections.abc import Callable
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+
+#: Modules of searches with a limit on their time; each looks at the clock once a step.
+SEARCHES = (
+    *("certificate.branchandbound", "workspace.regular.search", "workspace.general.search", "workspace.looplimits"),
+    *("workspace.general.machinenumber", "workspace.numbers.boundsearch", "workspace.numbers.extremes"),
+)
+#: Seconds from one look at the clock to the next: about those of a step on a quiet machine.
+STEP = 0.01
+
+
+def let_children_be_interrupted() -> None:
+    """Let children start with the default action at SIGINT, also where the tests run without interrupts.
+
+    A shell's background job, ``nohup`` and some runners ignore the signal, which children inherit; a handler they do
+    not. This process goes on without interrupts: its handler does nothing.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda *_: None)
+
+
+def pytest_configure() -> None:
+    let_children_be_interrupted()
+
+
+@pytest.fixture
+def children_can_be_interrupted() -> Callable[[], None]:
+    return let_children_be_interrupted
+
+
+@pytest.fixture(scope="session", autouse=True)
+def clock_of_steps() -> None:
+    """Let a search of so many seconds take a number of steps: no test depends on how fast or busy the machine is."""
+    looks = itertools.count()
+    for name in SEARCHES:
+        module = import_module(f"screwsynth.nlp.{name}")
+        assert module.time.perf_counter
+        module.time = SimpleNamespace(perf_counter=lambda: STEP * next(looks))  # type: ignore[attr-defined]

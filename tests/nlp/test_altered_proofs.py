@@ -1,0 +1,531 @@
+"""Proofs with one field of their files altered, by a little and by much: rejected, or a claim that is true and whole.
+
+Every field of each kind of proof is altered in turn. A proof that is accepted all the same must print what it printed
+before, but for bounds, which must still be on the true side of a value that the robot reaches.
+"""
+
+import base64
+import contextlib
+import copy
+import hashlib
+import json
+import re
+import tomllib
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from screwsynth.nlp import InputError, case_from_tables
+from screwsynth.nlp.certificate.paper import proof as proof_file
+from screwsynth.nlp.certificate.paper.proof import Statement, fingerprint
+from screwsynth.nlp.certificate.paper.statement import program_of
+from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof
+
+Run = Callable[..., tuple[int, str, str]]
+Place = tuple[str | int, ...]
+
+PLATFORM = """
+[units]
+length = "cm"
+[robot]
+model = "stewart-gough"
+layout = "aligned"
+parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = 8 }
+[pose]
+position = [0, 0, { min = 30, max = 31 }]
+rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }
+[solve]
+starts = 2
+[[task]]
+name = "one"
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+"""
+OTHER = """
+[[task]]
+name = "other"
+sense = "SENSE"
+axis = [0, 1, 1]
+point = [1, 0, 3]
+pitch = 2
+weight = 3
+[combine]
+method = "METHOD"
+"""
+DELTA = """
+[robot]
+model = "delta"
+parameters = { rb = { min = 0.12, max = 0.14 }, rp = 0.044, arm = 0.5, rod = 1.244, w = 0.131, tilt = 20 }
+[pose]
+position = [0, 0, -1.1]
+[[task]]
+sense = "max"
+axis = [0, 1, 2]
+pitch = inf
+[solve]
+starts = 2
+"""
+MACHINE = """
+[units]
+length = "in"
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 1, x4 = 5 }
+[pose]
+position = [0, 0, 20]
+[[task]]
+name = "push"
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+leg_length = { min = 17, max = 44 }
+actuator = { stroke_max = 30 }
+[workspace]
+position = [{ min = -0.5, max = 0.5 }, 0.5, 20]
+rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }
+"""
+SINGULAR = (
+    MACHINE[: MACHINE.index("[limits]")]
+    + """[workspace]
+position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }]
+rotation = { angle = { min = -40, max = 40 } }
+"""
+)
+ROBOT = """
+[robot]
+model = "3-rps"
+parameters = { rb = 1, rp = 0.6, h = 1.1 }
+[pose]
+position = [0, 0, 1.1]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[workspace]
+position = [{ min = -0.01, max = 0.01 }, { min = -0.01, max = 0.01 }, { min = 1.1, max = 1.11 }]
+rotation = { roll = { min = -1, max = 1 }, pitch = { min = -1, max = 1 }, yaw = { min = -1, max = 1 } }
+"""
+CRANKS = """
+[robot]
+model = "6-rus"
+parameters = { rb = 1, rp = 0.6, base_half = 20, platform_half = 43, crank = 0.35, lift = 35, h = 1.2 }
+[pose]
+position = [0, 0, 1.2]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[workspace]
+position = [0, 0, { min = 1.2, max = 1.201 }]
+rotation = { axis = [0, 0, 1], angle = 0 }
+"""
+SPECTRAL = """smallest_singular_value = { min = 0.25, length = 11.5 }
+condition_number = { max = 8, length = 11.5 }
+leg_clearance = { min = 0.5 }
+"""
+
+
+class Kind(NamedTuple):
+    """A kind of proof: its case, the words of the command that writes it, and those that check it."""
+
+    case: str
+    writes: tuple[str, ...]
+    checks: tuple[str, ...] = ()
+
+
+def combined(sense: str, method: str) -> str:
+    """The second task, and how both are combined."""
+    return OTHER.replace("SENSE", sense).replace("METHOD", method)
+
+
+LIMITED = MACHINE.replace("[workspace]", SPECTRAL + "[workspace]")
+TOLERANCE = "[tolerance]\njoint_centre = 0.01\n"
+KINDS = {
+    "task": Kind(PLATFORM, ("certify", "--gap", "1e-2")),
+    "above": Kind(PLATFORM, ("certify", "--above", "1"), ("--above", "1")),
+    "weighted sum": Kind(PLATFORM + combined("max", "weighted-sum"), ("certify",)),
+    "worst case": Kind(PLATFORM + combined("max", "worst-case"), ("certify",)),
+    "worst loss": Kind(PLATFORM + combined("min", "worst-case"), ("certify",)),
+    "no point": Kind(PLATFORM + "[limits]\nleg_length = { max = 3 }\n", ("certify",)),
+    "home's mode": Kind(DELTA, ("certify",)),
+    "workspace": Kind(LIMITED, ("workspace", "--gap", "0.1", "--leg-error", "0.01"), ("--leg-error", "0.01")),
+    "loops": Kind(ROBOT, ("workspace", "--gap", "0.5", "--time", "0.2")),
+    "cranks": Kind(CRANKS, ("workspace", "--gap", "0.5")),
+    "singular": Kind(SINGULAR, ("workspace", "--gap", "0.9", "--time", "0.2")),
+    "machines": Kind(
+        MACHINE.replace("[workspace]", TOLERANCE + "[workspace]"),
+        ("workspace", "--gap", "0.1", "--leg-error", "0.01"),
+        ("--leg-error", "0.01"),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files of cases and proofs."""
+    return tmp_path_factory.mktemp("proofs")
+
+
+def written(cli: Run, folder: Path, name: str) -> dict[str, Any]:
+    """The content of a proof's file, which is written when it is asked for first."""
+    case, target = folder / f"{name}.toml", folder / f"{name}.json"
+    if not target.exists():
+        case.write_text(KINDS[name].case, encoding="utf-8")
+        command, *options = KINDS[name].writes
+        cli(command, str(case), *options, "--proof", str(target), "--json", str(folder / f"{name}.result"))
+        assert target.exists()
+    content: dict[str, Any] = json.loads(target.read_text(encoding="utf-8"))
+    return content
+
+
+def checked(cli: Run, folder: Path, name: str, content: object) -> tuple[int, str, str]:
+    """The check of a content of a proof's file."""
+    file = folder / "altered.json"
+    file.write_text(json.dumps(content), encoding="utf-8")
+    return cli("verify-proof", str(file), str(folder / f"{name}.toml"), *KINDS[name].checks)
+
+
+def places(content: object, place: Place = ()) -> Iterator[Place]:
+    """The places of all values in a file; of a list those of the last entry alone."""
+    yield place
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield from places(value, (*place, key))
+    elif isinstance(content, list):
+        for value in content[-1:]:
+            yield from places(value, (*place, len(content) - 1))
+
+
+def others_of(value: object, rng: np.random.Generator) -> list[object]:
+    """Other values in the place of one: near ones, far ones, and ones of other types."""
+    if isinstance(value, bool):
+        return [not value, 1, None, "true"]
+    if isinstance(value, int | float):
+        small = [value * (1 + 1e-12), value * (1 - 1e-6), value + 1e-9, value - 0.019999999999]
+        return [*small, -value, 0, value * 1.5, value * 0.5, 1e300, -1e300, None, True, str(value), [value]]
+    if isinstance(value, str):
+        flipped = value[: len(value) // 2] + chr(33 + rng.integers(90)) + value[len(value) // 2 + 1 :]
+        return ["", flipped, value + " ", value[:-1], None, 0, ["x"]]
+    if isinstance(value, list):
+        return [[], value[1:], value[::-1], [*value, *value[:1]], None, {}, 0, "x"]
+    return [{}, {**value, "more": 1}, [], None, 0, "x"] if isinstance(value, dict) else [0.0, 1.0, -1e9, "x", []]
+
+
+def with_value(content: object, place: Place, value: object) -> Any:  # noqa: ANN401 - any JSON
+    """A copy of a file's content with another value at a place."""
+    if not place:
+        return value
+    found = copy.deepcopy(content)
+    inner: Any = found
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    return found
+
+
+def trees(content: dict[str, Any], rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Copies of a file with other nodes in its trees, with digests to match."""
+    for place in [each for each in places(content) if each[-1:] == ("tree",)]:
+        inner: Any = content
+        for key in place:
+            inner = inner[key]
+        nodes = zlib.decompress(base64.b64decode(inner))
+        several = [nodes[:-1], nodes + b"\x06", b"", b"\x06", b"\x02", b"\x03", b"\x07\x00"]
+        for _ in range(3 if nodes else 0):
+            one = bytearray(nodes)
+            one[rng.integers(len(one))] = rng.integers(256)
+            several.append(bytes(one))
+        for each in several:
+            text = base64.b64encode(zlib.compress(each)).decode()
+            found = with_value(content, place, text)
+            yield with_value(found, (*place[:-1], "digest"), hashlib.sha256(each).hexdigest())
+
+
+def alterations(content: dict[str, Any], rng: np.random.Generator, per_field: int | None) -> Iterator[tuple[str, Any]]:
+    """Names of altered fields, with the altered contents of the file: all, or a few of each field."""
+
+    def some(values: list[Any], count: int) -> list[Any]:
+        few = rng.choice(len(values), min(count, len(values)), replace=False)
+        return values if per_field is None else [values[k] for k in few]
+
+    for place in places(content):
+        value: Any = content
+        for key in place:
+            value = value[key]
+        name = ".".join(map(str, place))
+        for other in some(others_of(value, rng), per_field or 0):
+            yield f"{name}: {str(value)[:40]!r} -> {str(other)[:40]!r}", with_value(content, place, other)
+        if per_field is None and place and isinstance(place[-1], str):
+            found = copy.deepcopy(content)
+            inner: Any = found
+            for key in place[:-1]:
+                inner = inner[key]
+            del inner[place[-1]]
+            yield f"{name}: taken out", found
+    for each in some(list(trees(content, rng)), 4):
+        yield "another tree", each
+
+
+BOUND = re.compile(r"at (most|least) ([^\s,]+)")
+BOXES = re.compile(r"[\d,]+ leaves, shown on .*\n")
+REASONS = re.compile(r"(?<=^not on paper: ).*?: .*", re.MULTILINE)
+LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\S+) \(F\('other'\) - (\S+)\)")
+
+
+def least_loss(weight: float, best: float, other_weight: float, other_best: float) -> float:
+    """The worst of two losses, the least of it on a grid of the box; F is summed over the rows of J."""
+    case = case_from_tables(tomllib.loads(KINDS["worst loss"].case), name="grid", source="grid")
+    nlps = formulate_each(case)
+    points = np.stack(np.meshgrid(*np.linspace(nlps[0].lower, nlps[0].upper, 21).T), axis=-1).reshape(-1, nlps[0].n)
+    first, second = (np.array([nlp.evaluate(x).F for x in points]) for nlp in nlps)
+    return float(np.maximum(weight * (best - first), other_weight * (second - other_best)).min())
+
+
+def is_true(before: str, after: str, reached: dict[tuple[str, str], float]) -> bool:
+    """Whether an output says what another one said, but for bounds that are still beyond values that are reached."""
+    before, after = (REASONS.sub("", BOXES.sub("", each)) for each in (before, after))
+    if before.startswith("holds: there is no feasible point"):
+        # Every claim about the points of an empty set is true.
+        return before.partition(" within ")[2] in after or ", F being that of task 'one'" in after
+    if (found := LOSSES.search(after)) and after[found.start() :] != before[found.start() :]:
+        return least_loss(*map(float, found.groups())) >= float(BOUND.findall(after)[0][1])
+    if BOUND.sub("BOUND", before) != BOUND.sub("BOUND", after):
+        return False
+    for old, line in zip(before.splitlines(), after.splitlines(), strict=True):
+        for (side, first), (_, second) in zip(BOUND.findall(old), BOUND.findall(line), strict=True):
+            value = reached.get((line.strip().partition(":")[0], side), float(first))
+            # A value that no search has reached may lie between it and the bound.
+            sign = 1.0 if side == "most" else -1.0
+            if first != second and not sign * (float(second) - value) >= -1e-9 * abs(value):
+                return False
+    return True
+
+
+def reached_values(folder: Path, name: str) -> dict[tuple[str, str], float]:
+    """Values that a search has found, by the beginning of the line about them and the side of the bound."""
+    result = json.loads((folder / f"{name}.result").read_text(encoding="utf-8"))
+    if "extremes" in result:
+        side = {"max": "most", "min": "least"}
+        return {(each["name"], side[each["sense"]]): each["reached"] for each in result["extremes"]}
+    value = (result["certificate"] or {}).get("incumbent")
+    return {} if value is None else {("holds", side): value for side in ("most", "least")}
+
+
+def faults_of(cli: Run, folder: Path, name: str, per_field: int | None) -> tuple[list[str], int, int]:
+    """Altered fields that are accepted with a false claim, or refused in a wrong way; numbers of tries and accepted."""
+    content, rng = written(cli, folder, name), np.random.default_rng(0)
+    code, before, err = checked(cli, folder, name, content)
+    assert (code, err) == (0, ""), err
+    reached = reached_values(folder, name)
+    faults, tries, accepted = [], 0, 0
+    for what, altered in alterations(content, rng, per_field):
+        tries += 1
+        code, out, err = checked(cli, folder, name, altered)
+        accepted += code == 0
+        if code == 0 and not is_true(before, out, reached):
+            faults.append(f"{what}: {out}")
+        if code and (code not in (1, 2) or out or len(err.splitlines()) != 1 or "Traceback" in err):
+            faults.append(f"{what}: exit {code}: {err}")
+    return faults, tries, accepted
+
+
+SLOW = ("machines", "loops", "cranks", "singular", "weighted sum", "worst case")
+#: Certificates of the platform with points that keep the limits.
+PLATFORMS = ("task", "above", "weighted sum", "worst case", "worst loss")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow) if each in SLOW else each for each in KINDS]
+)
+def test_an_altered_field_is_rejected_or_changes_nothing_but_a_true_bound(cli: Run, folder: Path, name: str) -> None:
+    faults, tries, _ = faults_of(cli, folder, name, 1)
+    assert not faults
+    assert tries > (25 if KINDS[name].writes[0] == "workspace" else 15)
+
+
+def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None:
+    content = written(cli, folder, "machines")
+    for other in (-0.019999999999, 0.0, 0.0099999999, 0.02):
+        code, out, err = checked(cli, folder, "machines", {**content, "leg_error": other})
+        assert (code, out) == (1, "")
+        assert "see --leg-error" in err
+    case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
+    code, out, err = cli("verify-proof", proof, case)
+    assert (code, out) == (1, "")
+    assert "by at most 0.01 in, and not 0: see --leg-error" in err
+    assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
+    code, out, _ = cli("verify-proof", proof, case, "--leg-error", "0.01")
+    assert code == 0
+    assert "for every machine whose joint centres are off by at most 0.01 in" in out
+    errors = re.findall(r"(position|rotation) error: at most (\S+) (?:in|deg), for lengths of legs that are (.*)", out)
+    assert [(each[0], each[2]) for each in errors] == [
+        ("position", "off by at most 0.01 in"),
+        ("rotation", "off by at most 0.01 in"),
+    ]
+    reached = reached_values(folder, "machines")
+    assert all(float(bound) >= reached[f"{name} error", "most"] for name, bound, _ in errors)
+
+
+@pytest.mark.parametrize("proof", ["task", "weighted sum", "worst case", "worst loss"])
+def test_a_proof_is_no_proof_of_another_case(cli: Run, folder: Path, proof: str) -> None:
+    """The objective of the claim is the case's, whatever the file's, and its bound holds."""
+    content = written(cli, folder, proof)
+    for case in PLATFORMS:
+        if case == proof:
+            continue
+        own = checked(cli, folder, case, written(cli, folder, case))[1]
+        other = case_from_tables(tomllib.loads(KINDS[case].case), name="other", source="other")
+        statement = Statement(**{**content["statement"], "best": tuple(content["statement"]["best"])})
+        graphs = [content["graph"]]
+        with contextlib.suppress(InputError):
+            graphs.append(fingerprint(program_of(other, statement)))
+        for graph in graphs:
+            code, out, err = checked(cli, folder, case, {**content, "graph": graph})
+            assert (code == 0) == (err == "")
+            assert code or (graph != content["graph"] and is_true(own, out, reached_values(folder, case)))
+
+
+def test_nothing_rests_on_the_fingerprint(cli: Run, folder: Path) -> None:
+    content = written(cli, folder, "task")
+    other = KINDS["task"].case.replace("x1 = 12", "x1 = 13")
+    (folder / "other.toml").write_text(other, encoding="utf-8")
+    proof = folder / "other.json"
+    proof.write_text(json.dumps(content), encoding="utf-8")
+    assert "other expressions" in cli("verify-proof", str(proof), str(folder / "other.toml"))[2]
+    nlp = program_of(case_from_tables(tomllib.loads(other), name="other", source="other"), Statement())
+    best = max(nlp.evaluate(x).F for x in np.random.default_rng(0).uniform(nlp.lower, nlp.upper, (50, nlp.n)))
+    for bound, status in ((content["bound"], 1), (0.99 * best, 1), (2 * best, 0)):
+        proof.write_text(json.dumps({**content, "graph": fingerprint(nlp), "bound": bound}), encoding="utf-8")
+        assert bound < best or status == 0
+        assert cli("verify-proof", str(proof), str(folder / "other.toml"))[0] == status
+
+
+MALFORMED = [
+    "[" * 200_000,
+    '{"format": ' * 100_000,
+    "{" + '"a": {' * 70 + "}" * 71,
+    '{"format": "screwsynth-proof", "format": "screwsynth-proof"}',
+    "9" * 401,
+    '"\\ud800"',
+    "\ufeff{}",
+    "NaN",
+]
+EDITS = [
+    ("bound", "1e999"),
+    ("bound", "-1e999"),
+    ("bound", "1" * 401),
+    ("bound", "NaN"),
+    ("bound", '"1"'),
+    ("bound", "true"),
+    ("statement", '{"kind": 3}'),
+    ("statement", '{"best": ["a", "b"]}'),
+    ("statement", "[]"),
+    ("version", "2"),
+    ("version", "1" * 5000),
+    ("name", '"\\ud800"'),
+    ("tree", '"eA=="'),
+    ("tree", '"\u00e9"'),
+]
+
+
+@pytest.mark.parametrize("text", [*MALFORMED, *EDITS], ids=range(len(MALFORMED) + len(EDITS)))
+def test_a_malformed_proof_is_refused_in_a_sentence(
+    cli: Run, folder: Path, tmp_path: Path, text: str | tuple[str, str]
+) -> None:
+    file = tmp_path / "proof.json"
+    if isinstance(text, tuple):
+        content = {key: json.dumps(value) for key, value in written(cli, folder, "task").items()} | dict([text])
+        text = "{" + ", ".join(f'"{key}": {value}' for key, value in content.items()) + "}"
+    file.write_text(text, encoding="utf-8")
+    code, out, err = cli("verify-proof", str(file))
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert str(file) in err
+
+
+def test_a_tree_that_unpacks_to_too_much_is_refused(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = written(cli, folder, "task")
+    monkeypatch.setattr(proof_file, "_LARGEST_TREE", 1000)
+    content["tree"] = base64.b64encode(zlib.compress(bytes(10**6))).decode()
+    code, out, err = checked(cli, folder, "task", content)
+    assert (code, out) == (2, "")
+    assert "incomplete, or larger" in err
+
+
+def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Path) -> None:
+    free, fixed, proof = tmp_path / "free.toml", tmp_path / "fixed.toml", str(tmp_path / "proof.json")
+    fixed.write_text(MACHINE, encoding="utf-8")
+    free.write_text(MACHINE.replace("x2 = 11.543", "x2 = { min = 8, max = 15 }"), encoding="utf-8")
+    result = str(tmp_path / "result.json")
+    assert cli("evaluate", str(fixed), "--json", result)[0] in (0, 1)
+    code, _, err = cli("workspace", str(free), "--gap", "0.1", "--of", result, "--proof", proof)
+    assert (code, err) == (0, f"--of {result}: has the dimensions of the case 'fixed'\n")
+    assert "is free" in cli("verify-proof", proof, str(free))[2]
+    for options in (("--of", result), ("--set", "x2=11.543")):
+        code, out, err = cli("verify-proof", proof, str(free), *options)
+        assert code == 0, err
+        assert "F: of the task 'push'" in out
+        code, _, err = cli("verify-proof", proof, *options)
+        assert (code, "needs the CASE" in err) == (2, True)
+    code, _, err = cli("verify-proof", proof, str(free), "--set", "x2=11.6")
+    assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
+    for option in (("--above", "1"), ("--all-assemblies",)):
+        code, _, err = cli("verify-proof", proof, *option)
+        assert (code, "means nothing for this proof" in err) == (2, True)
+
+
+def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:
+    inches, result = tmp_path / "inches.toml", str(tmp_path / "result.json")
+    inches.write_text(MACHINE, encoding="utf-8")
+    cli("evaluate", str(inches), "--json", result)
+    for old, new, units in (
+        ('length = "in"', 'length = "mm"', "'mm' and 'deg'"),
+        ("x3 = 1, x4 = 5", "x3 = 0.1, x4 = 0.1", "'in' and 'rad'"),
+    ):
+        other = tmp_path / "other.toml"
+        angle = 'length = "in"\nangle = "rad"' if "rad" in units else 'length = "in"'
+        other.write_text(MACHINE.replace('length = "in"', angle).replace(old, new), encoding="utf-8")
+        code, out, err = cli("workspace", str(other), "--of", result)
+        assert (code, out) == (2, "")
+        assert f"has the units 'in' and 'deg', and the case {units}" in err
+    (tmp_path / "rps.toml").write_text(ROBOT, encoding="utf-8")
+    code, _, err = cli("workspace", str(tmp_path / "rps.toml"), "--of", result)
+    assert code == 2
+    assert "with the robot 'stewart-gough', not of 'rps' with '3-rps'" in err
+
+
+@pytest.mark.parametrize("command", ["workspace", "verify-proof"])
+def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folder: Path, command: str) -> None:
+    case, proof = folder / "legless.toml", folder / "legless.json"
+    case.write_text(CRANKS, encoding="utf-8")
+    claim = PaperClaim("regular", "", "regular", tree=b"\x02")
+    proof.write_text(PaperProof("", "legless", (), (), (), 0.01, (claim,), ()).as_text(), encoding="utf-8")
+    words = (str(proof), str(case)) if command == "verify-proof" else (str(case),)
+    code, out, err = cli(command, *words, "--leg-error", "0.01")
+    assert (code, out) == (2, "")
+    assert "--leg-error 0.01: is for six straight legs, which '6-rus' is not" in err
+
+
+def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:
+    """The least of several values is no smooth minimum; without its refusal the search began at a wrong level."""
+    case = tmp_path / "poses.toml"
+    pose = "[pose]\nposition = [0, 0, { min = 30, max = 31 }]\n"
+    text = PLATFORM.replace("rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }\n", "")
+    text = text.replace(
+        pose, "".join(f"[[pose]]\nposition = [0, 0, {{ min = {z}, max = {z + 1} }}]\n" for z in (30, 40))
+    )
+    case.write_text(text + '[combine]\nover_poses = "worst"\n', encoding="utf-8")
+    code, out, err = cli("certify", str(case), "--above", "1")
+    assert (code, out) == (2, "")
+    assert "--above: is not for the worst of several poses" in err
+    proof = str(tmp_path / "proof.json")
+    assert cli("certify", str(case), "--proof", proof)[0] == 0
+    assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]

@@ -1,0 +1,344 @@
+"""Equalities of MJCF as MuJoCo itself computes them: open at random configurations, closed by Newton's method."""
+
+# ruff: noqa: ANN401, E501 - MuJoCo has no stubs; XML in one line an element
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.models.mechanism import wrenches_of
+from screwsynth.nlp import InputError
+from screwsynth.nlp.exchange.reading.description import Description
+from screwsynth.nlp.exchange.reading.frames import Frame, rotation_vector
+from screwsynth.nlp.exchange.reading.importing import Request, import_robot
+from screwsynth.nlp.exchange.reading.mjcf import read_mjcf
+from screwsynth.nlp.exchange.reading.newton import close, gap_of, gap_of_coupling
+from screwsynth.nlp.exchange.reading.reduction import Ends
+from screwsynth.nlp.exchange.reading.xmltext import read_xml
+
+mujoco = pytest.importorskip("mujoco")
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+INERTIA = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+JOINTS = ("hinge", "slide", "ball", "free", "hinge slide", "hinge hinge hinge", "slide hinge ball", "")
+
+
+def text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def unit(rng: np.random.Generator, size: int) -> Array:
+    vector = rng.normal(size=size)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def bodies(rng: np.random.Generator) -> tuple[str, list[str]]:
+    """Three trees of bodies, and the names of their hinges and slides."""
+    names: list[str] = []
+
+    def body(number: int, depth: int) -> str:
+        kinds = str(rng.choice([kind for kind in JOINTS if depth == 0 or kind != "free"])).split()
+        place = f'pos="{text(rng.normal(size=3))}" quat="{text(rng.normal(size=4))}"'
+        joints = ""
+        for k, kind in enumerate(kinds):
+            name = f"j{number}_{k}"
+            if kind == "free":
+                joints += f'<freejoint name="{name}"/>'
+            else:
+                own = "" if kind == "ball" else f'axis="{text(unit(rng, 3))}" ref="{rng.normal()!r}"'
+                names.extend([] if kind == "ball" else [name])
+                joints += f'<joint name="{name}" type="{kind}" pos="{text(rng.normal(size=3))}" {own}/>'
+        site = f'<site name="s{number}" pos="{text(rng.normal(size=3))}" quat="{text(rng.normal(size=4))}"/>'
+        inner = body(number + 1, depth + 1) if depth < 2 else ""
+        return f'<body name="b{number}" {place}>{INERTIA}{joints}{site}{inner}</body>'
+
+    return "".join(body(10 * k, 0) for k in (1, 2, 3)), names
+
+
+def equalities(rng: np.random.Generator, scalar: list[str]) -> str:
+    """Equalities of every form, each once, between random bodies of different trees."""
+
+    def pair(letter: str) -> tuple[str, str]:
+        one, other = rng.choice([1, 2, 3], 2, replace=False)
+        return f"{letter}{one}{rng.integers(3)}", f"{letter}{other}{rng.integers(3)}"
+
+    forms = {
+        "connect_body": ("connect", f'anchor="{text(rng.normal(size=3))}"', "body"),
+        "connect_world": ("connect", f'anchor="{text(rng.normal(size=3))}"', "world"),
+        "connect_site": ("connect", "", "site"),
+        "weld_body": ("weld", "", "body"),
+        "weld_anchor": ("weld", f'anchor="{text(rng.normal(size=3))}"', "body"),
+        "weld_pose": ("weld", f'relpose="{text(rng.normal(size=7))}"', "body"),
+        "weld_both": ("weld", f'anchor="{text(rng.normal(size=3))}" relpose="{text(rng.normal(size=7))}"', "body"),
+        "weld_world": ("weld", f'anchor="{text(rng.normal(size=3))}"', "world"),
+        "weld_site": ("weld", "", "site"),
+    }
+    found = ""
+    for name, (tag, own, ends) in forms.items():
+        one, other = pair("s" if ends == "site" else "b")
+        second = "" if ends == "world" else f'{ends if ends == "site" else "body"}2="{other}"'
+        first = "site1" if ends == "site" else "body1"
+        found += f'<{tag} name="{name}" {first}="{one}" {second} {own}/>'
+    first, second = rng.choice(scalar, 2, replace=False)
+    found += (
+        f'<joint name="gear" joint1="{first}" joint2="{second}" polycoef="{rng.normal()!r} {rng.normal()!r} 0 0 0"/>'
+    )
+    return found + f'<joint name="held" joint1="{second}" polycoef="{rng.normal()!r} 0 0 0 0"/>'
+
+
+def random_positions(rng: np.random.Generator, model: Any, near: float | None = None) -> Array:
+    """Random coordinates, or some near those of the reference configuration."""
+    qpos = np.array(model.qpos0)
+    mujoco.mj_integratePos(model, qpos, rng.normal(size=model.nv) * (2.0 if near is None else near), 1.0)
+    return qpos
+
+
+def residuals(model: Any, data: Any) -> dict[str, Array]:
+    """MuJoCo's violation of each equality, by its name."""
+    equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    return {
+        model.equality(k).name: data.efc_pos[equal & (data.efc_id == k)].copy()
+        for k in range(model.neq)
+        if (equal & (data.efc_id == k)).any()
+    }
+
+
+def read(folder: Path, model_text: str, qpos: Array) -> tuple[Description, Any, Any]:
+    """A model read at a keyframe, and MuJoCo's model and data there."""
+    path = folder / "m.xml"
+    path.write_text(
+        model_text.replace("</mujoco>", f'<keyframe><key name="k" qpos="{text(qpos)}"/></keyframe></mujoco>')
+    )
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    return read_mjcf(read_xml(path), path, "k"), model, data
+
+
+def test_what_equalities_are_open_by_is_what_mujoco_says(tmp_path: Path) -> None:
+    """Connects, welds and joint equalities, with sites, anchors and relative poses, at 25 random configurations."""
+    checked = 0
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        tree, scalar = bodies(rng)
+        if len(scalar) < 2:
+            continue
+        model_text = f"<mujoco><worldbody>{tree}</worldbody><equality>{equalities(rng, scalar)}</equality></mujoco>"
+        qpos = random_positions(rng, mujoco.MjModel.from_xml_string(model_text))
+        given, model, data = read(tmp_path, model_text, qpos)
+        places = {body.name: body.place for body in given.bodies}
+        found = residuals(model, data)
+        gaps = [gap_of(each, places) for each in given.closures]
+        gaps += [gap_of_coupling(given, each) for each in given.couplings]
+        assert len(gaps) == 11
+        for gap in gaps:
+            if gap.name not in found:
+                assert gap.distance == pytest.approx(0, abs=1e-12)  # between bodies that cannot move
+                continue
+            rows = found[gap.name]
+            checked += 1
+            if len(rows) == 1:
+                assert gap.distance + gap.angle == pytest.approx(abs(rows[0]), abs=1e-12)
+                continue
+            assert gap.distance == pytest.approx(np.linalg.norm(rows[:3]), abs=1e-12), gap.name
+            if len(rows) == 6:
+                # MuJoCo's rows of a rotation are the vector part of its quaternion.
+                assert np.sin(gap.angle / 2) == pytest.approx(np.linalg.norm(rows[3:]), abs=1e-12), gap.name
+    assert checked > 200
+
+
+def closed_model(rng: np.random.Generator) -> str:
+    """Two chains of seven freedoms, with equalities of a random form that hold at the reference configuration."""
+
+    def chain(letter: str) -> str:
+        joints = [("hinge", "hinge"), ("slide", "hinge"), ("hinge",), ("ball",)]
+        inner = ""
+        for k in reversed(range(4)):
+            own = "".join(
+                f'<joint name="{letter}{k}{n}" type="{kind}" pos="{text(0.2 * rng.normal(size=3))}"'
+                + ("/>" if kind == "ball" else f' axis="{text(unit(rng, 3))}"/>')
+                for n, kind in enumerate(joints[k])
+            )
+            end = '<site name="end_' + letter + '"/>' if k == 3 else ""
+            place = f'pos="{text(0.5 * rng.normal(size=3))}" quat="{text(rng.normal(size=4))}"'
+            inner = f'<body name="{letter}{k}" {place}>{INERTIA}{own}{end}{inner}</body>'
+        return inner
+
+    plain = f"<mujoco><worldbody>{chain('a')}{chain('c')}</worldbody></mujoco>"
+    model = mujoco.MjModel.from_xml_string(plain)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    A, C = (Frame(data.body(name).xpos.copy(), data.body(name).xmat.reshape(3, 3).copy()) for name in ("a3", "c3"))
+    anchor = rng.normal(size=3)
+    there = C.inverse() @ A
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, there.inverse().rotation.ravel())
+    match int(rng.integers(5)):
+        case 0:
+            tie = f'<connect name="tie" body1="a3" body2="c3" anchor="{text(anchor)}"/>'
+        case 1:
+            tie = f'<weld name="tie" body1="a3" body2="c3" anchor="{text(anchor)}"/>'
+        case 2:
+            # The place in the first body's frame is that of the anchor, which is given in the second's.
+            place = (there.inverse() @ Frame(anchor)).position
+            tie = f'<weld name="tie" body1="a3" body2="c3" anchor="{text(anchor)}" relpose="{text(place)} {text(quaternion)}"/>'
+        case 3:
+            place = there.inverse().position
+            tie = f'<weld name="tie" body1="a3" body2="c3" relpose="{text(place)} {text(quaternion)}"/>'
+        case _:
+            mujoco.mju_mat2Quat(quaternion, there.rotation.ravel())
+            own = f'pos="{text(there.position)}" quat="{text(quaternion)}"'
+            plain = plain.replace('<site name="end_c"/>', f'<site name="end_c" {own}/>')
+            tie = f'<{"weld" if rng.integers(2) else "connect"} name="tie" site1="end_a" site2="end_c"/>'
+    gear = '<joint name="gear" joint1="a00" joint2="c10" polycoef="0 0.3 0 0 0"/>'
+    return plain.replace("</worldbody>", f"</worldbody><equality>{tie}{gear}</equality>")
+
+
+def coordinates(model: Any, given: Description, places: dict[str, Frame], start: Array) -> Iterator[tuple[int, Array]]:
+    """Address and value of MuJoCo's coordinates of each joint, from the places of bodies before and after."""
+    parents = {body.name: body.parent for body in given.bodies}
+    before = {body.name: body.place for body in given.bodies}
+    for joint in given.joints:
+        address = model.joint(joint.name).qposadr[0] if joint.kind != "weld" else -1
+        parent, after = parents[joint.body], places[joint.body]
+        if joint.kind == "S":
+            # The last joint of its body, which hangs on the body before with its own quaternion at the reference.
+            own = np.zeros(9)
+            mujoco.mju_quat2Mat(own, model.body(joint.body).quat)
+            quaternion = np.zeros(4)
+            mujoco.mju_mat2Quat(quaternion, (own.reshape(3, 3).T @ places[parent].rotation.T @ after.rotation).ravel())
+            yield address, quaternion
+        elif joint.kind in ("R", "P"):
+            way = (places[parent].inverse() @ after) @ (before[parent].inverse() @ before[joint.body]).inverse()
+            axis = before[parent].rotation.T @ joint.axis
+            moved = axis @ (way.position if joint.kind == "P" else rotation_vector(way.rotation))
+            yield address, np.array([start[address] + moved])
+
+
+def test_loops_that_newtons_method_closes_are_closed_for_mujoco(tmp_path: Path) -> None:
+    """Each form of equality, from 20 configurations near a closed one: MuJoCo's residuals vanish at its coordinates."""
+    for seed in range(20):
+        rng = np.random.default_rng(100 + seed)
+        model_text = closed_model(rng)
+        start = random_positions(rng, mujoco.MjModel.from_xml_string(model_text), 0.1)
+        given, model, data = read(tmp_path, model_text, start)
+        assert max(np.abs(rows).max() for rows in residuals(model, data).values()) > 1e-3
+        closed = close(given, 1.0).description
+        places = {body.name: body.place for body in closed.bodies}
+        for address, values in coordinates(model, given, places, start):
+            data.qpos[address : address + len(values)] = values
+        mujoco.mj_forward(model, data)
+        for name in ("a3", "c3"):
+            np.testing.assert_allclose(data.body(name).xpos, places[name].position, atol=1e-9, err_msg=str(seed))
+        for name, rows in residuals(model, data).items():
+            assert np.abs(rows).max() < 1e-10, (seed, name)
+        assert all(abs(value) < 1e-10 for value in closed.offsets.values())
+
+
+def platform_on_legs(rng: np.random.Generator, is_plain: bool) -> str:
+    """Six legs U-P-S, whose last joints are connects, or welds of a small body behind a ball, in random forms."""
+    legs, ties = "", ""
+    turn = np.zeros(9)
+    for k in range(6):
+        azimuth = np.pi / 3 * k
+        foot = np.array([np.cos(azimuth + 0.2), np.sin(azimuth + 0.2), 0.1 * np.sin(3 * k)])
+        head = np.array([0.6 * np.cos(azimuth - 0.2 * (-1) ** k), 0.6 * np.sin(azimuth - 0.2 * (-1) ** k), 1.0])
+        way = head - foot
+        quaternion = unit(rng, 4)
+        mujoco.mju_quat2Mat(turn, quaternion)
+        R = turn.reshape(3, 3)
+        ball = f'<body name="ball{k}" pos="{text(way)}" quat="{text(quaternion)}">{INERTIA}<joint name="a{k}" type="ball"/></body>'
+        own = f'<site name="l{k}" pos="{text(way)}"/>'
+        form = 0 if is_plain else int(rng.integers(5))
+        if form == 0:
+            ties += f'<connect name="t{k}" site1="l{k}" site2="p{k}"/>'
+        elif form == 1:
+            ties += f'<connect name="t{k}" body1="slide{k}" body2="top" anchor="{text(way)}"/>'
+        else:
+            own += ball
+            anchor = rng.normal(size=3)
+            # The platform's frame is parallel to the world's: the anchor, and the platform, in the small body's frame.
+            place = R.T @ (np.array([0.0, 0.0, 1.0]) + anchor - head)
+            inverse = np.array([quaternion[0], *-quaternion[1:]])
+            pose = {
+                2: f'anchor="{text(anchor)}"',
+                3: f'anchor="{text(anchor)}" relpose="{text(place)} {text(inverse)}"',
+                4: f'relpose="{text(R.T @ (np.array([0.0, 0.0, 1.0]) - head))} {text(inverse)}"',
+            }[form]
+            ties += f'<weld name="t{k}" body1="ball{k}" body2="top" {pose}/>'
+        legs += (
+            f'<body name="u{k}" pos="{text(foot)}">{INERTIA}<joint name="x{k}" axis="1 0 0"/><joint name="y{k}" axis="0 1 0"/>'
+            f'<body name="slide{k}">{INERTIA}<joint name="q{k}" type="slide" axis="{text(way)}"/>{own}</body></body>'
+        )
+        legs += ""
+    sites = "".join(
+        f'<site name="p{k}" pos="{text(np.array([0.6 * np.cos(a), 0.6 * np.sin(a), 0.0]))}"/>'
+        for k, a in enumerate(np.pi / 3 * k - 0.2 * (-1) ** k for k in range(6))
+    )
+    motors = "".join(f'<motor joint="q{k}"/>' for k in range(6))
+    top = f'<body name="top" pos="0 0 1"><freejoint/>{INERTIA}{sites}</body>'
+    return (
+        f"<mujoco><worldbody>{legs}{top}</worldbody><equality>{ties}</equality><actuator>{motors}</actuator></mujoco>"
+    )
+
+
+def test_a_platform_is_one_robot_by_connects_and_by_welds(tmp_path: Path) -> None:
+    """Balls welded to the platform by anchors and poses: work rates are those of connects, without --close."""
+
+    def work_rates(model_text: str) -> Array:
+        path = tmp_path / "m.xml"
+        path.write_text(model_text)
+        found = import_robot(Request(path, Ends("top")))
+        assert not any("open" in note for note in found.notes)
+        assert all(
+            limb["joints"][0]["type"] == "U" and limb["joints"][2]["type"] == "S" for limb in found.tables["limb"]
+        )
+        J = wrenches_of(found.mechanism, 1.0).jacobian
+        return np.asarray(J.T @ J)
+
+    plain = work_rates(platform_on_legs(np.random.default_rng(0), is_plain=True))
+    for seed in range(4):
+        found = work_rates(platform_on_legs(np.random.default_rng(seed), is_plain=False))
+        np.testing.assert_allclose(found, plain, rtol=0, atol=1e-9 * plain.max())
+
+
+def test_keyframes_mocap_bodies_and_tendons(tmp_path: Path) -> None:
+    """A model is read where a keyframe has it; what is left out is named, with what it acts on."""
+    model_text = platform_on_legs(np.random.default_rng(0), is_plain=True)
+    model_text = model_text.replace(
+        "</worldbody>", '<body name="hand" mocap="true" pos="0 0 2"><site name="tip"/></body></worldbody>'
+    )
+    tendons = '<tendon><fixed name="rope"><joint joint="q0" coef="1"/></fixed></tendon>'
+    more = '<weld name="grip" body1="hand" body2="top"/><tendon name="knot" tendon1="rope"/></equality>' + tendons
+    model_text = model_text.replace("</equality>", more).replace(
+        "</actuator>", '<motor name="winch" tendon="rope"/></actuator>'
+    )
+    model = mujoco.MjModel.from_xml_string(model_text)
+    qpos = np.array(model.qpos0)
+    qpos[2:18:3] += 0.1
+    path = tmp_path / "m.xml"
+    keys = f'<keyframe><key name="up" qpos="{text(qpos)}"/><key qpos="{text(model.qpos0)}"/></keyframe></mujoco>'
+    path.write_text(model_text.replace("</mujoco>", keys))
+    low = import_robot(Request(path, Ends("top")))
+    notes = " | ".join(low.notes)
+    for words in (
+        "the equality grip with a mocap body",
+        "the equality knot of the kind tendon was left out",
+        "the actuator 'winch' acts on the tendon 'rope', which is not read; --actuated names what it drives",
+    ):
+        assert words in notes
+    with pytest.raises(InputError, match=r"is open by 0\.1 .*--keyframe takes another configuration: 2"):
+        import_robot(Request(path, Ends("top"), keyframe="up"))
+    # The platform follows the legs, which are longer in the keyframe.
+    high = import_robot(Request(path, Ends("top"), closes=True, keyframe="up"))
+    tops = [next(link.position for link in each.mechanism.links if link.name == "top") for each in (low, high)]
+    assert tops[1][2] > tops[0][2] + 0.1
+    assert np.allclose(import_robot(Request(path, Ends("top"), keyframe="2")).tables["home"], low.tables["home"])
+    with pytest.raises(InputError, match=r"--keyframe upp: no such keyframe; did you mean 'up'"):
+        import_robot(Request(path, Ends("top"), keyframe="upp"))

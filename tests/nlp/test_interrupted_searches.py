@@ -1,0 +1,447 @@
+"""Interrupts inside searches, at any instruction of Python: what is claimed then is never better than what is true."""
+
+import math
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+import pytest
+from limb_cases import machine, poses
+
+import screwsynth.nlp
+from screwsynth.models import FloatArray
+from screwsynth.models.joints.closedform import closed_form
+from screwsynth.nlp import Case, Nlp, load_case, solve, sweep
+from screwsynth.nlp.case.limits.limits import Limits
+from screwsynth.nlp.case.pose import Free
+from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.certificate import branchandbound
+from screwsynth.nlp.certificate.boxes.boxsearch import BoxSearch
+from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.certificate.certificate import CertificateStatus
+from screwsynth.nlp.interruption import STOPPED, is_requested
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.solver.certified import certify
+from screwsynth.nlp.workspace import scale
+from screwsynth.nlp.workspace.anybuilt.machines import machines_of
+from screwsynth.nlp.workspace.general.family import Family
+from screwsynth.nlp.workspace.general.machinenumber import smallest_of_machines
+from screwsynth.nlp.workspace.general.problem import Problem, build_problem
+from screwsynth.nlp.workspace.general.search import prove_rank
+from screwsynth.nlp.workspace.judge import judge_workspace
+from screwsynth.nlp.workspace.looplimits import loop_extremes
+from screwsynth.nlp.workspace.machine import Legs, workspace_of_case
+from screwsynth.nlp.workspace.numbers.boundsearch import Bounds, prove_minimum
+from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
+from screwsynth.nlp.workspace.regular import search as regular
+from screwsynth.nlp.workspace.regular.search import prove_regular
+from screwsynth.nlp.workspace.scale import largest_scale
+from screwsynth.nlp.workspace.verdict import Outcome, Regularity
+
+ROOT = Path(screwsynth.nlp.__file__).parent
+#: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
+WATCHED = tuple(str(ROOT / name) for name in ("workspace", "certificate", "interruption.py"))
+LOOPS = (
+    str(ROOT / "interruption.py"),
+    *(str(ROOT / "certificate" / name) for name in ("branchandbound.py", "incumbent.py")),
+    *(str(ROOT / "certificate" / "boxes" / name) for name in ("boxsearch.py", "openboxes.py")),
+    *(str(ROOT / "certificate" / "limbs" / name) for name in ("limbsearch.py", "sharedsearch.py")),
+    *(str(ROOT / "workspace" / name) for name in ("judge.py", "looplimits.py", "scale.py")),
+    *(str(ROOT / "workspace" / name / "search.py") for name in ("regular", "general")),
+    str(ROOT / "workspace" / "general" / "machinenumber.py"),
+    str(ROOT / "workspace" / "numbers" / "boundsearch.py"),
+)
+
+
+class Claim(NamedTuple):
+    """What a search says: whether it proves, how good its bound is (the larger the better), and whether it stopped."""
+
+    is_proved: bool
+    quality: float
+    is_stopped: bool
+
+
+Search = Callable[[], Claim]
+Tracer = Callable[[FrameType, str, Any], Any]
+
+
+@contextmanager
+def at_instruction(n: int, error: type[BaseException], watched: tuple[str, ...]) -> Iterator[list[int]]:
+    """Raise an error before the n-th instruction of the watched code; gives the number of those that ran."""
+    count = [0]
+
+    def local(_: FrameType, event: str, __: object) -> Tracer:
+        if event == "opcode":
+            count[0] += 1
+            if count[0] == n:
+                raise error
+        return local
+
+    def every(frame: FrameType, _: str, __: object) -> Tracer | None:
+        if not frame.f_code.co_filename.startswith(watched):
+            return None
+        frame.f_trace_opcodes, frame.f_trace_lines = True, False
+        return local
+
+    before = sys.gettrace()
+    sys.settrace(every)
+    try:
+        yield count
+    finally:
+        sys.settrace(before)
+
+
+def from_regularity(found: Regularity) -> Claim:
+    assert found.outcome is not Outcome.PROVED or (found.open, found.share) == (0, 0.0)
+    return Claim(found.outcome is Outcome.PROVED, -found.share, found.reason == STOPPED)
+
+
+@cache
+def legs_and_box() -> tuple[Legs, PoseBox]:
+    """Six legs that are singular in a small part of the workspace, without change of sign: a touching determinant."""
+    rng = np.random.default_rng(0)
+    turns = Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))
+    box = pose_box(Workspace((Free(-1.0, 1.0), Free(-1.0, 1.0), Free(3.0, 4.0)), turns))
+    return Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3))), box
+
+
+def six_legs() -> Claim:
+    return from_regularity(prove_regular(*legs_and_box(), engine="numpy", most_boxes=600))
+
+
+@cache
+def any_robot() -> Problem:
+    case = workspace_case("6-rss", "", width=0.9, turn=50)
+    assert case.workspace is not None
+    return build_problem(case, closed_form(case.model).model, pose_box(case.workspace))
+
+
+def any_rank() -> Claim:
+    problem = any_robot()
+    return from_regularity(prove_rank(problem, problem.locked, engine="numpy", most_boxes=130))
+
+
+def workspace_case(name: str, limits: str, width: float, turn: float, tolerance: float | None = None) -> Case:
+    """A robot of the gallery about its home."""
+    home = build_model(name).home
+    text = f"""
+[robot]
+model = "{name}"
+[robot.parameters]
+{"".join(f"{item.name} = {item.typical[0]}{chr(10)}" for item in build_model(name).parameters)}
+[pose]
+position = {list(home)}
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+point = [0, 0, 0]
+pitch = 0.1
+[limits]
+{limits}
+"""
+    case = case_from_tables(tomllib.loads(text), name=name, source=f"{name}.toml")
+    size, is_planar, angle = max(abs(each) for each in home) or 1.0, name.startswith("planar"), math.radians(turn)
+    half = (width * size, width * size, 0.0 if is_planar else width * size)
+    place = tuple(Free(at - by, at + by) if by else at for at, by in zip(home, half, strict=True))
+    angles = tuple(Free(-angle, angle) if angle and (k == 2 or not is_planar) else 0.0 for k in range(3))
+    turns = Turns(TurnKind.ROLL_PITCH_YAW, angles)
+    return replace(case, workspace=Workspace(place, turns), joint_centre_tolerance=tolerance)
+
+
+class Bowl:
+    """A function of the pose with a smallest value of -1, in the shape of a bowl, and bounds that are not sharp."""
+
+    middle = np.array([0.3, 0.1, 3.6, 0.02, 0.01, -0.03])
+
+    def values(self, points: FloatArray) -> FloatArray:
+        return np.asarray(((points - self.middle) ** 2).sum(axis=1) - 1.0)
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        nearest = np.clip(self.middle, lower, upper)
+        return Bounds(self.values(nearest) - 0.1 * (upper - lower).sum(axis=1), upper - lower)
+
+
+def bowl() -> Claim:
+    found = prove_minimum(Bowl(), legs_and_box()[1], gap=0.2)
+    assert found.bound <= -1.0 <= found.value == Bowl().values(found.y[None])[0]
+    return Claim(not found.reason, found.bound, found.reason == STOPPED)
+
+
+@cache
+def planar() -> Case:
+    return workspace_case("planar-3-rpr", "actuator_length = { min = -0.5, max = 0.01 }", 0.05, 5)
+
+
+def loops() -> Claim:
+    case = planar()
+    found = loop_extremes(
+        case, closed_form(case.model), pose_box(workspace_of_case(case)),
+        gap=0.2, time_limit=None, interrupted=is_requested,
+    )  # fmt: skip
+    assert found
+    for each in found:
+        sign = 1.0 if each.key.endswith("max") else -1.0
+        if each.pose is not None:
+            assert sign * each.reached <= sign * each.bound
+    return Claim(
+        any(each.key.endswith("max") and each.outcome is Outcome.PROVED for each in found),
+        -max(each.bound for each in found if each.key.endswith("max")),
+        any(each.reason == STOPPED for each in found),
+    )
+
+
+@cache
+def family() -> Family:
+    case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
+    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case))).family
+
+
+def machines() -> Claim:
+    built = family()
+    found = smallest_of_machines(built, ca.sumsqr(built.coordinates) + built.coordinates[0], gap=0.2)
+    assert not found.value < found.bound
+    return Claim(not found.reason, found.bound, found.reason == STOPPED)
+
+
+@cache
+def program(name: str) -> tuple[Nlp, float]:
+    """A program, and the best value of its objective that is known."""
+    nlp = formulate(machine(2.0) if name == "limbs" else poses(7))
+    return nlp, certify_program(nlp, gap=0.2).incumbent
+
+
+def certified(name: str) -> Claim:
+    """The claim of a certificate; its bound may be sharper before the end than then, but never beyond the optimum."""
+    nlp, best = program(name)
+    found = certify_program(nlp, gap=0.2, engine="numpy", jobs=1)
+    assert nlp.sign * found.bound <= nlp.sign * best
+    if found.x is not None:
+        assert pytest.approx(found.incumbent, rel=1e-12) == nlp.evaluate(found.x).F
+    return Claim(found.status is CertificateStatus.PROVED, 0.0, found.reason == STOPPED)
+
+
+def whole_box() -> Claim:
+    return certified("poses")
+
+
+def limbs() -> Claim:
+    return certified("limbs")
+
+
+def shared() -> Claim:
+    """The limbs of a program that is small enough for a search of the whole box."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(branchandbound, "_WHOLE_BOX", 0)
+        return certified("poses")
+
+
+QUICK: tuple[Search, ...] = (six_legs, bowl, machines)
+SEARCHES = (*QUICK, any_rank, loops, whole_box, limbs, shared)
+
+
+@cache
+def complete(search: Search, watched: tuple[str, ...]) -> tuple[Claim, int]:
+    """The claim of a search that nothing interrupts, and the number of its instructions."""
+    found = search()
+    with at_instruction(-1, KeyboardInterrupt, watched) as count:
+        search()
+    return found, count[0]
+
+
+def interrupted(search: Search, error: type[BaseException], watched: tuple[str, ...], moments: int, seed: int) -> int:
+    """Interrupt a search at random instructions, and return how often it answered with a claim of its own."""
+    whole, instructions = complete(search, watched)
+    answers = 0
+    for n in np.random.default_rng(seed).integers(1, instructions + 1, moments).tolist():
+        try:
+            with at_instruction(n, error, watched):
+                found = search()
+        except error:
+            continue
+        if found == whole:  # the number of instructions depends on the clock by a few
+            continue
+        answers += 1
+        assert error is KeyboardInterrupt
+        assert found.is_stopped, n
+        assert not found.is_proved, n
+        assert found.quality <= whole.quality, n
+    return answers
+
+
+each_search = pytest.mark.parametrize("search", SEARCHES, ids=lambda each: each.__name__)
+
+
+@each_search
+def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search) -> None:
+    assert interrupted(search, KeyboardInterrupt, LOOPS, 32 if search in QUICK else 3, 0) > 0
+    # Other errors are answered by no search.
+    assert interrupted(search, MemoryError, LOOPS, 1, 1) == 0
+
+
+@pytest.mark.slow
+@each_search
+@pytest.mark.parametrize("watched", [LOOPS, WATCHED], ids=["loops", "all"])
+def test_searches_are_interrupted_at_many_instructions(search: Search, watched: tuple[str, ...]) -> None:
+    assert interrupted(search, KeyboardInterrupt, watched, 60, 2) >= (5 if watched == LOOPS else 0)
+    assert interrupted(search, MemoryError, watched, 6, 3) == 0
+
+
+def interrupting(calls: int, real: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that is interrupted at a call of it, and works before and after."""
+    count = 0
+
+    def function(*arguments: object, **more: object) -> Any:  # noqa: ANN401 - what the real one returns
+        nonlocal count
+        count += 1
+        if count == calls:
+            raise KeyboardInterrupt
+        return real(*arguments, **more)
+
+    return function
+
+
+def octahedral(x1: str = "12", over: str = "", longest: str = "31") -> Case:
+    """Six legs that are regular, and whose longest length is too large, over a small workspace."""
+    text = f"""
+[robot]
+model = "stewart-gough"
+[robot.parameters]
+x1 = {x1}
+x2 = 8
+x3 = 4
+x4 = 9
+[pose]
+position = [0, 0, 30]
+[[task]]
+sense = "max"
+axis = [2, 2, 1]
+point = [2, 3, 6]
+pitch = 1
+[limits]
+{over}
+leg_length = {{ min = 20, max = {longest} }}
+[workspace]
+position = [{{ min = -2, max = 2 }}, {{ min = -2, max = 2 }}, {{ min = 28, max = 32 }}]
+"""
+    return case_from_tables(tomllib.loads(text), name="octahedral", source="octahedral.toml")
+
+
+def test_a_judgement_keeps_what_is_proved_before_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = octahedral()
+    whole = judge_workspace(case, gap=0.2)
+    monkeypatch.setattr(BoxSearch, "_step", interrupting(3, BoxSearch._step))
+    found = judge_workspace(case, gap=0.2)
+    assert found.regularity.outcome is whole.regularity.outcome
+    assert [each.name for each in found.extremes] == [each.name for each in whole.extremes]
+    stopped = [each.reason == STOPPED for each in found.extremes]
+    assert True in stopped
+    assert all(stopped[stopped.index(True) :])
+    assert not found.is_proved
+    for before, each in zip(whole.extremes, found.extremes, strict=True):
+        assert each.outcome in (before.outcome, Outcome.OPEN)
+    assert not is_requested()
+
+
+def test_certificates_of_several_tasks_end_with_the_one_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BoxSearch, "_step", interrupting(1, BoxSearch._step))
+    found = certify(load_case("paper-4.2"), starts=2, jobs=1)
+    assert [each.reason for each in found.tasks] == [STOPPED] * len(found.tasks)
+    assert not found.is_proved
+    assert not is_requested()
+
+
+def test_an_interrupted_scale_is_no_larger(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = replace(octahedral(), limits=Limits())
+    monkeypatch.setattr(scale, "ACCURACY", 0.5)
+    whole = largest_scale(case, time_limit=None)
+    assert whole.factor >= 1
+    monkeypatch.setattr(regular._Search, "_halves", interrupting(1, regular._Search._halves))
+    found = largest_scale(case, time_limit=None)
+    assert found.factor <= whole.factor
+    assert found.failed >= whole.failed
+
+
+def test_an_interrupted_exchange_of_poses_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    assert whole.workspace is not None
+    assert whole.workspace.is_proved
+    monkeypatch.setattr(BoxSearch, "_step", interrupting(2, BoxSearch._step))
+    found = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    assert found.workspace is not None
+    assert not found.workspace.is_proved
+    assert STOPPED in {each.reason for each in found.workspace.judgement.extremes}
+    assert len(found.workspace.history) <= len(whole.workspace.history)
+
+
+def test_an_interrupted_sweep_keeps_no_row_of_the_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BoxSearch, "_step", interrupting(2, BoxSearch._step))
+    out = tmp_path / "out.csv"
+    over = {"over": {"x2": [7.0, 8.0]}, "out": out, "starts": 1, "jobs": 1, "certified": True}
+    with pytest.raises(KeyboardInterrupt):
+        sweep(load_case("paper-4.1-helical"), **over)
+    assert not out.exists()
+    assert not Path(f"{out}.journal").exists()
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, ValueError])
+def test_an_error_of_a_callback_proves_nothing(error: type[BaseException]) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    problem = any_robot()
+    nlp = program("poses")[0]
+    searches: tuple[Callable[[], Any], ...] = (
+        lambda: prove_regular(*legs_and_box(), progress=fail).outcome is Outcome.OPEN,
+        lambda: prove_rank(problem, problem.locked, progress=fail).outcome is Outcome.OPEN,
+        lambda: certify_program(nlp, progress=fail).status is CertificateStatus.INCOMPLETE,
+    )
+    for search in searches:
+        if error is KeyboardInterrupt:
+            assert search()
+        else:
+            with pytest.raises(error):
+                search()
+
+
+SCRIPT = """
+import os, signal, sys, threading
+sys.path[:0] = {path!r}
+import test_interrupted_searches as own
+from screwsynth.nlp.workspace import scale
+from screwsynth.nlp.workspace.scale import largest_scale
+from screwsynth.nlp.workspace.verdict import Outcome
+problem = own.any_robot()
+for k in range(12):
+    timer = threading.Timer(0.004 * (k + 1), os.kill, (os.getpid(), signal.SIGINT))
+    try:
+        timer.start()
+        found = own.prove_rank(problem, problem.locked, engine="numpy")
+        print("claim", found.outcome.value, found.reason, found.share)
+    except KeyboardInterrupt:
+        print("raised")
+    try:
+        timer.join()
+    except KeyboardInterrupt:
+        pass
+"""
+
+
+@pytest.mark.slow
+def test_signals_in_python_prove_nothing() -> None:
+    """6-rss over a workspace with singular poses: each search is ended by a signal."""
+    script = SCRIPT.format(path=[str(Path(__file__).parent), *(str(each) for each in sys.path)])
+    done = subprocess.run([sys.executable, "-P", "-c", script], capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert len(lines) == 12
+    assert set(lines) <= {"raised", f"claim open {STOPPED} 1.0"}

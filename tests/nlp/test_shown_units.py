@@ -1,0 +1,72 @@
+"""The unit beside every number shown, and the poses that a table speaks of."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from screwsynth.models import Dimension, robot_function
+from screwsynth.nlp import Solution, case_from_tables, load_case, result_of, solve
+from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.output.pictures.figures import figure_of
+from screwsynth.nlp.output.pictures.solutions import drawings_of
+from screwsynth.nlp.units import Units, rate_unit, slope_unit
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def delta() -> Solution:
+    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables["solve"]["starts"] = 2
+    tables["limits"] = {"actuator_rate": {"max": 4.0}, "rate_share": {"max": 0.9}}
+    return solve(case_from_tables(tables, name="delta", source="delta"))
+
+
+def test_every_rate_of_a_motor_has_the_unit_of_its_coordinate_and_of_the_motion(delta: Solution) -> None:
+    text = str(delta.table())
+    # The motors of a Delta turn: 4 radians per radian is its limit, and no wrench has the rate of a motor.
+    assert len(re.findall(r"\d: [-+][\d.]+ rad/rad", text)) == 3
+    assert re.search(r"actuator_rate.max +4 +rad/rad +4 .*active +\+[\d.]+ F/\(rad/rad\)", text)
+    assert re.search(r"^ +work rate", text, re.MULTILINE)
+    (side,) = {each.unit for each in result_of(delta).optimality.active if each.name.startswith("actuator_rate")}  # type: ignore[union-attr]
+    assert side == "rad/rad"
+    (bar,) = [axes.get_ylabel() for axes in figure_of(drawings_of(delta)).axes if "rate" in axes.get_ylabel()]
+    assert bar == "work rate of each limb, m/rad"
+    for word in ("F/unit", "per unit"):
+        assert word not in text
+
+
+def test_units_of_rates_and_slopes() -> None:
+    turn, way, other = np.eye(6)[2], np.eye(6)[5], 2 * np.eye(6)[2]
+    units = Units("mm", "deg")
+    found = [
+        [rate_unit(twist, units, each) for each in (Dimension.LENGTH, Dimension.ANGLE)] for twist in (turn, way, other)
+    ]
+    assert found == [["mm/rad", "rad/rad"], ["mm/mm", "rad/mm"], ["mm per unit of time", "rad per unit of time"]]
+    assert [slope_unit(each) for each in ("mm", "", None, "rad/rad")] == ["F/mm", "F per 1", "F per 1", "F/(rad/rad)"]
+
+
+@pytest.mark.slow
+def test_tables_over_a_workspace_say_at_which_poses_they_hold(cli: Run) -> None:
+    code, out, _ = cli("solve", "hexapod-workspace", "--starts", "2")
+    assert code == 0
+    titles = [line for line in out.splitlines() if re.match(r"(tightest )?limits (over|at)", line)]
+    assert titles == [
+        "tightest limits over every pose",
+        "limits at the stated pose, and where a pose of the workspace became a constraint of its limit",
+    ]
+    # At the stated pose the joints are mounted straight: that the table says 0 degrees is true of that pose alone.
+    assert out.index(titles[1]) < out.index("base_joint_angle.max")
+
+
+def test_a_point_of_a_case_over_a_workspace_says_that_its_limits_are_of_that_point(cli: Run) -> None:
+    _, out, _ = cli("evaluate", "hexapod-workspace")
+    assert "limits at the stated pose, not over the workspace" in out
+    _, out, _ = cli("evaluate", "hexapod-machining")
+    assert "limits at" not in out
+    assert load_case("hexapod-machining").workspace is None

@@ -1,0 +1,268 @@
+"""One rule for refutations: a pose refutes a claim where ``evaluate`` shows the fault, with the joints as at home."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+from screwsynth.models import Dimension
+from screwsynth.models.catalog import gallery_names
+from screwsynth.models.joints.closedform import closed_form
+from screwsynth.nlp import Case
+from screwsynth.nlp.case.pose import Rotation
+from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.certificate.paper.proof import ProofError
+from screwsynth.nlp.evidence import state
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.state import RobotState
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.workspace.anyrobot import prove_ranks
+from screwsynth.nlp.workspace.general.problem import NotJudgedError, build_problem
+from screwsynth.nlp.workspace.general.search import prove_rank
+from screwsynth.nlp.workspace.homeposes import Homes
+from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.workspace.paper.anyrobot.looppoints import start_of
+from screwsynth.nlp.workspace.paper.anyrobot.posedrobot import posed_robot
+from screwsynth.nlp.workspace.paper.check import check_paper
+from screwsynth.nlp.workspace.paper.document import PaperProof, read_paper
+from screwsynth.nlp.workspace.paper.poseroot import pose_root
+from screwsynth.nlp.workspace.paper.record import PaperRecord
+from screwsynth.nlp.workspace.paper.written import paper_of
+from screwsynth.nlp.workspace.posebox import PoseNumbers, pose_box
+from screwsynth.nlp.workspace.posed import at_one_pose
+from screwsynth.nlp.workspace.verdict import Outcome
+
+#: Robots whose platform does not turn.
+TRANSLATIONS = ("3-puu", "3-upu", "delta", "delta-parallelogram", "orthoglide", "tripteron")
+
+
+def size_of(name: str) -> float:
+    model = build_model(name)
+    return max(abs(each) for each in (*model.home, *(item.typical[0] for item in model.parameters)))
+
+
+def spans(*ends: tuple[float, float]) -> str:
+    """Positions of a workspace; two equal ends are a fixed one."""
+    parts = [repr(low) if low == high else f"{{ min = {low!r}, max = {high!r} }}" for low, high in ends]
+    return f"[{', '.join(parts)}]"
+
+
+def turns(*ends: tuple[float, float]) -> str:
+    parts = [f"{key} = {{ min = {a}, max = {b} }}" for key, (a, b) in zip(("roll", "pitch", "yaw"), ends, strict=True)]
+    return f"rotation = {{ {', '.join(parts)} }}"
+
+
+def case_over(
+    name: str,
+    position: str,
+    rotation: str = "",
+    limit: float = 0.0,
+    spread: float = 0.0,
+    seed: int = 0,
+) -> Case:
+    """A robot of the gallery over a workspace, with dimensions off by a part, and a limit on its actuators.
+
+    The limit is in parts of the robot's size for slides, and 100 degrees times as much for cranks.
+    """
+    model, rng, size = build_model(name), np.random.default_rng(seed), size_of(name)
+    lines = ["[units]", 'length = "m"', "[robot]", f'model = "{name}"', "[robot.parameters]"]
+    for item in model.parameters:
+        value = item.typical[0] * (1 + rng.uniform(-spread, spread))
+        lines.append(f"{item.name} = {math.degrees(value) if item.dimension is Dimension.ANGLE else value!r}")
+    lines += ["[pose]", f"position = {list(model.home)}", "[[task]]", 'name = "lift"', 'sense = "max"']
+    lines += ["axis = [0, 0, 1]", "pitch = inf"]
+    if limit:
+        quantity = model.quantities[0]
+        most = 100 * limit if quantity.dimension is Dimension.ANGLE else limit * size
+        lines += ["[limits]", f"{quantity.name} = {{ min = {-most}, max = {most} }}"]
+    lines += ["[workspace]", f"position = {position}", rotation]
+    return case_from_tables(tomllib.loads("\n".join(lines)), name="mine", source="mine")
+
+
+def about_home(name: str, part: float, degrees: float, limit: float = 0.0) -> Case:
+    """A robot about its home, in the poses that it can take."""
+    away = part * size_of(name)
+    position = spans(*((each - away, each + away) for each in build_model(name).home))
+    return case_over(name, position, "" if name in TRANSLATIONS else turns(*[(-degrees, degrees)] * 3), limit)
+
+
+def shown(case: Case, pose: PoseNumbers) -> tuple[RobotState, int]:
+    """The robot and its freedoms as the command that is printed shows them, its loops closed from home."""
+    x, y, z = pose.axis.tolist()
+    one = at_one_pose(case, tuple(pose.position.tolist()), Rotation((x, y, z), pose.angle))
+    nlp = formulate(one)
+    point = closed_start(nlp)
+    assert state.loops_are_closed(nlp, point)
+    found = state.evaluate(nlp, point)
+    mobility = mobility_of(nlp, point, found)
+    return found, 6 if mobility is None else mobility.freedoms
+
+
+def check_shown(case: Case, judged: Judgement) -> int:
+    """Check what refutes by what ``evaluate`` shows there; return the number of refutations."""
+    count = 0
+    for rank, is_of_constraints in zip(judged.ranks, (False, True), strict=False):
+        if rank.outcome is Outcome.REFUTED and rank.y is not None:
+            found, freedoms = shown(case, rank.box.pose(rank.y))
+            assert case.model.generic is not None
+            assert freedoms > 6 - case.model.generic.constraints if is_of_constraints else found.is_singular
+            count += 1
+    for each in judged.extremes:
+        name, _, limb = each.name.partition(" limb ")
+        if each.outcome is not Outcome.REFUTED or each.key == "reach":
+            continue
+        assert each.pose is not None
+        (quantity,) = (item for item in case.model.quantities if item.name == name)
+        value = shown(case, each.pose)[0].quantities[name][quantity.owners.index(limb)]
+        assert math.isclose(value, each.reached, rel_tol=1e-6, abs_tol=1e-9)
+        count += 1
+    return count
+
+
+def verdicts(judged: Judgement) -> list[tuple[str, str, Outcome]]:
+    ranks = [(f"rank {k}", "", each.outcome) for k, each in enumerate(judged.ranks)]
+    return [*ranks, *((each.name, each.sense.value, each.outcome) for each in judged.extremes)]
+
+
+def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, PaperProof]:
+    record = PaperRecord()
+    judged = judge_workspace(case, with_limits=with_limits, with_objective=False, jobs=1, paper=record)
+    return judged, read_paper(paper_of(judged, record, "").as_text(), "again")
+
+
+def check_agreement(name: str, part: float, degrees: float, limit: float) -> int:
+    """Check that verdicts are the same with a proof on paper and without, and refutations those that are shown."""
+    case = about_home(name, part, degrees, limit)
+    judged = judge_workspace(case, with_objective=False, jobs=1)
+    again, _ = judged_on_paper(case)
+    assert verdicts(judged) == verdicts(again)
+    assert {each.outcome for each in judged.extremes if each.limit} <= {Outcome.PROVED, Outcome.REFUTED}
+    assert check_shown(case, again) == check_shown(case, judged)
+    return check_shown(case, judged)
+
+
+@pytest.mark.parametrize("name", ["3-prs", "five-bar"])
+def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
+    assert check_agreement(name, 0.02, 5, 0.01) == 2 * len(build_model(name).quantities[0].owners)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", gallery_names())
+def test_limits_of_all_robots_are_judged_alike_with_a_proof_and_without(name: str) -> None:
+    assert check_agreement(name, 0.02, 5, 0.01) >= 2 * len(build_model(name).quantities[0].owners)
+
+
+def test_limits_that_only_another_assembly_passes_are_proved_and_not_refuted() -> None:
+    """The arms of a five-bar linkage by the law of cosines, elbows outside; one inside is beyond the limit."""
+    case = about_home("five-bar", 0.02, 5, 0.4)
+    judged, proof = judged_on_paper(case)
+    limits = [each for each in judged.extremes if each.limit is not None]
+    assert [each.outcome for each in limits] == [Outcome.PROVED] * 4
+    assert case.workspace is not None
+    box = pose_box(case.workspace)
+    base, link, reach = 0.3, 0.25, 0.4
+    points = np.vstack([[0, reach], np.random.default_rng(0).uniform(box.lower[:2], box.upper[:2], (20_000, 2))])
+    for limb, side in (("1", -1.0), ("2", 1.0)):
+        x, y = points[:, 0] - side * base / 2, points[:, 1]
+        angles = np.arctan2(y, x) - side * np.arccos(np.hypot(x, y) / (2 * link))
+        angles = angles[1:] - angles[0]
+        own = [each for each in limits if each.name == f"actuator_angle limb {limb}"]
+        low, high = (next(each for each in own if each.sense.value == sense) for sense in ("min", "max"))
+        assert low.bound <= angles.min() < angles.max() <= high.bound
+        assert low.reached <= angles.min() + 1e-3
+        assert high.reached >= angles.max() - 1e-3
+    # A bound over all assemblies is not within the limit, and so no proof claims it.
+    reasons = {each.reason for each in proof.unproved if each.name.startswith("actuator_angle")}
+    assert reasons == {"it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"}
+    assert len(check_paper(proof, case).claims) == 5
+
+
+def planar(part: float, degrees: float, seed: int) -> Case:
+    """A planar 3-RRR in its plane, with dimensions off by up to 5 %."""
+    away = part * size_of("planar-3-rrr")
+    rotation = f"rotation = {{ axis = [0, 0, 1], angle = {{ min = {-degrees}, max = {degrees} }} }}"
+    return case_over("planar-3-rrr", spans((-away, away), (-away, away), (0.0, 0.0)), rotation, 0.0, 0.05, seed)
+
+
+def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
+    case = planar(0.44809968, 21.472688, 9)
+    assert case.workspace is not None
+    box = pose_box(case.workspace)
+    problem, homes = build_problem(case, closed_form(case.model).model, box), Homes(case, box, (), None)
+    # Newton's method alone finds a pose that is singular with an arm bent the other way.
+    other = prove_rank(problem, problem.locked, most_boxes=4000)
+    assert other.outcome is Outcome.REFUTED
+    assert other.y is not None
+    assert not shown(case, box.pose(other.y))[0].is_singular
+    assert not homes.is_singular(other.y, None, constraints=False)
+    found = prove_rank(
+        problem,
+        problem.locked,
+        most_boxes=4000,
+        is_shown=lambda z: homes.is_singular(problem.pose_of(z), None, constraints=False),
+    )
+    assert found.outcome is Outcome.REFUTED
+    assert found.y is not None
+    assert shown(case, box.pose(found.y))[0].is_singular
+
+
+def test_ranks_are_refuted_by_what_is_shown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = planar(0.13426, 19.47242, 3)
+    assert case.workspace is not None
+    homes = Homes(case, pose_box(case.workspace), (), None)
+    found = prove_ranks(closed_form(case.model).model, homes)
+    judged = Judgement(case, case.workspace, found.regular, (), found.constraints)
+    assert check_shown(case, judged) == 1
+    monkeypatch.setattr(Homes, "is_singular", lambda *_, **__: False)
+    assert prove_ranks(closed_form(case.model).model, homes, time_limit=0.2).regular.outcome is Outcome.OPEN
+
+
+@pytest.mark.parametrize(
+    ("name", "away", "seed"),
+    [("delta", (0.0, 0.0, 0.0), 1), ("delta", (0.0, 0.0, 0.0), 2), ("delta", (0.03, 0.01, -0.02), 3),
+     ("delta", (0.1, -0.05, 0.1), 4), ("tripteron", (0.1, -0.05, 0.1), 5), ("3-puu", (0.0, 0.03, -0.03), 6)],
+)  # fmt: skip
+def test_proofs_about_robots_that_do_not_turn_are_accepted(name: str, away: tuple[float, ...], seed: int) -> None:
+    """Dimensions are off by up to 3 %, positions about a point away from home."""
+    size, home = size_of(name), build_model(name).home
+    middle = [each + part * size for each, part in zip(home, away, strict=True)]
+    position = spans(*((each - 0.02 * size, each + 0.02 * size) for each in middle))
+    case = case_over(name, position, spread=0.03, seed=seed)
+    judged, proof = judged_on_paper(case, with_limits=False)
+    assert judged.is_regular
+    assert [each.name for each in check_paper(proof, case).claims] == ["regular", "constraints regular"]
+
+
+def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
+    """The yaw of a 3-RPS follows from the rest, and is not within the narrow range stated: the claim is about more."""
+    size = size_of("3-rps")
+    position = spans((-0.1 * size, 0.1 * size), (-0.1 * size, 0.1 * size), (1.13, 1.13 + 2e-6 * size))
+    case = case_over("3-rps", position, turns((0.05, 0.0502), (-1.15, -1.1498), (0.3, 0.3002)), spread=0.03)
+    judged, proof = judged_on_paper(case, with_limits=False)
+    assert judged.is_regular
+    assert len(check_paper(proof, case).claims) == 2
+
+
+def test_the_check_begins_in_the_working_mode_of_home() -> None:
+    """Far from home the loops of a 4-RUU close with a limb bent the other way alone."""
+    size = size_of("4-ruu")
+    tried = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        middle = np.array(build_model("4-ruu").home) + rng.uniform(-0.5, 0.5, 3) * size
+        position = spans(*((each - 0.01 * size, each + 0.01 * size) for each in middle.tolist()))
+        case = case_over("4-ruu", position, turns((-1, 1), (-1, 1), (-1, 1)))
+        assert case.workspace is not None
+        model = closed_form(case.model).model
+        try:
+            build_problem(case, model, pose_box(case.workspace))
+        except NotJudgedError:
+            with pytest.raises(ProofError, match="in the assembly of home"):
+                start_of(posed_robot(case, model, pose_root(case.workspace)))
+            tried += 1
+        else:
+            start_of(posed_robot(case, model, pose_root(case.workspace)))
+    assert 0 < tried < 6
