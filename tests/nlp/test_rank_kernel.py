@@ -127,7 +127,7 @@ class Copy:
 
 
 def is_found(copy: Copy, problem: Problem, matrix: RankMatrix) -> bool:
-    """Whether ``I - C M(y)`` is beyond the kernel's bound at a point of a box, or a box counts with too large a bound."""
+    """Whether ``I - C M(y)`` is beyond the kernel's bound at a point, or a box counts with too large a bound."""
     rng = np.random.default_rng(1)
     test = RankTest(matrix, problem.z, problem.start)
     examiner = Examiner(problem, test, "c")

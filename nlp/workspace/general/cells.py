@@ -140,6 +140,7 @@ class Examiner:
 
     def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
+        self._rank: RankTest | None = None
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)
         equations = problem.equations if family is None else family.equations
@@ -152,14 +153,9 @@ class Examiner:
         entries = ca.vertcat(equations, own, test.entries, problem.z[0])
         self._encloser = Encloser(coordinates, entries, engine)
         self.second: Encloser | None = None
-        if (
-            not self.count
-            and not self._errors
-            and n <= MOST_VARIABLES
-            and isinstance(test, RankTest)
-            and self._encloser.module
-        ):
-            self.second = Encloser(coordinates, test.entries, engine)
+        if isinstance(test, RankTest) and not self.count and not self._errors and n <= MOST_VARIABLES:
+            second = Encloser(coordinates, test.entries, engine)
+            self.second, self._rank = (second, test) if second.module is not None else (None, None)
         self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
@@ -170,8 +166,8 @@ class Examiner:
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""
-        if self.second is not None and len(cells.lower):
-            return self._examined(cells, self._test.examine_second(self.second, cells.lower.T, cells.upper.T))
+        if self.second is not None and self._rank is not None and len(cells.lower):
+            return self._examined(cells, self._rank.examine_second(self.second, cells.lower.T, cells.upper.T))
         f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()

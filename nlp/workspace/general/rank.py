@@ -82,10 +82,17 @@ class RankTest:
         )
 
     def examine_second(self, encloser: Encloser, lower: FloatArray, upper: FloatArray) -> Tested:
-        """Return the verdict on boxes with ends (n, B), by the C kernel from forms of second order of the entries."""
+        """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
+
+        Args:
+            encloser: of the entries, by the kernel.
+            lower, upper: (n, B) ends of the coordinates.
+        """
         n, count = lower.shape
         regular, shares, smallest = np.empty(count, dtype=np.int32), np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        if encloser.module is None:
+            raise TypeError("forms of second order of a matrix are those of the C kernel")
         encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest), count)
         return Tested(regular.astype(bool), shares.T, smallest)
 
