@@ -86,7 +86,8 @@ class RankTest:
 
         Args:
             encloser: of the entries, by the kernel.
-            lower, upper: (n, B) ends of the coordinates.
+            lower: (n, B) lower ends of the coordinates.
+            upper: (n, B) upper ends.
         """
         n, count = lower.shape
         regular, shares, smallest = np.empty(count, dtype=np.int32), np.empty((n, count)), np.empty(count)
