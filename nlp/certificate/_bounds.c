@@ -16,6 +16,7 @@
 
 #include "kernel/enclosed.h"
 #include "kernel/models.h"
+#include "kernel/rank.h"
 
 typedef struct {
     Py_buffer buffers[24];
@@ -205,7 +206,53 @@ static PyObject *models(PyObject *module, PyObject *args)
     Py_RETURN_NONE;
 }
 
+static PyObject *rank(PyObject *module, PyObject *args)
+{
+    PyObject *tuple, *at, *scale, *constant, *arrays[5];
+    Tape tape = {0};
+    Matrix matrix = {0};
+    Ranks found = {0};
+    int n;
+    Borrowed all = {.count = 0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "iO!(iiiOOO)(OOOOO)n", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
+                          &matrix.nullity, &at, &scale, &constant, &arrays[0], &arrays[1], &arrays[2], &arrays[3],
+                          &arrays[4], &found.B))
+        return NULL;
+    int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
+    Py_ssize_t B = found.B, D = sizeof(double), E = matrix.entries = tape.outputs;
+    good = good && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
+           matrix.rows + matrix.nullity >= matrix.columns;
+    good = good && (matrix.at = borrow(&all, at, 2 * E, sizeof(int), 0)) && (matrix.scale = borrow(&all, scale, E, D, 0));
+    good = good && (matrix.constant = borrow(&all, constant, (Py_ssize_t)matrix.rows * matrix.columns, D, 0));
+    good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
+    good = good && (found.regular = borrow(&all, arrays[2], B, sizeof(int), 1));
+    good = good && (found.shares = borrow(&all, arrays[3], n * B, D, 1)) && (found.smallest = borrow(&all, arrays[4], B, D, 1));
+    for (Py_ssize_t e = 0; good && e < E; e++)
+        good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
+               matrix.at[2 * e + 1] < matrix.columns;
+    double *memory = NULL;
+    if (good && !(memory = malloc(memory_for_ranks(&tape, &matrix, n) * sizeof(double))))
+        PyErr_NoMemory();
+    if (memory) {
+        Py_BEGIN_ALLOW_THREADS
+        rank_all(&tape, &matrix, n, &found, memory);
+        Py_END_ALLOW_THREADS
+    } else if (!PyErr_Occurred()) {
+        PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
+    }
+    free(memory);
+    for (int i = 0; i < all.count; i++)
+        PyBuffer_Release(&all.buffers[i]);
+    if (!memory)
+        return NULL;
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
+    {"rank", rank, METH_VARARGS,
+     "rank(n, tape, (rows, columns, nullity, at, scale, constant), (lower, upper, regular, shares, smallest), B)\n\n"
+     "Judge the rank of a matrix over B boxes: arrays (n, B), (B,) of int, (n, B) and (B,)."},
     {"models", models, METH_VARARGS,
      "models(n, (middle, b, H, w, slope_lo, slope_hi, rounding), B, bound)\n"
      "models(n, (...), B, level, low, high)\n\n"

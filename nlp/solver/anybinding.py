@@ -29,7 +29,8 @@ from ..case.limits.limit import PosedRobot
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..workspace.general.assembled import Loops
-from ..workspace.general.problem import NotJudgedError, Problem, build_problem, rotation_of
+from ..workspace.general.posed_model import rotation_of
+from ..workspace.general.problem import NotJudgedError, Problem, build_problem
 from ..workspace.machine import workspace_of_case
 from ..workspace.posebox import PoseNumbers, pose_box
 from .tighter import TIGHTER, tightened

@@ -61,14 +61,16 @@ def random_cells(problem: Problem, count: int, width: float, rng: np.random.Gene
     return Cells(lower, upper, near, np.full(count, not problem.dependent))
 
 
-def wrong_boxes(problem: Problem, matrix: RankMatrix, width: float, seed: int) -> tuple[int, int]:
+def wrong_boxes(
+    problem: Problem, matrix: RankMatrix, width: float, seed: int, engine: str | None = None
+) -> tuple[int, int]:
     """Count boxes said to be regular, and those of them in which a random closed point says otherwise.
 
     With C a pseudo-inverse of the matrix at the middle, the determinant of C M is positive in a box that is regular for
     the reason of the search.
     """
     rng = np.random.default_rng(seed)
-    examiner = Examiner(problem, rank.RankTest(matrix, problem.z, problem.start), None)
+    examiner = Examiner(problem, rank.RankTest(matrix, problem.z, problem.start), engine)
     found = examiner.examine(random_cells(problem, 64, width, rng))
     own, dependent = list(problem.independent), list(problem.dependent)
     function = ca.Function("M", [problem.z], [ca.densify(matrix.matrix)])
@@ -117,9 +119,9 @@ def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) 
         return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R), *more)
 
     problem = problem_of("6-ups", 0.5, 80)
-    assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
+    assert not wrong_boxes(problem, problem.locked, 1.0, 1, "numpy")[1]
     monkeypatch.setattr(rank.RankTest, "_judged", without)
-    assert wrong_boxes(problem, problem.locked, 1.0, 1)[1]
+    assert wrong_boxes(problem, problem.locked, 1.0, 1, "numpy")[1]
 
 
 @pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")

@@ -103,7 +103,7 @@ def reachy_case(text: str) -> Case:
 
 @pytest.fixture(scope="module")
 def reachy() -> tuple[Case, PaperProof]:
-    text = one_motor(reachy_text(0.2))
+    text = one_motor(reachy_text(0.45))
     return reachy_case(text), proof_of(reachy_case(text), text)
 
 
@@ -132,7 +132,7 @@ def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, PaperProof]) 
     assert "reach limb stewart_1" in rejected(changed(proof, "reach limb stewart_1", bound=bound - 0.2), case)
     # A limit on a motor alone has the loops as conditions: the closed forms need the reach of all limbs.
     assert "other expressions" in rejected(changed(proof, "joint.stewart_1 joint stewart_1:1"), case)
-    other = reachy_case(one_motor(reachy_text(0.2)).replace("rc = 0.062", "rc = 0.060"))
+    other = reachy_case(one_motor(reachy_text(0.45)).replace("rc = 0.062", "rc = 0.060"))
     assert "other expressions" in rejected(changed(proof, "reach limb stewart_1"), other)
 
 

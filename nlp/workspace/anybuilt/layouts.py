@@ -15,7 +15,7 @@ from ...case.pose import HERE, Free, Pose, Rotation
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from ..general.family import BuiltModel, Family
-from ..general.problem import rotation_of
+from ..general.posed_model import rotation_of
 from ..posebox import PoseBox
 from ..posed import at_one_pose
 

@@ -9,12 +9,13 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from ...certificate.boxes.firstpass import MOST_VARIABLES
 from ..regular.inverse import inverses
 from .assembled import Loops
 from .enclosing import Encloser, Forms
 from .family import Family
 from .problem import Problem
-from .rank import Tested
+from .rank import RankTest, Tested
 from .relation import Relation, are_contractions, by_centres, relation_of
 
 if TYPE_CHECKING:
@@ -139,6 +140,7 @@ class Examiner:
 
     def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
+        self._rank: RankTest | None = None
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self.count = len(self._dependent)
         equations = problem.equations if family is None else family.equations
@@ -150,6 +152,10 @@ class Examiner:
         # A last entry that is not used, for a matrix that is constant.
         entries = ca.vertcat(equations, own, test.entries, problem.z[0])
         self._encloser = Encloser(coordinates, entries, engine)
+        self.second: Encloser | None = None
+        if isinstance(test, RankTest) and not self.count and not self._errors and n <= MOST_VARIABLES:
+            second = Encloser(coordinates, test.entries, engine)
+            self.second, self._rank = (second, test) if second.module is not None else (None, None)
         self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
@@ -160,6 +166,8 @@ class Examiner:
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""
+        if self.second is not None and self._rank is not None and len(cells.lower):
+            return self._examined(cells, self._rank.examine_second(self.second, cells.lower.T, cells.upper.T))
         f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
@@ -199,6 +207,12 @@ class Examiner:
         finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
         return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
+
+    def _examined(self, cells: Cells, found: Tested) -> Examined:
+        """Return the results of a test of boxes without dependent coordinates."""
+        B, f = found.shares.shape
+        none = Relation(np.zeros((B, 0)), np.zeros((B, 0, f)), np.zeros((B, 0)), np.zeros((B, 0, 0)))
+        return Examined(cells, none, *found)
 
     def _forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms of all entries over boxes (B, n), for all machines."""

@@ -7,7 +7,7 @@ centre and the middle of its terms of second order, its scaled gradient, and the
 from __future__ import annotations
 
 from types import ModuleType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -18,6 +18,9 @@ from ...certificate.boxes.engines import chosen_kernel, kernel
 from ...certificate.enclosing.enclosure import enclose
 from ...certificate.enclosing.instructions import compile_tape
 from ...certificate.enclosing.tape import Tape
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Part of its parts by which a sum of two doubles may be off, several times.
 _ULP = 2.0**-51
@@ -56,27 +59,31 @@ class Encloser:
 
     def __init__(self, z: SX, expressions: SX, engine: str | None = None) -> None:
         self.tape: Tape = compile_tape(ca.Function("entries", [z], [ca.densify(expressions)]))
-        self._module: ModuleType | None = chosen_kernel(engine, kernel)
+        self.module: ModuleType | None = chosen_kernel(engine, kernel)
         code = [getattr(self.tape, name) for name in ("op", "to", "a", "b", "first", "last")]
         self._code = np.ascontiguousarray(np.stack(code, axis=1).astype(np.int32))
 
     @property
     def name(self) -> str:
         """``c`` or ``numpy``."""
-        return "numpy" if self._module is None else "c"
+        return "numpy" if self.module is None else "c"
+
+    @property
+    def head(self) -> tuple[NDArray[np.int32], FloatArray, int, int, int]:
+        """The tape as the C kernel reads it."""
+        return self._code, self.tape.k, len(self.tape), self.tape.registers, self.tape.outputs
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms over boxes with ends (n, B)."""
         tape, (n, count) = self.tape, lower.shape
-        if self._module is None:
+        if self.module is None:
             found = enclose(tape, lower, upper)
             c, a, p, q, s = found.c, found.a, found.p, found.q, found.s
         else:
             c, p, q, s = (np.empty((tape.outputs, count)) for _ in range(4))
             a = np.empty((tape.outputs, n, count))
             ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-            head = self._code, tape.k, len(tape), tape.registers, tape.outputs
-            self._module.enclose(n, head, (*ends, c, p, q, s, a), count)
+            self.module.enclose(n, self.head, (*ends, c, p, q, s, a), count)
         middle, half = 0.5 * (p + q), 0.5 * (q - p)
         rest = half + s + 4 * _ULP * (half + np.abs(c) + np.abs(middle))
         return Forms((c + middle).T, a.transpose(2, 0, 1), rest.T)

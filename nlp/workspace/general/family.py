@@ -23,7 +23,8 @@ from ...case.case import Case
 from ..machine import INSIDE, CentreErrors
 from .assembled import Loops
 from .matrices import RankMatrix, free_matrix, locked_matrix
-from .problem import NotJudgedError, PosedModel, Problem, about_platform, posed_model
+from .posed_model import PosedModel, posed_model
+from .problem import NotJudgedError, Problem, about_platform
 
 #: Errors at which equations that were left out are tested, as a part of the robot's length, and number of tests.
 _OFF, _TESTS = 1e-2, 4

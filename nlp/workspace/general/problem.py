@@ -7,22 +7,20 @@ equations: all unknowns, and numbers of the pose that a robot with fewer freedom
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Member, Model, Substitution, frozen_array, jacobian
-from ....models.instance import sizes_at
+from ....models import FloatArray, Member, Model, frozen_array
 from ....models.member import scaled_twists
 from ....models.rows import independent_rows
 from ...case.case import Case
-from ...case.pose import Free
-from ...case.workspace import TurnKind
 from ..posebox import PoseBox
 from .assembled import Loops, closed_from_home
 from .matrices import Limbs, RankMatrix, free_matrix, locked_matrix
+from .posed_model import PosedModel, polynomial_rows, posed_model
 
 #: Points of the workspace at which the equations that are needed are found, beside its middle, and the part of the
 #: workspace, about its middle, in which they lie.
@@ -80,51 +78,6 @@ class Problem:
         return y
 
 
-def rotation_of(box: PoseBox, turn: SX) -> SX:
-    """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
-    if box.kind is TurnKind.ROLL_PITCH_YAW:
-        about = [_turn(k, turn[k]) for k in range(3)]
-        return about[2] @ about[1] @ about[0]
-    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
-    scaled = 2 / (1 + ca.sumsqr(r)) * r
-    return SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
-
-
-def _turn(about: int, tangent: SX) -> SX:
-    """Return the rotation about a coordinate axis by an angle, from the tangent of its half."""
-    i, j = (about + 1) % 3, (about + 2) % 3
-    factor = 2 / (1 + tangent * tangent)
-    matrix = SX.eye(3)
-    matrix[i, i] = matrix[j, j] = factor - 1
-    matrix[j, i], matrix[i, j] = factor * tangent, -factor * tangent
-    return matrix
-
-
-@dataclass(frozen=True, eq=False)
-class PosedModel:
-    """A model as expressions of the coordinates: Substitution's numbers put in.
-
-    Attributes:
-        z: (n, 1) symbols.
-        free: indices of the pose's numbers.
-        size: (n,) of the coordinates.
-        closure: equations, of order 1.
-        every: all equations of loops, and signs that must be positive.
-        signs: (s, 1) numbers that are positive in home's assembly.
-        limbs: rows, members and actuators.
-        jacobian: (rows, 6) J.
-    """
-
-    z: SX
-    free: tuple[int, ...]
-    size: FloatArray
-    closure: SX
-    every: SX
-    signs: SX
-    limbs: Limbs
-    jacobian: SX
-
-
 def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     """Return a robot over a workspace.
 
@@ -164,67 +117,14 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=RankMatrix(locked_matrix(limbs), 0),
+        locked=RankMatrix(
+            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed), 0
+        ),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
         needed=tuple(needed),
         columns=columns,
-    )
-
-
-def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None) -> PosedModel:
-    """Return a model as expressions of the coordinates.
-
-    Args:
-        case: with fixed dimensions.
-        model: its robot; its parameters may be followed by errors of joint centres.
-        box: the poses.
-        z: (n, 1) symbols of the coordinates; new ones if left out.
-        errors: (3 m, 1) symbols in the place of the errors.
-    """
-    free = box.free
-    y = [SX(float(each)) for each in 0.5 * box.lower + 0.5 * box.upper]
-    own = [SX.sym(f"y{k}") for k in free] if z is None else ca.vertsplit(z)[: len(free)]
-    for k, symbol in zip(free, own, strict=True):
-        y[k] = symbol
-    unknowns = [SX.sym(item.name) for item in model.unknowns] if z is None else ca.vertsplit(z)[len(free) :]
-    errors = SX(0, 1) if errors is None else errors
-    rotation, position = rotation_of(box, ca.vertcat(*y[3:])), ca.vertcat(*y[:3])
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    symbols = Substitution.identity(model)
-    numbers = ca.vertcat(SX(0, 1), *values, errors)
-    given = Substitution(numbers, ca.vertcat(SX(0, 1), *unknowns), rotation, position)
-    every = (*model.closure, *model.loops)
-    outputs = [
-        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[each.value for each in model.signs],
-        *[each.expression for each in every],
-    ]
-    following = iter(ca.Function("model", symbols.all, outputs).call(given.all))
-    wrenches = [
-        replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
-    ]
-    members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-    actuators = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-    signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
-    sizes = sizes_at(
-        model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
-    )
-    scaled = [next(following) / sizes[k] for k in range(len(every))]
-    ranges = (0.5 * (box.upper - box.lower))[list(free)]
-    own_sizes = np.array(ca.DM(sizes[len(every) :, :])).ravel()
-    return PosedModel(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
-        free=free,
-        size=np.concatenate([ranges, own_sizes]),
-        closure=ca.vertcat(SX(0, 1), *scaled[: len(model.closure)]),
-        every=ca.vertcat(SX(0, 1), *scaled),
-        signs=signs,
-        limbs=Limbs(wrenches, members, actuators, position, 1.0),
-        jacobian=jacobian(wrenches, SX(1), members),
     )
 
 

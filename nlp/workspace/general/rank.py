@@ -21,7 +21,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from .enclosing import Forms
+from .enclosing import Encloser, Forms
 from .matrices import RankMatrix
 from .relation import ROUNDING, Relation, are_contractions, by_centres
 
@@ -73,6 +73,29 @@ class RankTest:
                 entries.append(entry)
         self.entries: SX = ca.vertcat(SX(0, 1), *entries)
         self._constant *= self._scale[:, None]
+        self._head = (
+            *whole.shape,
+            matrix.nullity,
+            np.ascontiguousarray(np.array(self._at, dtype=np.int32).T),
+            np.ascontiguousarray(self._scale[self._at[0]]),
+            np.ascontiguousarray(self._constant),
+        )
+
+    def examine_second(self, encloser: Encloser, lower: FloatArray, upper: FloatArray) -> Tested:
+        """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
+
+        Args:
+            encloser: of the entries, by the kernel.
+            lower: (n, B) lower ends of the coordinates.
+            upper: (n, B) upper ends.
+        """
+        n, count = lower.shape
+        regular, shares, smallest = np.empty(count, dtype=np.int32), np.empty((n, count)), np.empty(count)
+        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        if encloser.module is None:
+            raise TypeError("forms of second order of a matrix are those of the C kernel")
+        encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest), count)
+        return Tested(regular.astype(bool), shares.T, smallest)
 
     def examine(
         self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..paper.record import TreeRecord
 
 #: Number of boxes examined at once.
-_BLOCK = 128
+_BLOCK = 1024
 #: Width of a box, in parts of the whole box, below which it is not bisected.
 _LEAST_WIDTH = 2.0**-24
 #: Smallest singular value, in parts of the largest, from which Newton's method looks for a singular pose, and most

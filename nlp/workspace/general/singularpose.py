@@ -20,6 +20,10 @@ from .problem import Problem
 SINGULAR = 1e-10
 #: Steps of Newton's method: where a determinant touches 0, each one halves the distance.
 _STEPS = 60
+#: Steps in which the smallest singular value must become smaller by a tenth: at the edge of a workspace it does not.
+_PATIENCE = 8
+#: Singular value of M, in parts of the largest, below which J is looked at.
+_NEAR = 1e-6
 #: Largest step of a coordinate, in parts of its size.
 _STEP = 0.25
 #: Largest residual of closed loops.
@@ -77,16 +81,21 @@ class SingularPose:
         if not np.isfinite(M).all():
             return None
         v = self._direction(M)
+        seen: list[float] = []
         for _ in range(_STEPS):
-            if self.is_singular(z):
+            _, values, right = np.linalg.svd(M)
+            rank = len(v) - self._matrix.nullity
+            seen.append(float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0)
+            if seen[-1] <= _NEAR and self.is_singular(z):
                 return z
+            if len(seen) > _PATIENCE and not seen[-1] < 0.9 * seen[-1 - _PATIENCE]:
+                return None
             parts = [each.full() for each in self._equations(z, v)]
-            M = self._values(z).full()
-            if not (all(np.isfinite(each).all() for each in parts) and np.isfinite(M).all()):
+            if not all(np.isfinite(each).all() for each in parts):
                 return None
             g, r, by_z, turned = parts
             k, n, c = len(g), len(z), len(v)
-            basis = np.linalg.svd(M)[2][c - self._matrix.nullity :]
+            basis = right[c - self._matrix.nullity :]
             rows = np.zeros((k + len(r) + 1 + len(basis), n + c))
             rows[:k, :n], rows[k : k + len(r), :n], rows[k : k + len(r), n:] = by_z * size, turned * size, M
             rows[k + len(r), n:], rows[k + len(r) + 1 :, n:] = v, basis
@@ -95,6 +104,9 @@ class SingularPose:
             step *= min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
             z, v = self._inside(z + size * step[:n]), v + step[n:]
             v /= np.linalg.norm(v)
+            M = self._values(z).full()
+            if not np.isfinite(M).all():
+                return None
         return z if self.is_singular(z) else None
 
     def slopes(self, z: FloatArray) -> FloatArray | None:

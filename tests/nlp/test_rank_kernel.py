@@ -1,0 +1,166 @@
+"""The rank of matrices without loops, from forms of second order in the C kernel: boxes, bounds, planted faults.
+
+A copy of the kernel keeps C, the middle of the matrix and the bound B of the last box, so that ``|I - C M(y)| <= B``
+can be held against the matrix at points of the box, computed by CasADi.
+"""
+
+import ctypes
+import importlib.machinery
+import importlib.util
+import math
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
+from types import ModuleType
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from screwsynth.models import FloatArray, stewart_gough
+from screwsynth.models.joints.closedform import closed_form
+from screwsynth.nlp import Case, Free, Task
+from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.certificate.boxes.engines import kernel
+from screwsynth.nlp.workspace.general.cells import Cells, Examiner
+from screwsynth.nlp.workspace.general.matrices import RankMatrix
+from screwsynth.nlp.workspace.general.problem import Problem, build_problem
+from screwsynth.nlp.workspace.general.rank import RankTest
+from screwsynth.nlp.workspace.general.search import prove_rank
+from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.workspace.verdict import Outcome
+
+pytestmark = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
+
+FOLDER = Path(__file__).parents[2] / "nlp" / "certificate"
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+ALL_AXES, TURNS = TurnKind.ANY_AXIS, TurnKind.ROLL_PITCH_YAW
+
+
+def hexapod(kind: TurnKind, degrees: float) -> Problem:
+    """LinuxCNC's hexapod, 5 in to each side of z = 20 in."""
+    case = Case(stewart_gough(layout="octahedral"), {"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)},
+                [0.0, 0.0, 20.0], [Task([0, 0, 0, 0, 0, 1])])  # fmt: skip
+    angle = Free(-math.radians(degrees), math.radians(degrees))
+    place = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+    return build_problem(
+        case, case.model, pose_box(Workspace(place, Turns(kind, (angle,) * (1 if kind is ALL_AXES else 3))))
+    )
+
+
+def gallery(name: str, part: float, degrees: float) -> Problem:
+    """A robot of the gallery about its home."""
+    model = build_model(name)
+    values = {item.name: item.typical[0] for item in model.parameters}
+    size = max(abs(each) for each in (*model.home, *values.values()))
+    angle = Free(-math.radians(degrees), math.radians(degrees))
+    place = [Free(each - part * size, each + part * size) for each in model.home]
+    case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])])
+    return build_problem(case, closed_form(model).model, pose_box(Workspace(place, Turns(TURNS, (angle,) * 3))))
+
+
+@pytest.mark.parametrize(("kind", "degrees", "most"), [(ALL_AXES, 20, 79), (ALL_AXES, 30, 571), (TURNS, 20, 103)])
+def test_a_hexapod_takes_as_many_boxes_as_its_exact_expansion(kind: TurnKind, degrees: float, most: int) -> None:
+    # The expansion of the rows as polynomials takes these numbers of boxes.
+    problem = hexapod(kind, degrees)
+    found = prove_rank(problem, problem.locked)
+    assert found.outcome is Outcome.PROVED
+    assert found.boxes <= 1.02 * most
+
+
+@pytest.mark.parametrize(("name", "part", "degrees"), [("6-rss", 0.02, 5), ("6-rus", 0.05, 10), ("6-ups", 0.1, 20)])
+def test_forms_of_second_order_take_a_quarter_of_the_boxes_of_the_first(name: str, part: float, degrees: float) -> None:
+    problem = gallery(name, part, degrees)
+    boxes = [prove_rank(problem, problem.locked, engine=engine, most_boxes=5000).boxes for engine in ("c", "numpy")]
+    assert boxes[0] < 0.25 * boxes[1]
+
+
+#: One wrong rule each: the text of the kernel, and what stands in its place.
+FAULTS = {
+    "no fault": ("", ""),
+    "pairs are dropped": ("a < n + n; a++", "a < n; a++"),
+    "terms of first order are dropped": ("for (int a = 0, t = 0;", "for (int a = n, t = n;"),
+    "the half of a square is its own middle": ("b == a - n ? 0.5 : 1.0", "b == a - n ? 0.0 : 1.0"),
+    "a square moves about 0": ("EACH middle[l] += 0.5 * terms[t][l], size", "EACH size"),
+    "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (0 * rest[l] + "),
+    "the rest has a fifth of its width": ("double half = 0.5 * (v->q[l]", "double half = 0.1 * (v->q[l]"),
+    "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < 3)"),
+}  # fmt: skip
+
+
+class Copy:
+    """A compiled copy of the kernel, and what it keeps of its last box."""
+
+    def __init__(self, folder: Path, old: str, new: str) -> None:
+        shutil.copytree(FOLDER, folder / "copy", ignore=shutil.ignore_patterns("*.so", "*.py", "__pycache__"))
+        header = folder / "copy" / "kernel" / "rank.h"
+        text = header.read_text(encoding="utf-8")
+        keep = "            for (int i = 0; i < n; i++)\n                found->shares"
+        for before, after in ((keep, f"            if (!l) keep_parts(m, parts);\n{keep}"), (old, new)):
+            assert not before or text.count(before) == 1, before
+            text = text.replace(before, after) if before else text
+        start = "static void rank_all("
+        kept = (
+            "double kept_C[4096], kept_B[4096];\nstatic void keep_parts(const Matrix *m, RankParts x)\n{\n"
+            "    memcpy(kept_C, x.inverse, (size_t)(m->columns * m->rows) * sizeof(double));\n"
+            "    memcpy(kept_B, x.B, (size_t)(m->columns * m->columns) * sizeof(double));\n}\n\n"
+        )
+        header.write_text(text.replace(start, kept + start), encoding="utf-8")
+        target = folder / "_bounds.abi3.so"
+        flags = ["-shared", "-fPIC", "-O1", "-ffp-contract=off", f"-I{sysconfig.get_path('include')}"]
+        source = folder / "copy" / "_bounds.c"
+        subprocess.run([str(COMPILER), *flags, str(source), "-o", str(target), "-lm"], check=True, capture_output=True)
+        loader = importlib.machinery.ExtensionFileLoader("_bounds", str(target))
+        spec = importlib.util.spec_from_file_location("_bounds", target, loader=loader)
+        assert spec is not None
+        self.module: ModuleType = importlib.util.module_from_spec(spec)
+        loader.exec_module(self.module)
+        library = ctypes.CDLL(str(target))
+        self._kept = [(ctypes.c_double * 4096).in_dll(library, name) for name in ("kept_C", "kept_B")]
+
+    def kept(self, columns: int) -> tuple[FloatArray, FloatArray]:
+        """C and B, (c, c) each."""
+        first, second = (np.array(each)[: columns**2].reshape(columns, columns) for each in self._kept)
+        return first, second
+
+
+def is_found(copy: Copy, problem: Problem, matrix: RankMatrix) -> bool:
+    """Whether ``I - C M(y)`` is beyond the kernel's bound at a point, or a box counts with too large a bound."""
+    rng = np.random.default_rng(1)
+    test = RankTest(matrix, problem.z, problem.start)
+    examiner = Examiner(problem, test, "c")
+    assert examiner.second is not None
+    examiner.second.module = copy.module
+    M = ca.Function("M", [problem.z], [ca.densify(matrix.matrix)])
+    n, columns = len(problem.start), matrix.matrix.shape[1]
+    values = M(problem.start).full()
+    scale = 2.0 ** -np.round(np.log2(np.linalg.norm(values, axis=1)))
+    for k in range(60):
+        free = np.zeros(n, dtype=bool)
+        free[rng.choice(n, 1 + k % 3, replace=False)] = True
+        half = problem.size * rng.uniform(0.05, 0.5) * free
+        centre = problem.start + 0.5 * problem.size * rng.uniform(-1, 1, n)
+        lower, upper = (centre - half)[None], (centre + half)[None]
+        found = examiner.examine(Cells(lower, upper, centre[None], np.ones(1, dtype=bool)))
+        C, B = copy.kept(columns)
+        if found.is_regular[0] and np.abs(np.linalg.eigvals(B)).max() >= 1:
+            return True
+        if not np.isfinite(found.smallest[0]) or not found.smallest[0] or not np.isfinite(B).all():
+            continue
+        ends = np.where(rng.random((8, n)) < 0.5, lower, upper)
+        for y in np.vstack([ends, centre[None], rng.uniform(lower, upper, (4, n))]):
+            values = scale[:, None] * M(y).full()
+            if (np.abs(np.eye(columns) - C @ values) > B + 1e-11).any():
+                return True
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_planted_fault_is_found(fault: str, tmp_path: Path) -> None:
+    copy = Copy(tmp_path, *FAULTS[fault])
+    problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), gallery("6-rus", 0.1, 20)]
+    assert any(is_found(copy, problem, problem.locked) for problem in problems) == (fault != "no fault")
