@@ -2,6 +2,6 @@
 
 The modules import each other in this order: ``ctext``, ``casaditext``, ``subject`` and ``calls`` stand alone;
 ``apitexts`` and ``runtimelimits`` use ``ctext``, ``held`` uses ``runtimelimits``; ``loops``, ``stages`` and
-``looptext`` each use those before; ``unitdata`` uses ``runtimelimits``, ``manifest`` uses both, and ``codegen`` uses all of them.
-``folder`` reads the file that ``manifest`` writes, and ``library`` loads the folder.
+``looptext`` each use those before; ``unitdata`` uses ``runtimelimits``, ``manifest`` uses both, and ``codegen`` uses
+all of them. ``folder`` reads the file that ``manifest`` writes, and ``library`` loads the folder.
 """
