@@ -18,10 +18,9 @@ from screwsynth.nlp import Case, CaseError, __version__, case_from_tables, formu
 from screwsynth.nlp.embedding.ctext import c_names
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
-from screwsynth.nlp.program.formulation import formulate_weighted
+from screwsynth.nlp.program.formulation import formulate_weighted, scaled_weights
 from screwsynth.nlp.program.layout import lay_out
 from screwsynth.nlp.program.pairs import with_all_pairs
-from screwsynth.nlp.solver.compromise import scale_weights
 
 Embedded = Any
 Embed = Callable[..., Embedded]
@@ -243,7 +242,7 @@ def test_limits_hold_at_every_pose_and_for_every_task(embed: Embed) -> None:
         tables = changed(tables, key, value)
         assert bounds.set(names[key.upper().replace(".", "_")], value) == 0
     case = case_of(tables)
-    nlp = with_all_pairs(formulate_weighted(case, scale_weights(case).values))
+    nlp = with_all_pairs(formulate_weighted(case, scaled_weights(case)))
     found = [each.name for each in nlp.program.constraints]
     assert sum("poses 2 and 1" in name for name in found) == 12
     assert sum("rate_share" in name for name in found) == 24
