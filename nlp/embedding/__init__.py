@@ -1,7 +1,7 @@
 """C for embedding: the objective of a case and a whole solver, from the templates in ``c``.
 
 The modules import each other in this order: ``ctext``, ``casaditext``, ``subject`` and ``calls`` stand alone;
-``loops``, ``stages`` and ``looptext`` each use those before; ``apitexts`` and ``runtimelimits`` use ``ctext``,
-``unitdata`` uses ``runtimelimits``, ``manifest`` uses both, and ``codegen`` uses all of them. ``folder`` reads the
-file that ``manifest`` writes, and ``library`` loads the folder.
+``apitexts`` and ``runtimelimits`` use ``ctext``, ``held`` uses ``runtimelimits``; ``loops``, ``stages`` and
+``looptext`` each use those before; ``unitdata`` uses ``runtimelimits``, ``manifest`` uses both, and ``codegen`` uses
+all of them. ``folder`` reads the file that ``manifest`` writes, and ``library`` loads the folder.
 """

@@ -30,6 +30,7 @@ from ..program.sampling import starting_points
 from .apitexts import index_macros, version_texts
 from .casaditext import for_controllers
 from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_literal, string_table
+from .held import held_by_fixed_numbers, held_texts
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
@@ -90,9 +91,11 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """
     subject = find_subject(case)
     nlp, prefix = subject.nlp, identifier(case.name)
-    staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI")
+    held = held_by_fixed_numbers(nlp)
+    staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
     names, units = _substitutions(subject, staged), UnitData(nlp)
+    names |= held_texts(held, limits)
     names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
     parts = dict(_PARTS)
     if staged.loops:

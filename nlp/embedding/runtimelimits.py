@@ -98,6 +98,15 @@ class RunTimeLimits:
         """Number of converted numbers."""
         return 0 if self.function is None else int(self.function.numel_out(0))
 
+    def places(self, key: str, reading: Reading, *, is_upper: bool) -> list[int]:
+        """Return the constraints whose bound on a side is that of a limit with a key by a reading."""
+        if self.function is None or key not in (keys := [each.key for each in self.limits]):
+            return []
+        (values,) = self.function.sx_in()
+        number, converted = values[keys.index(key)], self.function(values)
+        same = [ca.is_equal(converted[k], reading.to_value(number), _DEPTH) for k in range(self.converted)]
+        return [each.constraint for each in self.sides if each.is_upper == is_upper and same[each.converted]]
+
     @property
     def work(self) -> int:
         """Size of the functions' workspace in doubles."""

@@ -15,6 +15,7 @@ from casadi import SX
 
 from ..program.program import Program
 from .calls import RobotValues
+from .held import Held
 from .loops import Loop, Loops, find_loops
 
 #: Operations of a Hessian, beside loops, above which C has its product with a direction instead: a third of the code.
@@ -67,7 +68,7 @@ class StagedFunctions:
         return (self.prepare, *self.functions.values(), *self.of_robot.values(), *of_loops)
 
 
-def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
+def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> StagedFunctions:
     """Return the functions that the generated C calls.
 
     * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent with several poses where a
@@ -79,6 +80,7 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation;
     * ``signs``: numbers that are positive in home's assembly of the joints at every pose; absent without any.
+    * ``held``: what the case's fixed numbers make hold, and the gradients of its equations; absent without any.
 
     Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
     the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a
@@ -91,6 +93,7 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
         program: the program.
         size: (1, 1) size of the objective without cancellation.
         prefix: beginning of the functions' names.
+        held: what the fixed numbers make hold.
     """
     x, loops = program.x, find_loops(program)
     several = len(program.robots) > 1
@@ -118,6 +121,8 @@ def stage_functions(program: Program, size: SX, prefix: str) -> StagedFunctions:
     signs = ca.vertcat(SX(0, 1), *[robot.signs for robot in program.robots])
     if signs.numel():
         outputs["signs"] = [signs]
+    if held.items:
+        outputs["held"] = [held.values, ca.jacobian(held.values[: held.equations], x).T]
     if loops:
         del outputs["limits"]
         outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T.nz[:]]

@@ -116,10 +116,9 @@ def _check_pairs(nlp: Nlp) -> None:
     Raises:
         CaseError: there are too many.
     """
-    counts = [family.values.numel() for family in nlp.families]
-    pairs = sum(
-        count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, nlp.families, strict=True)
-    )
+    families = (*nlp.families, *nlp.fixed_families)
+    counts = [family.values.numel() for family in families]
+    pairs = sum(count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, families, strict=True))
     if pairs > _MOST_PAIRS:
         fault = f"gives {pairs} constraints on pairs of poses, and C is generated for at most {_MOST_PAIRS}"
         raise CaseError("pose", fault, nlp.case.pose_count, nlp.case.source)

@@ -66,6 +66,8 @@ def assemble(
         g_upper=frozen_vector([item.upper for item in bounded]),
         constant_limits=layout.constant_limits,
         families=layout.families,
+        implied=layout.implied,
+        fixed_families=layout.fixed_families,
     )
     _check_limbs(nlp)
     return nlp

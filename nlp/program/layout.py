@@ -81,6 +81,9 @@ class Layout:
         constraints: constraints that depend on a variable, and limits that do not hold.
         constant_limits: limits that depend on no variable and hold.
         families: limits on many pairs, which are no constraints yet.
+        implied: equations that the fixed numbers make hold, so that they are no constraints: those of loops that follow
+            from the others, and lengths of fixed directions.
+        fixed_families: limits on many pairs of fixed values, of which the tightest one stands for all.
     """
 
     case: Case
@@ -90,6 +93,8 @@ class Layout:
     constraints: tuple[BoundedConstraint, ...]
     constant_limits: tuple[BoundedConstraint, ...] = ()
     families: tuple[PairFamily, ...] = ()
+    implied: tuple[BoundedConstraint, ...] = ()
+    fixed_families: tuple[PairFamily, ...] = ()
 
 
 class StatedPoseSymbols(NamedTuple):
@@ -151,13 +156,14 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ]
     constraints = [item for pose in stated for item in pose.constraints]
     constraints += [
-        BoundedConstraint(Constraint(f"|{item.name}|", ca.sumsqr(placed.symbols), _LENGTH_OF_DIRECTION), 1.0, 1.0)
+        _unit_length(item.name, placed.symbols)
         for item, placed in zip(model.parameters, parameters, strict=True)
         if item.is_direction
     ]
     values = ca.vertcat(SX(0, 1), *[placed.symbols for placed in parameters])
     robots: list[RobotInstance] = []
     loops: list[BoundedConstraint] = []
+    following: list[BoundedConstraint] = []
     poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.displacements]
     for k, (rotation, position) in enumerate(poses):
         own_unknowns = ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]])
@@ -173,8 +179,10 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         ]
     if model.loops:
         own = [each.places[0].index for at_pose in unknowns for each in at_pose]
-        loops = [loops[k] for k in needed_equations([item.constraint.expression for item in loops], table, own)]
-    constraints = _variable_constraints(case, [*constraints, *loops], table)
+        needed = needed_equations([item.constraint.expression for item in loops], table, own)
+        following = [item for k, item in enumerate(loops) if k not in needed]
+        loops = [loops[k] for k in needed]
+    varying, fixed = _divided(case, [*constraints, *loops], table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
     limits = limit_constraints(
         case,
@@ -197,7 +205,17 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
             for x, y, z in [placed.places]
         ),
     )
-    return Layout(case, table, places, tuple(robots), (*constraints, *limits.varying), limits.constant, limits.families)
+    return Layout(
+        case,
+        table,
+        places,
+        tuple(robots),
+        (*varying, *limits.varying),
+        limits.constant,
+        limits.families,
+        (*following, *fixed),
+        limits.fixed_families,
+    )
 
 
 def _reference(case: Case) -> tuple[float, ...]:
@@ -221,6 +239,11 @@ def _unknown_prefixes(case: Case) -> list[str]:
     """Return the prefix of the names of the unknowns at each pose; an empty one for a single pose."""
     count = case.pose_count
     return [f"at{k + 1}_" for k in range(count)] if count > 1 else [""]
+
+
+def _unit_length(name: str, direction: SX) -> BoundedConstraint:
+    """Return the equation that a direction (3, 1) has the length 1."""
+    return BoundedConstraint(Constraint(f"|{name}|", ca.sumsqr(direction), _LENGTH_OF_DIRECTION), 1.0, 1.0)
 
 
 def _displace(rotation: SX, position: SX, step: Displacement) -> tuple[SX, SX]:
@@ -252,16 +275,17 @@ def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
     return tuple(widened)
 
 
-def _variable_constraints(
+def _divided(
     case: Case, constraints: Sequence[BoundedConstraint], table: SymbolTable
-) -> list[BoundedConstraint]:
-    """Return the constraints that depend on a variable, and refuse a constant one that does not hold.
+) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
+    """Return the constraints that depend on a variable, and the others, and refuse one of these that does not hold.
 
     Raises:
         CaseError: a constraint that depends on fixed numbers alone does not hold.
     """
     x, p = table.variables_vector, table.arguments_vector
-    variable = []
+    variable: list[BoundedConstraint] = []
+    fixed: list[BoundedConstraint] = []
     for item in constraints:
         expression = item.constraint.expression
         if x.numel() and any(ca.which_depends(expression, x, 1, True)):
@@ -271,7 +295,8 @@ def _variable_constraints(
         if not item.lower - _ROUNDING <= value <= item.upper + _ROUNDING:
             fault = f"is {value:.6g} with these parameters, which are all fixed, and must be {item.lower:g}"
             raise CaseError(f"robot.parameters: {item.constraint.name}", fault, source=case.source)
-    return variable
+        fixed.append(item)
+    return variable, fixed
 
 
 def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
@@ -289,8 +314,9 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
         size = table.add(f"{prefix}angle", Dimension.ANGLE, angle)
         rotation = matrix_from_axis_angle(n.symbols, size.symbols)
         symbols, places = ca.vertcat(position.symbols, size.symbols), (*position.places, *size.places)
+        unit = [_unit_length(f"{prefix}axis", n.symbols)]
         return StatedPoseSymbols(
-            rotation, position.symbols, places, symbols, HeldRotation(size.places[0]), [], pose.displacements
+            rotation, position.symbols, places, symbols, HeldRotation(size.places[0]), unit, pose.displacements
         )
     smallest, largest = sizes_of_turn(angle)
     radius = math.sin(largest / 2)

@@ -36,11 +36,13 @@ class LimitConstraints(NamedTuple):
         varying: those that depend on the variables, and those that do not hold.
         constant: those that hold whatever is chosen, because they depend on fixed numbers alone.
         families: constraints on many pairs, none of which is among ``varying``.
+        fixed_families: those whose values are fixed; the tightest pair of each is among the others.
     """
 
     varying: tuple[BoundedConstraint, ...]
     constant: tuple[BoundedConstraint, ...]
     families: tuple[PairFamily, ...] = ()
+    fixed_families: tuple[PairFamily, ...] = ()
 
 
 class ProgramNumbers(NamedTuple):
@@ -68,10 +70,10 @@ def limit_constraints(
     """
     if not case.limits:
         return LimitConstraints((), ())
-    few, deferred = _sorted_families(list(_families(case, robots, named)), numbers)
+    few, deferred, fixed = _sorted_families(list(_families(case, robots, named)), numbers)
     limits = without_repeated(list(_constraints(case, robots, named, few)), numbers.x, numbers.p)
     if not limits:
-        return LimitConstraints((), (), deferred)
+        return LimitConstraints((), (), deferred, fixed)
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
     x, p = numbers.x, numbers.p
     free = ca.which_depends(expressions, x, 1, True) if numbers.bounds else [False] * len(limits)
@@ -85,20 +87,22 @@ def limit_constraints(
             key = next(filter(None, item.constraint.keys))
             raise CaseError(f"limits.{key}", f"has no finite value: {item.constraint.name}", source=case.source)
         (constant if holds and not varies else varying).append(item)
-    return LimitConstraints(tuple(varying), tuple(constant), deferred)
+    return LimitConstraints(tuple(varying), tuple(constant), deferred, fixed)
 
 
 class _SortedFamilies(NamedTuple):
-    """Pairs that are constraints from the start, and families whose pairs become constraints when they are needed."""
+    """Pairs that are constraints from the start, families whose pairs come when needed, and fixed families."""
 
     pairs: list[tuple[BoundedConstraint, ...]]
     deferred: tuple[PairFamily, ...]
+    fixed: tuple[PairFamily, ...]
 
 
 def _sorted_families(families: Sequence[PairFamily], numbers: ProgramNumbers) -> _SortedFamilies:
     """Return all pairs of few values, the tightest pair of fixed values, and the families of many values."""
     pairs: list[tuple[BoundedConstraint, ...]] = []
     deferred: list[PairFamily] = []
+    fixed: list[PairFamily] = []
     for family in families:
         count = int(family.values.numel())
         if count <= _ALL_PAIRS:
@@ -109,7 +113,8 @@ def _sorted_families(families: Sequence[PairFamily], numbers: ProgramNumbers) ->
             function = ca.Function("values", [numbers.x, numbers.p], [ca.densify(family.values)])
             order = np.argsort(function(0, numbers.values).full().ravel(), kind="stable")
             pairs.append(family.pair(int(order[0]), int(order[-1])))
-    return _SortedFamilies(pairs, tuple(deferred))
+            fixed.append(family)
+    return _SortedFamilies(pairs, tuple(deferred), tuple(fixed))
 
 
 def _families(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[PairFamily]:

@@ -105,6 +105,7 @@ class Nlp(Whole):
             program.
         families: limits on many pairs of values. Of their pairs only those in ``pairs`` are constraints; see
             :mod:`.pairs`.
+        implied, fixed_families: what else the fixed numbers make hold, as in :class:`~.layout.Layout`.
         pairs: family, first and second index of these pairs; their constraints are the program's last.
         pair_count: number of constraints that these pairs have.
         in_home_mode: whether a search of the whole box keeps to home's working mode of a robot given joint by joint.
@@ -122,6 +123,8 @@ class Nlp(Whole):
     g_upper: FloatArray
     constant_limits: tuple[BoundedConstraint, ...] = ()
     families: tuple[PairFamily, ...] = ()
+    implied: tuple[BoundedConstraint, ...] = ()
+    fixed_families: tuple[PairFamily, ...] = ()
     pairs: tuple[PairPlace, ...] = ()
     pair_count: int = 0
     in_home_mode: bool = False

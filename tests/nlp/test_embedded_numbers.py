@@ -1,0 +1,125 @@
+"""Generated C with other fixed numbers than the case's own, judged by formulas that are not the program's."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from screwsynth.models import robot_function
+from screwsynth.nlp import CompiledCase, case_from_tables, formulate, generate_c, load_compiled
+from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.embedding.held import held_by_fixed_numbers
+
+BENCH = Path(__file__).parents[2] / "bench" / "soak"
+OK, INFEASIBLE = 0, 2
+
+PLATE = """
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+
+[robot.parameters]
+x1 = 0.2
+x2 = { min = 0.05, max = 0.15 }
+x3 = 10
+x4 = { min = 3, max = 27 }
+
+[pose]
+position = [0, 0, { min = 0.25, max = 0.4 }]
+
+[[task]]
+name = "turn"
+sense = "max"
+axis = [0, 1, 0]
+point = [0, 0, 0.22]
+pitch = 0
+
+[limits]
+joint_spacing = { min = 0.04 }
+"""
+
+
+def delta_tables() -> dict[str, Any]:
+    """A Delta whose platform is held without rotation: three of its loop equations follow from the others."""
+    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 0}
+    tables["solve"]["starts"] = 2
+    return tables
+
+
+def compiled(tables: dict[str, Any], name: str, folder: Path) -> CompiledCase:
+    if not any(shutil.which(each) for each in ("cc", "gcc", "clang")):
+        pytest.skip("no C compiler is installed")
+    for file, text in generate_c(case_from_tables(tables, name=name, source=name), "").items():
+        (folder / file).write_text(text, encoding="utf-8")
+    return load_compiled(folder)
+
+
+def numbers(own: CompiledCase, **changed: float) -> np.ndarray:
+    """The case's fixed numbers, some of them changed."""
+    values = {each.name: each.default for each in own.parameters}
+    assert changed.keys() <= values.keys()
+    return np.array(list((values | changed).values()))
+
+
+def test_loops_that_closed_by_a_fixed_number_are_judged(tmp_path: Path) -> None:
+    sys.path.append(str(BENCH))
+    formulas: ModuleType = importlib.import_module("formulas")
+    own = compiled(delta_tables(), "delta", tmp_path)
+    names = [each.name for each in own.variables]
+
+    def gap(x: np.ndarray, p: np.ndarray) -> float:
+        """Largest difference of a rod's length between its joints from its own, by the positions of the joints."""
+        at = dict(zip(names, x.reshape(-1, 1), strict=True))
+        at |= dict(zip([each.name for each in own.parameters], p.reshape(-1, 1), strict=True))
+        return float(np.abs(formulas.delta(at).equations).max())
+
+    for angle in (0.0, 1e-4, 0.1):
+        p = numbers(own, angle=angle)
+        for seeds in (1, 16):
+            found = own.solve(None, p, seeds=seeds)
+            assert (gap(found.x[0], p) < 1e-8) == (found.status[0] == OK), angle
+            assert (found.violation[0] <= 1e-9) == (found.status[0] == OK)
+            assert found.status[0] == (OK if angle == 0 else INFEASIBLE)
+    # All starting points of the case's own numbers still end at an optimum.
+    low, high = (np.array([getattr(each, end) for each in own.variables]) for end in ("lower", "upper"))
+    starts = low + (high - low) * np.random.default_rng(0).uniform(size=(300, len(low)))
+    assert set(own.solve(starts, numbers(own), seeds=2).status.tolist()) == {OK}
+    # An axis that is no direction gives no rotation.
+    assert own.solve(None, numbers(own, axis_z=2.0)).status[0] == INFEASIBLE
+
+
+def test_limits_on_fixed_numbers_are_judged(tmp_path: Path) -> None:
+    own = compiled(tomllib.loads(PLATE), "plate", tmp_path)
+
+    def spacing(x1: float, x3: float) -> float:
+        """Least distance of the base's joints: at angles x3 beside three directions on a circle of radius x1."""
+        angles = np.radians(np.array([0, 120, 240])[:, None] + np.array([-x3, x3])).ravel()
+        return min(2 * x1 * abs(np.sin((a - b) / 2)) for a, b in itertools.combinations(angles, 2))
+
+    for x1, x3 in ((0.2, 10.0), (0.2, 5.0), (0.2, 5.75), (0.1, 10.0), (0.3, 5.0)):
+        # In C an angle is in radians.
+        p = numbers(own, x1=x1, x3=np.radians(x3))
+        for least in (None, 0.045, 0.06):
+            limit = 0.04 if least is None else least
+            found = own.solve(None, p, limits={} if least is None else {"joint_spacing.min": least})
+            assert found.status[0] == (OK if spacing(x1, x3) >= limit else INFEASIBLE), (x1, x3, least)
+
+
+def test_what_fixed_numbers_make_hold_is_kept() -> None:
+    nlp = formulate(case_from_tables(delta_tables(), name="delta", source="delta"))
+    held = held_by_fixed_numbers(nlp)
+    loops = [each.name for each in nlp.program.constraints if each.name.startswith("loop")]
+    found = [each.constraint.name for each in held.items]
+    every = [each.name for each in nlp.case.model.closure]
+    assert sorted([*loops, *found[: held.equations]]) == sorted(every)
+    assert found[held.equations :] == ["|axis|"]
