@@ -82,9 +82,12 @@ def unknowns_at(model: Model, home: Mechanism, there: Mechanism) -> Array:
     names = {each.name for each in home.joints if each.kind in ("R", "P", "H")}
     rows, wanted = [each.expression for each in model.closure], [0.0] * len(model.closure)
     for each in model.joints:
-        if each.name in names and len(each.coordinates) == 1 and each.coordinates[0].cosine is None:
-            rows.append(each.coordinates[0].value)
-            wanted.append(coordinate(home, there, each.name))
+        for k, own in enumerate(each.coordinates):
+            # The mechanism has the axes of universal and cylindrical joints one by one.
+            name = each.name if len(each.coordinates) == 1 else f"{each.name}.{k + 1}"
+            if name in names and own.cosine is None:
+                rows.append(own.value)
+                wanted.append(coordinate(home, there, name))
     residual = ca.vertcat(SX0, *rows) - ca.DM(wanted)
     function = ca.Function(
         "at", symbols.all, [ca.densify(residual), ca.densify(ca.jacobian(residual, symbols.unknowns))]
