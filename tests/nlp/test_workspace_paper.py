@@ -520,4 +520,4 @@ def test_the_shipped_workspace_is_accepted(cli: Run, tmp_path: Path) -> None:
     assert (code, err) == (0, "")
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
-    assert out.startswith("holds: 57 of 57 claims")
+    assert out.startswith("holds: 58 of 58 claims")
