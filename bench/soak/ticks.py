@@ -35,8 +35,6 @@ FORMULAS: Mapping[str, Callable[[Mapping[str, Array]], State]] = {
     "planar-3-rrr": planar,
     "3-rps": tripod,
 }
-#: Limits that are not judged: the program merges constraints that agree at its samples.
-NOT_JUDGED = ("leg_clearance.min",)
 
 
 @dataclass
@@ -86,8 +84,6 @@ class Robot:
         """Return the largest excess (m,) over a limit or out of a closed loop, in parts of the limit's size."""
         most = np.zeros(len(limits))
         for column, key in zip(limits.T, self.keys, strict=True):
-            if key in NOT_JUDGED:
-                continue
             values = state.limits[key]
             with np.errstate(all="ignore"):
                 off = column[:, None] - values if key.endswith(".min") else values - column[:, None]
@@ -142,7 +138,7 @@ def next_tick(robot: Robot, x: Array, p: Array, rng: np.random.Generator) -> Tic
         here = values.min(axis=1) if is_least else values.max(axis=1)
         factor = 1 + (-1 if is_least else 1) * rng.choice([0.0, 1e-9, 1e-3, 0.05, -1e-3, -0.05], m)
         own = robot.compiled.limits[j]
-        most = min(own.most, robot.limits[j]) if key in ("angle.max", *NOT_JUDGED) else own.most
+        most = min(own.most, robot.limits[j]) if key == "angle.max" else own.most
         with np.errstate(all="ignore"):
             wanted = np.clip(here * factor, own.above + 1e-3 * abs(robot.limits[j]), most)
         change = (rng.random(m) < 0.15) & np.isfinite(wanted) & (np.abs(wanted) < 10 * np.abs(robot.limits[j]))
