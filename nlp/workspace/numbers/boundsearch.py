@@ -8,7 +8,6 @@ bounds alone.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -16,14 +15,28 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ....models import FloatArray
-from ...interruption import reason_of, reason_to_stop
+from ...certificate.boxes.search import (
+    TOO_SMALL,
+    Boxes,
+    Columns,
+    Effort,
+    Rule,
+    Search,
+    Verdicts,
+    bisected,
+    some,
+)
 from ..posebox import PoseBox
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..paper.record import TreeRecord
 
 #: Number of boxes examined at once.
-_BLOCK = 256
+_BLOCK = 512
+#: Value below which gaps are parts of this one.
+_NEAR_ZERO = 1e-6
 #: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
 _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
@@ -94,96 +107,114 @@ def prove_minimum(
         interrupted: whether the work is requested to stop.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
-    began = time.perf_counter()
-    y, value = _good_point(oracle, box)
+    effort = Effort(time_limit, interrupted=interrupted)
+    rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
     lower, upper = box.lower[None], box.upper[None]
-    nothing = Bounds(np.array([-math.inf]), oracle.bounds(lower, upper).shares)
-    state = _State(lower, upper, nothing, math.inf, y, value, 0)
-
-    def run() -> str:
-        nonlocal state
-        while len(state.bounds.lower) and state.least < _target(state.value, gap, limit, slack):
-            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
-            if reason:
-                return reason
-            state = _after_step(state, oracle, box, gap, limit, slack, recorder)
-        return ""
-
-    reason, count = reason_of(run), len(state.bounds.lower)
-    least = min(state.least, state.value)
-    return Minimum(least, state.value, state.y, state.boxes, count, time.perf_counter() - began, reason)
+    root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
+    search = Search(rule, root, block=_BLOCK, whole=box.upper - box.lower, least=(0.0, 0.0), is_best_first=True)
+    reason = effort.run(search, rule.ending(search))
+    value, y = rule.best
+    least = min(-search.state.bound, value)
+    return Minimum(least, value, y, search.boxes, search.state.open, effort.seconds, reason)
 
 
-class _State(NamedTuple):
-    """A search after a step: open boxes, the smallest bound of the closed ones, the best pose, and boxes examined."""
+class Goal(NamedTuple):
+    """The bound that a search of a smallest value is to reach.
 
-    lower: FloatArray
-    upper: FloatArray
-    bounds: Bounds
-    closed: float
-    y: FloatArray
+    Attributes:
+        gap: allowed distance of the bound from the smallest value known.
+        limit: the search ends once the bound is at least this; None without one.
+        slack: how far a value may be below the limit and still count as on it.
+        is_relative: whether the gap is a part of the value, and is to be met where the limit is decided too.
+    """
+
+    gap: float
+    limit: float | None
+    slack: float
+    is_relative: bool = False
+
+    def bound(self, value: float) -> float:
+        """Return the bound at which a box is closed, and at which the search ends, for the smallest value known."""
+        gap = self.gap * max(abs(value), _NEAR_ZERO) if self.is_relative else self.gap
+        met = value - gap if math.isfinite(value) else math.inf
+        if self.limit is None or value < self.limit - self.slack:
+            return met
+        undecided = self.limit if value >= self.limit else self.limit - self.slack
+        return max(met, undecided) if self.is_relative and math.isfinite(met) else undecided
+
+
+class Value(NamedTuple):
+    """A value, and the point that has it."""
+
     value: float
-    boxes: int
-
-    @property
-    def least(self) -> float:
-        """The smallest bound of all boxes."""
-        return min(self.closed, float(self.bounds.lower.min(initial=math.inf)))
+    at: FloatArray
 
 
-def _after_step(
-    state: _State,
-    oracle: Oracle,
-    box: PoseBox,
-    gap: float,
-    limit: float | None,
-    slack: float,
-    recorder: TreeRecord | None,
-) -> _State:
-    """Return the state after the boxes with the smallest bounds were bisected."""
-    lower, upper, (bound, shares), closed, y, value, boxes = state
-    order = np.argpartition(bound, min(_BLOCK, len(bound)) - 1)
-    now, later = order[:_BLOCK], order[_BLOCK:]
-    part_lower, part_upper, parents = lower[now], upper[now], bound[now]
-    split = np.argmax(np.where(part_upper > part_lower, shares[now], -1.0), axis=1)
-    every = np.arange(len(now))
-    middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
-    left, right = part_upper.copy(), part_lower.copy()
-    left[every, split] = right[every, split] = middle
-    halves = np.concatenate([part_lower, right]), np.concatenate([left, part_upper])
-    children = box.contracted(*halves)
-    if recorder is not None:
-        recorder.cuts(part_lower, part_upper, split)
-        recorder.contractions(halves, (children.lower, children.upper), children.outside)
-    kept = ~children.outside
-    new_lower, new_upper = children.lower[kept], children.upper[kept]
-    at = oracle.bounds(new_lower, new_upper)
-    found = np.fmax(at.lower, np.concatenate([parents, parents])[kept])
-    centres = box.clipped(0.5 * new_lower + 0.5 * new_upper)
-    values = oracle.values(centres)
-    if len(values) and float(np.nanmin(values)) < value:
-        y, value = centres[int(np.nanargmin(values))], float(np.nanmin(values))
-    done = found >= max(value - gap, _target(value, gap, limit, slack))
-    return _State(
-        np.concatenate([lower[later], new_lower[~done]]),
-        np.concatenate([upper[later], new_upper[~done]]),
-        Bounds(np.concatenate([bound[later], found[~done]]), np.concatenate([shares[later], at.shares[~done]])),
-        min(closed, float(found[done].min(initial=math.inf))),
-        y,
-        value,
-        boxes + len(found),
-    )
+class SmallestValue(Rule[Columns]):
+    """Rule of the smallest value of a function over boxes; what is maximised is its negative.
+
+    Args:
+        goal: the bound that is to be reached.
+        best: the smallest value known.
+    """
+
+    def __init__(self, goal: Goal, best: Value) -> None:
+        self._goal, self.best = goal, best
+
+    def verdicts(self, left: Boxes[Columns]) -> Verdicts[Columns]:
+        """Close boxes whose bounds are good enough."""
+        done = -left.bound >= self._goal.bound(self.best.value)
+        return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), left.count)
+
+    def ending(self, search: Search[Columns]) -> Callable[[], str | None]:
+        """Return the function that ends a search: at its goal, or at a box that is too small for it."""
+
+        def reason() -> str | None:
+            state = search.state
+            if -state.bound >= self._goal.bound(self.best.value):
+                return ""
+            small = max((float(each.bound.max()) for each in state.small), default=-math.inf)
+            return TOO_SMALL if state.small and small >= state.bound else None
+
+        return reason
 
 
-def _target(value: float, gap: float, limit: float | None, slack: float) -> float:
-    """Return the bound at which a search ends: that of the gap, or of the limit where no value below it is known."""
-    if limit is None or value < limit - slack:
-        return value - gap
-    return limit if value >= limit else limit - slack
+class _OracleRule(SmallestValue[tuple[()]]):
+    """Rule of a function of the pose."""
+
+    def __init__(self, oracle: Oracle, box: PoseBox, goal: Goal, recorder: TreeRecord | None) -> None:
+        super().__init__(goal, _good_point(oracle, box))
+        self._oracle, self._box, self._recorder = oracle, box, recorder
+
+    @staticmethod
+    def split(lower: FloatArray, upper: FloatArray, found: Bounds) -> NDArray[np.intp]:
+        """Return the coordinates (B,) with the largest shares in the slack of the bounds of boxes."""
+        return np.asarray(np.argmax(np.where(upper > lower, found.shares, -1.0), axis=1))
+
+    def divided(self, boxes: Boxes[tuple[()]]) -> Boxes[tuple[()]]:
+        """Return the halves of boxes."""
+        if self._recorder is not None:
+            self._recorder.cuts(boxes.lower, boxes.upper, boxes.split)
+        return bisected(boxes)
+
+    def examine(self, boxes: Boxes[tuple[()]], target: float) -> Verdicts[tuple[()]]:
+        """Return bounds of boxes, contracted to the workspace, and take note of small values in them."""
+        parts = self._box.contracted(boxes.lower, boxes.upper)
+        if self._recorder is not None:
+            self._recorder.contractions((boxes.lower, boxes.upper), (parts.lower, parts.upper), parts.outside)
+        kept = ~parts.outside
+        lower, upper = parts.lower[kept], parts.upper[kept]
+        found = self._oracle.bounds(lower, upper)
+        centres = self._box.clipped(0.5 * lower + 0.5 * upper)
+        values = self._oracle.values(centres)
+        if len(values) and float(np.nanmin(values)) < self.best.value:
+            self.best = Value(float(np.nanmin(values)), centres[int(np.nanargmin(values))])
+        bound = np.fmin(-found.lower, boxes.bound[kept])
+        return self.verdicts(Boxes(lower, upper, bound, self.split(lower, upper, found), ()))
 
 
-def _good_point(oracle: Oracle, box: PoseBox) -> tuple[FloatArray, float]:
-    """Return a point with a small value, and the value."""
+def _good_point(oracle: Oracle, box: PoseBox) -> Value:
+    """Return a small value."""
     rng = np.random.default_rng(_SEED)
     points = np.concatenate([box.random(_POINTS, rng), _corners(box)])
     values = oracle.values(points)
@@ -197,7 +228,7 @@ def _good_point(oracle: Oracle, box: PoseBox) -> tuple[FloatArray, float]:
             y, value = around[best], float(values[best])
         else:
             step *= _SHRINK
-    return y, value
+    return Value(value, y)
 
 
 def _corners(box: PoseBox) -> FloatArray:
