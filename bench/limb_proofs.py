@@ -14,11 +14,11 @@ from pathlib import Path
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, load_case, solve
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.checker.proof import Proof, Statement, fingerprint
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "models")]
 from limb_cases import poses  # noqa: E402 - the tests' cases

@@ -14,17 +14,20 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.boxes import bounding, firstpass, tangents
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import engine_for, kernel
-from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
-from screwsynth.nlp.certificate.boxes.tapes import search_tape
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.enclosing import quadratic
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.proof.boxes import bounding
+from screwsynth.nlp.proof.boxes import first_pass as firstpass
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import engine_for
+from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
+from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.enclosure import quadratic_models as quadratic
+from screwsynth.nlp.proof.enclosure import tangent_bounds as tangents
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.jsondata import json_data
 
@@ -375,7 +378,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
 
 @pytest.mark.parametrize("engine", ["fortran", "c"])
 def test_an_engine_that_is_not_there_is_refused(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("screwsynth.nlp.certificate.boxes.engines.kernel", lambda: None)
+    monkeypatch.setattr("screwsynth.nlp.proof.boxes.engines.kernel", lambda: None)
     form = standard_form(formulate(load_case("paper-4.2-rotation")))
     with pytest.raises(ValueError, match="numpy"):
         engine_for(form, engine)

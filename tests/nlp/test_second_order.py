@@ -6,17 +6,18 @@ import pytest
 import random_graphs
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
-from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
-from screwsynth.nlp.certificate.boxes.firstpass import value_tape
-from screwsynth.nlp.certificate.enclosing import secondorder
-from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
-from screwsynth.nlp.certificate.enclosing.tape import Tape
-from screwsynth.nlp.certificate.standardform import Condition, StandardForm, standard_form
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import KernelEngine
+from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
+from screwsynth.nlp.proof.boxes.first_pass import value_tape
+from screwsynth.nlp.proof.enclosure import second_order as secondorder
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.first_order import midpoints
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.second_order import Forms, enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.tape import Tape
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
 

@@ -10,21 +10,21 @@ from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import Case, Free, Rotation
 from screwsynth.nlp.case.settings import Search
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.limbs import sharedsearch
-from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb, first_largest
-from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
-from screwsynth.nlp.certificate.paper.limbs.sharedtree import Leaf, leaf_bytes, read_shared
-from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
-from screwsynth.nlp.certificate.paper.limbs.tilts import sum_of_tilts, tilts_over
-from screwsynth.nlp.certificate.paper.proof import Node, Proof, ProofError, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
+from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
+from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.limbs.sharedtree import Leaf, leaf_bytes, read_shared
+from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
+from screwsynth.nlp.proof.checker.limbs.tilts import sum_of_tilts, tilts_over
+from screwsynth.nlp.proof.checker.proof import Node, Proof, ProofError, Statement, fingerprint
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
 GAP = 1e-2

@@ -11,12 +11,12 @@ from casadi import SX
 from limb_cases import machine
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.standardform import Condition, StandardForm, standard_form
-from screwsynth.nlp.certificate.symmetry import grouped, halved, mirrors
+from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
+from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.statement.limb_separation import separate
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 
 @cache

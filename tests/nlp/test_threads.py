@@ -5,10 +5,10 @@ import pytest
 from limb_cases import poses
 
 from screwsynth.nlp import Case, formulate, load_case
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.engines import kernel
-from screwsynth.nlp.certificate.boxes.threads import Threads, pieces
-from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.proof.boxes.threads import Threads, pieces
+from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.enclosure.engine import kernel
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
