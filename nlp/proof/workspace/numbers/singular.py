@@ -3,8 +3,8 @@
 The smallest singular value is 1 over the largest of the inverse, which is affine in the coordinates but for a rest
 (:mod:`.inverse`). The norm ``(tr (P P')^m)^(1/2m)`` is convex in P, not below the largest singular value and close to
 it, so that its largest value over the affine part is that at a corner of a box. The largest singular value of J itself
-is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i| <= 1``, the rows of :mod:`..regular.rows`
-divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
+is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i| <= 1``, the rows of
+:mod:`..regular.rows` divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres up to t change J by a matrix whose Frobenius norm bounds the change of every singular value
 (H. Weyl). With l the shortest length of a leg, the unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and
