@@ -29,7 +29,7 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.boxes.search import BoxSearch
-from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
@@ -51,17 +51,18 @@ from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
 #: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
-WATCHED = tuple(str(ROOT / name) for name in ("workspace", "certificate", "interruption.py"))
+WATCHED = tuple(str(ROOT / name) for name in ("proof", "interruption.py"))
 LOOPS = (
     str(ROOT / "interruption.py"),
-    *(str(ROOT / "certificate" / name) for name in ("branchandbound.py", "incumbent.py")),
-    *(str(ROOT / "certificate" / "boxes" / name) for name in ("boxsearch.py", "openboxes.py")),
-    *(str(ROOT / "certificate" / "limbs" / name) for name in ("limbsearch.py", "sharedsearch.py")),
-    *(str(ROOT / "workspace" / name) for name in ("judge.py", "looplimits.py", "scale.py")),
-    *(str(ROOT / "workspace" / name / "search.py") for name in ("regular", "general")),
-    str(ROOT / "workspace" / "general" / "machinenumber.py"),
-    str(ROOT / "workspace" / "numbers" / "boundsearch.py"),
+    str(ROOT / "proof" / "certificate" / "branch_and_bound.py"),
+    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "open_boxes.py")),
+    *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
+    *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
+    *(str(ROOT / "proof" / "workspace" / name / "search.py") for name in ("regular", "ranks")),
+    *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("loop_limits.py", "bound_search.py")),
+    str(ROOT / "proof" / "workspace" / "tolerance" / "machine_number.py"),
 )
+assert all(Path(each).exists() for each in (*WATCHED, *LOOPS))
 
 
 class Claim(NamedTuple):
@@ -242,7 +243,7 @@ def limbs() -> Claim:
 def shared() -> Claim:
     """The limbs of a program that is small enough for a search of the whole box."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(branchandbound, "_WHOLE_BOX", 0)
+        patch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
         return certified("poses")
 
 

@@ -17,7 +17,7 @@ from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
 from screwsynth.nlp.proof.boxes.limbs.models import LimbEngine, LimbModels
 from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
 from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
-from screwsynth.nlp.proof.certificate import branch_and_bound as branchandbound
+from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.proof import Proof, Statement, fingerprint
@@ -187,7 +187,7 @@ def both_searches(seed: int) -> tuple[float, float]:
 
 
 def test_no_start_beats_a_bound_by_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     for seed in range(6):
         bound, best = both_searches(seed)
         assert bound >= best - 1e-9 * abs(best)
@@ -209,7 +209,7 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
         del sums
         return whole(engine, good, found, part, own, part.best, threshold)
 
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     monkeypatch.setattr(sharedsearch, "cut_own", careless)
     # No better incumbent is found, so a bound that is too low cannot hide behind it.
     monkeypatch.setattr(sharedsearch.SharedSearch, "_improve", lambda *_: None)

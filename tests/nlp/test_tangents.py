@@ -14,7 +14,7 @@ from screwsynth.nlp.proof.boxes.examination import Verdict
 from screwsynth.nlp.proof.boxes.first_pass import value_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure import tangent_bounds as tangents
+from screwsynth.nlp.proof.enclosure import tangent_bounds
 from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.proof.enclosure.first_order import midpoints
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
@@ -90,12 +90,12 @@ def test_no_function_is_above_its_form_with_tangents(name: str) -> None:
 
 def test_a_tangent_that_is_a_secant_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the test above: ``rho^2 D`` a hundredth too small."""
-    whole = tangents._sum
+    whole = tangent_bounds._sum
 
     def careless(rows: Forms, weights: np.ndarray) -> Forms:
         return whole(rows, np.where(weights > 0, weights * 0.99, weights))
 
-    monkeypatch.setattr(tangents, "_sum", careless)
+    monkeypatch.setattr(tangent_bounds, "_sum", careless)
     assert violations(minimum("paper-4.3"), 60)[0] > 0
 
 

@@ -31,7 +31,7 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
-from screwsynth.nlp.proof.workspace.tolerance import machine_number as machinenumber
+from screwsynth.nlp.proof.workspace.tolerance import machine_number
 from screwsynth.nlp.proof.workspace.tolerance.machines import Effort, Machines, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
@@ -295,9 +295,9 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    spread = machinenumber.by_centres
+    spread = machine_number.by_centres
     monkeypatch.setattr(firstorder, "_OUTWARDS", 0.8)
-    monkeypatch.setattr(machinenumber, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
 

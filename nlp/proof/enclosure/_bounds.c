@@ -1,4 +1,4 @@
-/* Kernel of the search of a whole box: the examination of boxes, as in enclosure.py, univariate.py, quadratic.py and
+/* Kernel of the search of a whole box: the examination of boxes, as in first_order.py, univariate.py, quadratic_models.py and
  * bounding.py.
  *
  * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its

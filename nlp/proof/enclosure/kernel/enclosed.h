@@ -1,4 +1,4 @@
-/* Enclosures of a tape's results over many boxes, for other searches than that of a whole box; enclosure.py. */
+/* Enclosures of a tape's results over many boxes, for other searches than that of a whole box; first_order.py. */
 #ifndef ENCLOSED_H
 #define ENCLOSED_H
 

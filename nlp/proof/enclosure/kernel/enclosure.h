@@ -1,4 +1,4 @@
-/* The interpreter of a tape over LANES boxes; enclosure.py. */
+/* The interpreter of a tape over LANES boxes; first_order.py. */
 #ifndef ENCLOSURE_H
 #define ENCLOSURE_H
 

@@ -1,4 +1,4 @@
-/* The examination of one box; bounding.py and limbmodels.py. */
+/* The examination of one box; bounding.py and limbs/models.py. */
 #ifndef EXAMINATION_H
 #define EXAMINATION_H
 
@@ -17,13 +17,13 @@ typedef struct {
     int *verdict, *reason, *split, *cut_lower, *cut_upper;
     double *bound, *value, *left_lower, *left_upper, *centre;
     int shared;     /* number of the first variables that other limbs have too */
-    double *models; /* of the Lagrangian and of the function's gradient, limbmodels.py; NULL without them */
+    double *models; /* of the Lagrangian and of the function's gradient, limbs/models.py; NULL without them */
     const double *least; /* (B) points with lesser values do not matter; NULL where all do */
 } Report;
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
 
-/* Writes row after row of a box's model: limbmodels.py names them. */
+/* Writes row after row of a box's model: limbs/models.py names them. */
 static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
 {
     int n = x->n, J = x->J, R = x->R;

@@ -1,4 +1,4 @@
-/* The first pass over a box, by forms of second order of its expressions alone; firstpass.py. */
+/* The first pass over a box, by forms of second order of its expressions alone; first_pass.py. */
 #ifndef FIRSTPASS_H
 #define FIRSTPASS_H
 

@@ -1,4 +1,4 @@
-/* Bounds of quadratic models over many boxes, and ends that reach levels, for the search by limbs; quadratic.py. */
+/* Bounds of quadratic models over many boxes, and ends that reach levels, for the search by limbs; quadratic_models.py. */
 #ifndef MODELS_H
 #define MODELS_H
 

@@ -1,4 +1,4 @@
-/* Upper models of the Lagrangian over one box, and their bounds; bounding.py and quadratic.py. */
+/* Upper models of the Lagrangian over one box, and their bounds; bounding.py and quadratic_models.py. */
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
@@ -6,7 +6,7 @@
 
 #define MULTIPLIER_ROUNDS 8
 #define TANGENT_ROUNDS 3
-#define LARGEST_WEIGHT 1e20 /* quadratic.py */
+#define LARGEST_WEIGHT 1e20 /* quadratic_models.py */
 
 /* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
@@ -70,7 +70,7 @@ static void choose_multipliers(Box *x, const int *equation, int first)
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form: quadratic.py's _integrate. */
+/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's _integrate. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
 {
     double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;

@@ -1,4 +1,4 @@
-/* The rank of a matrix over boxes, from forms of second order of its entries; workspace/general/rank.py. */
+/* The rank of a matrix over boxes, from forms of second order of its entries; workspace/ranks/rank_rule.py. */
 #ifndef RANK_H
 #define RANK_H
 

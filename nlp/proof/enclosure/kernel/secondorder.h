@@ -1,4 +1,4 @@
-/* The interpreter of a tape in forms of second order over LANES boxes; secondorder.py. */
+/* The interpreter of a tape in forms of second order over LANES boxes; second_order.py. */
 #ifndef SECONDORDER_H
 #define SECONDORDER_H
 

@@ -1,4 +1,4 @@
-/* Tangents to squares over a box: forms of second order of functions that take squared quotients away; tangents.py. */
+/* Tangents to squares over a box: forms of second order of functions that take squared quotients away; tangent_bounds.py. */
 #ifndef TANGENTS_H
 #define TANGENTS_H
 

@@ -1,4 +1,4 @@
-/* Types of the kernel: tapes, forms, and enclosures over LANES boxes at once; enclosure.py. */
+/* Types of the kernel: tapes, forms, and enclosures over LANES boxes at once; first_order.py. */
 #ifndef VALUES_H
 #define VALUES_H
 
