@@ -18,7 +18,7 @@ from screwsynth.nlp.proof.boxes.examination import Verdict
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.statement import standard_form
+from screwsynth.nlp.proof.statement import standard_form as statement
 from screwsynth.nlp.proof.statement.form import StandardForm
 from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
@@ -73,7 +73,7 @@ def test_bounds_are_those_of_the_search_with_unknowns(monkeypatch: pytest.Monkey
     solution = solve(at_home(robot_function("6-rus")()), starts=2)
     nlp = replace(solution.nlp, in_home_mode=True)
     own = certify_program(nlp, solution.x, claimed=solution.F)
-    monkeypatch.setattr(standard_form, "without_unknowns", with_unknowns)
+    monkeypatch.setattr(statement, "without_unknowns", with_unknowns)
     every = certify_program(nlp, solution.x, claimed=solution.F)
     assert own.status is every.status is CertificateStatus.PROVED
     assert solution.F <= own.bound <= 1.00011 * solution.F

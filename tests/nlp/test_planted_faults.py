@@ -33,7 +33,7 @@ from screwsynth.nlp.proof.workspace.regular.engines import KernelRankEngine
 from screwsynth.nlp.proof.workspace.regular.regularity import Rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 
-SOURCE = Path(__file__).parents[2] / "nlp" / "workspace" / "_workspace.c"
+SOURCE = Path(__file__).parents[2] / "nlp" / "proof" / "workspace" / "_workspace.c"
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 #: Compiling a copy takes a second.
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler")]

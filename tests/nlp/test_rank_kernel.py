@@ -34,7 +34,7 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 pytestmark = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
 
-FOLDER = Path(__file__).parents[2] / "nlp" / "certificate"
+FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 ALL_AXES, TURNS = TurnKind.ANY_AXIS, TurnKind.ROLL_PITCH_YAW
 
