@@ -376,7 +376,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
 
 @pytest.mark.parametrize("engine", ["fortran", "c"])
 def test_an_engine_that_is_not_there_is_refused(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("screwsynth.nlp.proof.enclosure.engine.kernel", lambda: None)
+    monkeypatch.setattr("screwsynth.nlp.proof.boxes.engines.kernel", lambda: None)
     form = standard_form(formulate(load_case("paper-4.2-rotation")))
     with pytest.raises(ValueError, match="numpy"):
         engine_for(form, engine)
