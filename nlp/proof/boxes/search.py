@@ -1,0 +1,376 @@
+"""Branch and bound over boxes: the loop of every search.
+
+A rule examines boxes: it closes them, or says what part is left, a bound over it and the coordinate to bisect. The loop
+takes examined boxes in an order, bisects them, has the halves examined, and keeps those that are open. Bounds are upper
+bounds of a value that is maximised; a rule without a value leaves them at 0.
+
+Everything that is claimed is one value, :class:`State`, which a step replaces by its last assignment: a search that is
+interrupted in a step claims what it did before.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import time
+from abc import ABC, abstractmethod
+from bisect import insort
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from ...interruption import Milestone, is_requested, reached, reason_of, reason_to_stop
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ....models import FloatArray
+
+#: Coordinates to bisect of boxes that are examined again as they are, and of those that are too small to be bisected.
+WHOLE, SMALL = -1, -2
+#: Reason for stopping at boxes below the least width.
+TOO_SMALL = "the boxes that are left are too small to be divided"
+#: With more open boxes than this the newest ones are taken first, so that a search needs no more memory.
+_MANY = 1_000_000
+#: With more open boxes than this those with the largest bounds are no longer looked for among all.
+_FEW = 50_000
+#: Seconds between two reports of progress.
+_REPORT_EVERY = 0.1
+
+
+
+class Order(enum.Enum):
+    """The boxes that a search takes first."""
+
+    NEWEST = "those of the step before: depth first"
+    LARGEST_CHUNK = "those of the step whose largest bound is the largest: cheap, for many boxes"
+    LARGEST = "those with the largest bounds; of many, as above"
+
+
+Columns = TypeVar("Columns")
+Rows = TypeVar("Rows")
+
+
+class Boxes(NamedTuple, Generic[Columns]):
+    """B boxes.
+
+    Attributes:
+        lower, upper: (B, n) ends.
+        bound: (B,) upper bounds.
+        split: (B,) coordinate to bisect; ``WHOLE`` for none.
+        more: columns that a rule carries: arrays (B, ...), or tuples of them.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    bound: FloatArray
+    split: NDArray[np.intp]
+    more: Columns
+
+    @property
+    def count(self) -> int:
+        """Number of boxes."""
+        return len(self.split)
+
+
+def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
+    """Return some rows of an array, or of all arrays of a tuple; other columns have a method ``some`` of their own."""
+    each: Any = rows
+    if isinstance(each, np.ndarray):
+        found = each[which]
+    elif isinstance(each, tuple):
+        parts = [some(part, which) for part in each]
+        found = type(each)(*parts) if hasattr(each, "_fields") else tuple(parts)
+    else:
+        found = each.some(which)
+    return found  # type: ignore[no-any-return]
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Return the rows of arrays, or of tuples of them, one after the other."""
+    first: Any = parts[0]
+    if len(parts) == 1:
+        found = first
+    elif isinstance(first, np.ndarray):
+        found = np.concatenate(parts)  # type: ignore[arg-type]
+    elif isinstance(first, tuple):
+        columns = [joined(each) for each in zip(*parts, strict=True)]  # type: ignore[call-overload]
+        found = type(first)(*columns) if hasattr(first, "_fields") else tuple(columns)
+    else:
+        found = first.joined(parts)
+    return found  # type: ignore[no-any-return]
+
+
+def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
+    """Return boxes that stay whole, then the lower halves of the others, then the upper ones."""
+    whole, cut = np.flatnonzero(boxes.split < 0), np.flatnonzero(boxes.split >= 0)
+    parts = some(boxes, np.concatenate([whole, cut, cut]))
+    low, split = len(whole) + np.arange(len(cut)), boxes.split[cut]
+    high = low + len(cut)
+    middle = 0.5 * parts.lower[low, split] + 0.5 * parts.upper[low, split]
+    parts.upper[low, split] = parts.lower[high, split] = middle
+    return parts
+
+
+class Verdicts(NamedTuple, Generic[Columns]):
+    """Results for boxes.
+
+    Attributes:
+        left: (O,) the parts of the open boxes that are left; those to be examined again have ``WHOLE`` to bisect.
+        closed: largest bound of what was closed or cut off.
+        examined: number of boxes examined.
+        again: (O,) whether a part that is too small to be bisected is to be examined again, as one that was moved; None
+            for no part.
+        is_better: whether a better point is known, for which boxes that are too small are examined again.
+        reasons: what a record of the search needs beside.
+    """
+
+    left: Boxes[Columns]
+    closed: float
+    examined: int
+    again: NDArray[np.bool_] | None = None
+    is_better: bool = False
+    reasons: Any = None
+
+
+class Rule(ABC, Generic[Columns]):
+    """Examination of boxes for a kind of claim."""
+
+    def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
+        """Return the parts of boxes, with what they carry: those that stay whole, all lower halves, all upper ones."""
+        return bisected(boxes)
+
+    @abstractmethod
+    def examine(self, boxes: Boxes[Columns], target: float) -> Verdicts[Columns]:
+        """Return the results for boxes, of which those with a bound of at most the target may be closed."""
+
+    def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
+        """Record a step for a proof.
+
+        Args:
+            boxes: the boxes before their examination.
+            found: its results.
+            split: (O,) coordinate along which each part that is left is bisected; ``WHOLE`` for those that are examined
+                again, and ``SMALL`` for those that are too small.
+        """
+
+
+#: Boxes in the order of a search, the next one last: their largest bound, a number that counts up, and themselves.
+_Chunk = tuple[float, int, Boxes[Columns]]
+
+
+class State(NamedTuple, Generic[Columns]):
+    """A search after a step.
+
+    Attributes:
+        waiting: examined boxes that are to be divided.
+        small: boxes that are too small to be divided.
+        closed: largest bound of what was closed.
+        examined: number of boxes examined.
+    """
+
+    waiting: list[_Chunk[Columns]]
+    small: list[Boxes[Columns]]
+    closed: float
+    examined: int
+
+    @property
+    def left(self) -> list[Boxes[Columns]]:
+        """All boxes that are left."""
+        return [*(boxes for _, _, boxes in self.waiting), *self.small]
+
+    @property
+    def open(self) -> int:
+        """Number of boxes that are left."""
+        return sum(each.count for each in self.left)
+
+    @property
+    def bound(self) -> float:
+        """Upper bound over the whole box; -inf where all of it is closed without one."""
+        waiting = self.waiting[-1][0] if self.waiting else -math.inf
+        return max([self.closed, waiting, *(float(each.bound.max()) for each in self.small)])
+
+
+class Search(Generic[Columns]):
+    """A search of a box.
+
+    Args:
+        rule: examines boxes.
+        root: the whole box.
+        block: number of boxes examined at once.
+        whole: (n,) widths of the whole box; those of 0 do not count.
+        least: width, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
+        order: the boxes that are taken first.
+
+    Attributes:
+        rule: examines boxes.
+        state: after the last complete step.
+    """
+
+    def __init__(
+        self,
+        rule: Rule[Columns],
+        root: Boxes[Columns],
+        *,
+        block: int,
+        whole: FloatArray,
+        least: tuple[float, float],
+        order: Order,
+    ) -> None:
+        self.rule, self._block, self._order = rule, block, order
+        self._columns = np.flatnonzero(whole > 0)
+        self._whole, self._least, self._newest = whole[self._columns], least, 0
+        self.state: State[Columns] = State([(math.inf, 0, root)], [], -math.inf, 0)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether boxes are left to be examined."""
+        return bool(self.state.waiting)
+
+    @property
+    def boxes(self) -> int:
+        """Number of boxes examined."""
+        return self.state.examined
+
+    def step(self, target: float) -> None:
+        """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
+        waiting, small = list(self.state.waiting), list(self.state.small)
+        parts = self.rule.divided(self._take(waiting))
+        found = self.rule.examine(parts, target)
+        split = self._divisions(found)
+        self.rule.record(parts, found, split)
+        if found.is_better:
+            for each in small:
+                self._put(waiting, each._replace(split=np.full(each.count, WHOLE)))
+            small = []
+        left = found.left._replace(split=split)
+        is_cut = split >= 0
+        if not is_cut.all():
+            self._put(waiting, some(left, split == WHOLE))
+            small += [some(left, split == SMALL)] * bool((split == SMALL).any())
+            left = some(left, is_cut)
+        self._put(waiting, left)
+        self.state = State(waiting, small, max(self.state.closed, found.closed), self.state.examined + found.examined)
+
+    def _divisions(self, found: Verdicts[Columns]) -> NDArray[np.intp]:
+        """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
+        lower, upper, bound, split, _ = found.left
+        every = np.arange(len(split))
+        low, high = lower[every, split], upper[every, split]
+        middle = 0.5 * low + 0.5 * high
+        width = ((upper - lower)[:, self._columns] / self._whole).max(axis=1, initial=0.0)
+        is_small = (width < np.where(np.isfinite(bound), self._least[1], self._least[0])) | ~(
+            (low < middle) & (middle < high)
+        )
+        once = False if found.again is None else found.again
+        return np.where(is_small & (split >= 0), np.where(once, WHOLE, SMALL), split)
+
+    def _put(self, waiting: list[_Chunk[Columns]], boxes: Boxes[Columns]) -> None:
+        """Add boxes."""
+        if boxes.count:
+            key = 0.0 if self._order is Order.NEWEST else float(boxes.bound.max())
+            self._newest += 1
+            insort(waiting, (key, self._newest, boxes))
+
+    def _take(self, waiting: list[_Chunk[Columns]]) -> Boxes[Columns]:
+        """Remove and return boxes whose parts are a block; there must be one.
+
+        Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
+        """
+        taken: list[Boxes[Columns]] = []
+        room, count = self._block, self.state.open
+        if self._order is Order.LARGEST and count <= _FEW:
+            waiting[:] = [(math.inf, 0, joined([boxes for _, _, boxes in waiting]))]
+        while waiting and room > 0:
+            place = max(range(len(waiting)), key=lambda k: waiting[k][1]) if count > _MANY else -1
+            boxes = waiting.pop(place)[2]
+            parts = np.where(boxes.split >= 0, 2, 1)
+            if parts.sum() > room:
+                is_newest = self._order is Order.NEWEST
+                order = np.arange(boxes.count) if is_newest else np.argsort(-boxes.bound, kind="stable")
+                fit = max(1, int(np.searchsorted(np.cumsum(parts[order]), room, side="right")))
+                self._put(waiting, some(boxes, order[fit:]))
+                boxes, room = some(boxes, order[:fit]), 0
+            taken.append(boxes)
+            room -= int(parts.sum())
+            if self._order is Order.NEWEST:
+                break
+        return joined(taken)
+
+
+class Steps(Protocol):
+    """A search that is run step by step."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether boxes are left to be examined."""
+
+    @property
+    def boxes(self) -> int:
+        """Number of boxes examined."""
+
+    def step(self, target: float) -> None:
+        """Examine some boxes, and close those whose bounds do not exceed a target."""
+
+
+def _now() -> float:
+    """Return the time; the clock of a test is put in its place later than this function is made."""
+    return time.perf_counter()
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long a search may take; its clock begins with it.
+
+    Attributes:
+        time_limit: seconds after which a search stops.
+        most_boxes: number of boxes after which it stops.
+        interrupted: whether the work is requested to stop.
+        progress: called with the seconds, about ten times a second.
+        began: time at the start.
+    """
+
+    time_limit: float | None = None
+    most_boxes: int | None = None
+    interrupted: Callable[[], bool] = is_requested
+    progress: Callable[[float], None] | None = None
+    began: float = field(default_factory=_now)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the start."""
+        return _now() - self.began
+
+    def run(
+        self,
+        search: Steps,
+        ending: Callable[[], str | None] = lambda: None,
+        target: Callable[[], float] = lambda: -math.inf,
+    ) -> str:
+        """Run a search until no box is open; return the reason for stopping before, or an empty text.
+
+        Args:
+            search: the search.
+            ending: returns the reason for ending, which is empty where the claim is decided; None for going on.
+            target: returns the bound up to which boxes may be closed.
+        """
+        return reason_of(lambda: self._run(search, ending, target))
+
+    def _run(self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
+        """Run a search that may be interrupted."""
+        reported = -math.inf
+        reached(Milestone.BOUND)
+        while True:
+            ended = ending()
+            if ended is not None or not search.is_open:
+                return ended or ""
+            seconds = self.seconds
+            reason = reason_to_stop(seconds, self.time_limit, self.interrupted, search.boxes, self.most_boxes)
+            if reason:
+                return reason
+            if self.progress is not None and seconds - reported >= _REPORT_EVERY:
+                reported = seconds
+                self.progress(seconds)
+            search.step(target())

@@ -1,0 +1,228 @@
+"""Smallest value of a function over a box of poses, from bounds of it over boxes: best-first bisection.
+
+The function is given by an :class:`Oracle`: lower bounds over boxes, and values at points. Its value at a point is an
+upper bound of the smallest value, improved by random steps from the best point known; what is proved rests on the
+bounds alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from .....models import FloatArray
+from ...boxes.search import TOO_SMALL, Boxes, Columns, Effort, Order, Rule, Search, Verdicts, bisected, some
+from ..robot.pose_box import PoseBox
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..proof_record import TreeRecord
+
+#: Number of boxes examined at once.
+_BLOCK = 512
+#: Value below which gaps are parts of this one.
+_NEAR_ZERO = 1e-6
+#: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
+_POINTS, _STEPS, _AROUND = 256, 24, 32
+#: Factor of the size of steps from one to the next.
+_SHRINK = 0.7
+_SEED = 0
+
+
+class Bounds(NamedTuple):
+    """Lower bounds (B,) over boxes, -inf without one, and the share (B, 6) of each coordinate in their slack."""
+
+    lower: FloatArray
+    shares: FloatArray
+
+
+class Oracle(Protocol):
+    """Bounds and values of a function of the pose."""
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        """Return lower bounds over boxes (B, 6)."""
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, 6)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """The smallest value of a function over the workspace.
+
+    Attributes:
+        bound: proven: no pose has a smaller value.
+        value: at ``y``.
+        y: (6,) the best pose known.
+        boxes, open: number of boxes examined, and of boxes left.
+        seconds: wall time.
+        reason: for stopping before the gap was met; else empty.
+    """
+
+    bound: float
+    value: float
+    y: FloatArray
+    boxes: int
+    open: int
+    seconds: float
+    reason: str
+
+
+def prove_minimum(
+    oracle: Oracle,
+    box: PoseBox,
+    *,
+    gap: float,
+    limit: float | None = None,
+    slack: float = 0.0,
+    time_limit: float | None = None,
+    interrupted: Callable[[], bool] = lambda: False,
+    recorder: TreeRecord | None = None,
+) -> Minimum:
+    """Prove the smallest value of a function over a box of poses.
+
+    Args:
+        oracle: the function.
+        box: the poses.
+        gap: allowed distance of the bound from the best value known, in the function's unit.
+        limit: the search ends, with a wider gap, once the bound is at least this, and not before, whatever the gap is,
+            while no value below it is known.
+        slack: how far a value may be below the limit and still count as on it.
+        time_limit: seconds after which the search stops with the bound reached.
+        interrupted: whether the work is requested to stop.
+        recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
+    """
+    effort = Effort(time_limit, interrupted=interrupted)
+    rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
+    lower, upper = box.lower[None], box.upper[None]
+    root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
+    search = Search(rule, root, block=_BLOCK, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
+    reason = effort.run(search, rule.ending(search))
+    value, y = rule.best
+    least = min(-search.state.bound, value)
+    return Minimum(least, value, y, search.boxes, search.state.open, effort.seconds, reason)
+
+
+class Goal(NamedTuple):
+    """The bound that a search of a smallest value is to reach.
+
+    Attributes:
+        gap: allowed distance of the bound from the smallest value known.
+        limit: the search ends once the bound is at least this; None without one.
+        slack: how far a value may be below the limit and still count as on it.
+        is_relative: whether the gap is a part of the value, and is to be met where the limit is decided too.
+    """
+
+    gap: float
+    limit: float | None
+    slack: float
+    is_relative: bool = False
+
+    def bounds(self, value: float) -> tuple[float, float]:
+        """Return the bounds at which a box is closed, and at which the search ends, for the smallest value known."""
+        gap = self.gap * max(abs(value), _NEAR_ZERO) if self.is_relative else self.gap
+        met = value - gap if math.isfinite(value) else math.inf
+        if self.limit is None or value < self.limit - self.slack:
+            return met, met
+        undecided = self.limit if value >= self.limit else self.limit - self.slack
+        closing = max(met, undecided) if math.isfinite(met) else undecided
+        return closing, closing if self.is_relative else undecided
+
+
+class Value(NamedTuple):
+    """A value, and the point that has it."""
+
+    value: float
+    at: FloatArray
+
+
+class SmallestValue(Rule[Columns]):
+    """Rule of the smallest value of a function over boxes; what is maximised is its negative.
+
+    Args:
+        goal: the bound that is to be reached.
+        best: the smallest value known.
+    """
+
+    def __init__(self, goal: Goal, best: Value) -> None:
+        self._goal, self.best = goal, best
+
+    def verdicts(self, left: Boxes[Columns]) -> Verdicts[Columns]:
+        """Close boxes whose bounds are good enough."""
+        done = -left.bound >= self._goal.bounds(self.best.value)[0]
+        return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), left.count)
+
+    def ending(self, search: Search[Columns]) -> Callable[[], str | None]:
+        """Return the function that ends a search: at its goal, or at a box that is too small for it."""
+
+        def reason() -> str | None:
+            state = search.state
+            if -state.bound >= self._goal.bounds(self.best.value)[1]:
+                return ""
+            small = max((float(each.bound.max()) for each in state.small), default=-math.inf)
+            return TOO_SMALL if state.small and small >= state.bound else None
+
+        return reason
+
+
+class _OracleRule(SmallestValue[tuple[()]]):
+    """Rule of a function of the pose."""
+
+    def __init__(self, oracle: Oracle, box: PoseBox, goal: Goal, recorder: TreeRecord | None) -> None:
+        super().__init__(goal, _good_point(oracle, box))
+        self._oracle, self._box, self._recorder = oracle, box, recorder
+
+    @staticmethod
+    def split(lower: FloatArray, upper: FloatArray, found: Bounds) -> NDArray[np.intp]:
+        """Return the coordinates (B,) with the largest shares in the slack of the bounds of boxes."""
+        return np.asarray(np.argmax(np.where(upper > lower, found.shares, -1.0), axis=1))
+
+    def divided(self, boxes: Boxes[tuple[()]]) -> Boxes[tuple[()]]:
+        """Return the halves of boxes."""
+        if self._recorder is not None:
+            self._recorder.cuts(boxes.lower, boxes.upper, boxes.split)
+        return bisected(boxes)
+
+    def examine(self, boxes: Boxes[tuple[()]], target: float) -> Verdicts[tuple[()]]:
+        """Return bounds of boxes, contracted to the workspace, and take note of small values in them."""
+        parts = self._box.contracted(boxes.lower, boxes.upper)
+        if self._recorder is not None:
+            self._recorder.contractions((boxes.lower, boxes.upper), (parts.lower, parts.upper), parts.outside)
+        kept = ~parts.outside
+        lower, upper = parts.lower[kept], parts.upper[kept]
+        found = self._oracle.bounds(lower, upper)
+        centres = self._box.clipped(0.5 * lower + 0.5 * upper)
+        values = self._oracle.values(centres)
+        if len(values) and float(np.nanmin(values)) < self.best.value:
+            self.best = Value(float(np.nanmin(values)), centres[int(np.nanargmin(values))])
+        bound = np.fmin(-found.lower, boxes.bound[kept])
+        return self.verdicts(Boxes(lower, upper, bound, self.split(lower, upper, found), ()))
+
+
+def _good_point(oracle: Oracle, box: PoseBox) -> Value:
+    """Return a small value."""
+    rng = np.random.default_rng(_SEED)
+    points = np.concatenate([box.random(_POINTS, rng), _corners(box)])
+    values = oracle.values(points)
+    best = int(np.nanargmin(values))
+    y, value, step = points[best], float(values[best]), 0.3
+    for _ in range(_STEPS):
+        around = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
+        values = oracle.values(around)
+        best = int(np.nanargmin(values))
+        if values[best] < value:
+            y, value = around[best], float(values[best])
+        else:
+            step *= _SHRINK
+    return Value(value, y)
+
+
+def _corners(box: PoseBox) -> FloatArray:
+    """Return the corners (64, 6) of the box, moved into the workspace."""
+    sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
+    return box.clipped(box.lower + sides * (box.upper - box.lower))
