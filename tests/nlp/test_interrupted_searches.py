@@ -36,7 +36,6 @@ from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
 from screwsynth.nlp.proof.workspace.regular import search as regular
 from screwsynth.nlp.proof.workspace.regular.search import prove_regular

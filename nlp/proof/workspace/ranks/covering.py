@@ -1,4 +1,4 @@
-"""Boxes of a robot that cover a workspace: the whole of it, and boxes contracted to its poses."""
+"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and rules for their search."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ..robot.posed_robot import Problem
-from .loop_boxes import Cells
+from .connected import is_connected
+from .krawczyk import Relation
+from .loop_boxes import Cells, Examined, Examiner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,11 +26,6 @@ def whole_workspace(problem: Problem) -> Cells:
     dependent = list(problem.dependent)
     lower[0, dependent] = upper[0, dependent] = np.nan
     return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
-
-
-def widths_of(cells: Cells, own: list[int], whole: FloatArray) -> FloatArray:
-    """Return the widths (B, f) of boxes along f coordinates, in parts of those (f,) of the whole box."""
-    return (cells.upper - cells.lower)[:, own] / np.where(whole > 0, whole, np.inf)
 
 
 def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
@@ -73,6 +71,81 @@ def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
     new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
     new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
     return Contracted(cells._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond)
+
+
+class Followed(NamedTuple):
+    """Columns of a search of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
+
+    near: FloatArray
+    is_known: NDArray[np.bool_]
+    relation: Relation
+
+
+class LoopRule(Rule[Followed]):
+    """Rule for boxes of a robot, in which dependent coordinates are followed.
+
+    Args:
+        problem: the robot.
+        examiner: follows the dependent coordinates, and has the test.
+
+    Attributes:
+        whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
+    """
+
+    def __init__(self, problem: Problem, examiner: Examiner) -> None:
+        self._problem, self._examiner, self._independent = problem, examiner, list(problem.independent)
+        self._start = whole_workspace(problem)
+        self.whole: FloatArray = np.zeros(len(problem.start))
+        self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
+        # The boxes in which dependent coordinates became known.
+        self._roots: list[Cells] = []
+
+    @property
+    def root(self) -> Boxes[Followed]:
+        """The whole workspace."""
+        k, f = len(self._problem.dependent), len(self._independent)
+        none = Relation(np.zeros((1, k)), np.zeros((1, k, f)), np.zeros((1, k)), np.zeros((1, k, 0)))
+        lower, upper, near, is_known = self._start
+        return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), Followed(near, is_known, none))
+
+    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the parts of boxes, with their dependent coordinates."""
+        parts, cut = bisected(boxes), int((boxes.split >= 0).sum())
+        sides = np.zeros((parts.count, len(parts.lower[0])))
+        high = np.arange(parts.count - cut, parts.count)
+        sides[high, parts.split[high]], sides[high - cut, parts.split[high]] = 1.0, -1.0
+        sides[parts.split < 0] = 0.0
+        cells = Cells(parts.lower, parts.upper, parts.more.near, parts.more.is_known)
+        found = self._examiner.narrowed(cells, parts.more.relation, sides[:, self._independent])
+        return parts._replace(lower=found.lower, upper=found.upper)
+
+    def examined(self, boxes: Boxes[Followed]) -> Examined:
+        """Return the results for the boxes that hold poses of the workspace."""
+        cells = self._contracted(Cells(boxes.lower, boxes.upper, boxes.more.near, boxes.more.is_known))
+        found = self._examiner.examine(cells)
+        new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
+        if new.size:
+            self._roots.append(some(found.cells, new))
+        return found
+
+    def _contracted(self, cells: Cells) -> Cells:
+        """Return boxes contracted to the workspace."""
+        return in_workspace(self._problem, cells)
+
+    def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
+        """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""
+        lower, upper, near, is_known = found.cells
+        columns = np.array(self._independent)[split]
+        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation))
+
+    def widths(self, found: Examined) -> FloatArray:
+        """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
+        own, whole = self._independent, self.whole[self._independent]
+        return (found.cells.upper - found.cells.lower)[:, own] / np.where(whole > 0, whole, np.inf)
+
+    def is_one_assembly(self) -> bool:
+        """Return whether the boxes surely belong to one assembly."""
+        return not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
 
 
 def in_workspace(problem: Problem, cells: Cells) -> Cells:

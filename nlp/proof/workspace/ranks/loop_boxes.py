@@ -299,33 +299,31 @@ class Examiner:
             lower[:, D], upper[:, D] = np.minimum(low, high), np.maximum(low, high)
         return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
 
-    def halves(self, found: Examined, split: NDArray[np.int64]) -> Cells:
-        """Return the halves of boxes along independent coordinates, first the lower ones.
+    def narrowed(self, cells: Cells, relation: Relation, sides: FloatArray) -> Cells:
+        """Return parts of boxes with the ends of their dependent coordinates.
 
         Args:
-            found: the examined boxes.
-            split: (B,) place of the coordinate among the independent ones.
+            cells: parts (B,) of boxes, with the dependent coordinates of the whole.
+            relation: of the whole.
+            sides: (B, f) -1 or 1 for an independent coordinate in its lower or upper half, 0 for a whole one.
         """
-        cells, (off, T, rho, _) = found.cells, found.relation
-        rho = rho + found.relation.of_errors
-        every, column = np.arange(len(split)), np.array(self._independent)[split]
-        middle = 0.5 * cells.lower[every, column] + 0.5 * cells.upper[every, column]
-        parts = []
-        for side in (-1.0, 1.0):
-            lower, upper = cells.lower.copy(), cells.upper.copy()
-            (upper if side < 0 else lower)[every, column] = middle
-            if self.count and cells.is_known.any():
-                # The coordinate lies in [-1, 0] or [0, 1] of the whole box, and a little beyond for rounding.
-                own = T[every, :, split]
-                reach = np.abs(T).sum(axis=2) - 0.5 * np.abs(own) + rho
-                reach = reach + 1e-12 * (np.abs(off) + np.abs(T).sum(axis=2) + rho)
-                centre = off - 0.5 * side * own
-                for place, j in enumerate(self._dependent):
-                    mid = 0.5 * cells.lower[:, j] + 0.5 * cells.upper[:, j]
-                    half = 0.5 * (cells.upper[:, j] - cells.lower[:, j]) * (1 + _ROUNDING)
-                    low = mid + half * np.maximum(centre[:, place] - reach[:, place], -1.0) - _ROUNDING * np.abs(mid)
-                    high = mid + half * np.minimum(centre[:, place] + reach[:, place], 1.0) + _ROUNDING * np.abs(mid)
-                    lower[:, j] = np.where(cells.is_known, np.minimum(low, high), np.nan)
-                    upper[:, j] = np.where(cells.is_known, np.maximum(low, high), np.nan)
-            parts.append(Cells(lower, upper, cells.near, cells.is_known))
-        return joined(parts)
+        D, known = self._dependent, cells.is_known
+        if not D or not known.any():
+            return cells
+        (off, T, rho, _), size = relation, np.abs(relation.T)
+        rho = rho + relation.of_errors
+        total = size.sum(axis=2)
+        # A half lies in [-1, 0] or [0, 1] of the whole box, and a little beyond for rounding.
+        reach = total - 0.5 * (size @ np.abs(sides)[:, :, None])[:, :, 0] + rho
+        reach = reach + 1e-12 * (np.abs(off) + total + rho)
+        centre = off - (T @ (0.5 * sides)[:, :, None])[:, :, 0]
+        middle = 0.5 * cells.lower[:, D] + 0.5 * cells.upper[:, D]
+        half = 0.5 * (cells.upper[:, D] - cells.lower[:, D]) * (1 + _ROUNDING)
+        slack = _ROUNDING * np.abs(middle)
+        with np.errstate(all="ignore"):
+            low = middle + half * np.maximum(centre - reach, -1.0) - slack
+            high = middle + half * np.minimum(centre + reach, 1.0) + slack
+        lower, upper = cells.lower.copy(), cells.upper.copy()
+        lower[:, D] = np.where(known[:, None], np.minimum(low, high), np.nan)
+        upper[:, D] = np.where(known[:, None], np.maximum(low, high), np.nan)
+        return cells._replace(lower=lower, upper=upper)

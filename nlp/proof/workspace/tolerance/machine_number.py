@@ -12,31 +12,27 @@ first; errors never are. Values are those of machines whose errors are along the
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
-from ....interruption import reason_of, reason_to_stop
+from ...boxes.search import Boxes, Effort, Order, Search, Verdicts, some
 from ...enclosure.forms import Forms
-from ..ranks.connected import is_connected
-from ..ranks.covering import in_workspace, whole_workspace, widths_of
+from ..numbers.bound_search import Goal, SmallestValue, Value
+from ..ranks.covering import Followed, LoopRule
 from ..ranks.krawczyk import ROUNDING, Relation, by_centres
-from ..ranks.loop_boxes import Cells, Examined, Examiner, joined
+from ..ranks.loop_boxes import Examiner
 from ..ranks.rank_rule import Tested
 from ..robot.tolerance_model import Family
-from .machine_points import MachinePoints, PointValue
+from .machine_points import MachinePoints
 
 #: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
-_BLOCK, _TRIED = 128, 8
-#: Width of a box, in parts of the whole box, below which it is not bisected.
-_LEAST_WIDTH = 2.0**-24
-#: Value below which gaps are parts of this one.
-_NEAR_ZERO = 1e-6
+_BLOCK, _TRIED = 256, 8
+#: Widths of a box, in parts of the whole box, below which it is not bisected.
+_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 
 
 class _Bound:
@@ -115,105 +111,44 @@ def smallest_of_machines(
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    search = _Search(family, expression, engine)
-    return search.run(gap, limit, slack, time_limit, interrupted)
+    effort = Effort(time_limit, interrupted=interrupted)
+    rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True), engine)
+    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
+    reason = effort.run(search, rule.ending(search))
+    bound, (value, z) = -search.state.bound, rule.best
+    bound = min(bound, value)
+    if math.isfinite(bound) and not rule.is_one_assembly():
+        bound, reason = -math.inf, "the assemblies in two neighbouring boxes are not proved to be the same"
+    return MachineMinimum(
+        bound=bound if math.isfinite(bound) else -math.inf,
+        value=value if math.isfinite(value) else math.nan,
+        z=z if math.isfinite(value) else None,
+        boxes=search.boxes,
+        seconds=effort.seconds,
+        reason=reason,
+    )
 
 
-class _State(NamedTuple):
-    """What is left after a step: open boxes, and the smallest bound of those that are closed."""
+class _MachineRule(LoopRule, SmallestValue[Followed]):
+    """Rule of an expression over all machines."""
 
-    open: Examined
-    closed: float
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Lower bounds of the open boxes; nothing is known of a box in which dependent coordinates are not."""
-        return np.where(self.open.cells.is_known, self.open.smallest, -np.inf)
-
-
-class _Search:
-    """The state of a search."""
-
-    def __init__(self, family: Family, expression: SX, engine: str | None) -> None:
-        self._began, self._family, problem = time.perf_counter(), family, family.problem
-        self._examiner = Examiner(problem, _Bound(expression), engine, family)
+    def __init__(self, family: Family, expression: SX, goal: Goal, engine: str | None) -> None:
+        LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), engine, family))
+        SmallestValue.__init__(self, goal, Value(math.inf, family.start))
         self._points = MachinePoints(family, expression)
-        self._independent, self._dependent = list(problem.independent), list(problem.dependent)
-        whole = whole_workspace(problem)
-        self._whole = (whole.upper - whole.lower)[0, self._independent]
-        self._roots: list[Cells] = []
-        self._best = PointValue(math.inf, family.start)
-        self._boxes = 0
-        self._state = _State(self._examined(whole), math.inf)
 
-    def run(
-        self, gap: float, limit: float | None, slack: float, time_limit: float | None, interrupted: Callable[[], bool]
-    ) -> MachineMinimum:
-        """Search until the gap is met and the limit decided."""
-
-        def run() -> str:
-            while len(self._state.open.smallest):
-                (found, closed), bounds = self._state, self._state.bounds
-                if min(closed, float(bounds.min())) >= self._target(gap, limit, slack):
-                    break
-                reason = reason_to_stop(time.perf_counter() - self._began, time_limit, interrupted)
-                if reason:
-                    return reason
-                order = np.argpartition(bounds, min(_BLOCK, len(bounds)) - 1)
-                now, later = found.some(order[:_BLOCK]), found.some(order[_BLOCK:])
-                width = widths_of(now.cells, self._independent, self._whole)
-                if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
-                    return "the boxes that are left are too small to be divided"
-                score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-                split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
-                following = _State(later.followed_by(self._examined(self._examiner.halves(now, split))), closed)
-                done = following.bounds >= self._target(gap, limit, slack)
-                least = float(following.bounds[done].min(initial=math.inf))
-                self._state = _State(following.open.some(np.flatnonzero(~done)), min(closed, least))
-            return ""
-
-        return self._result(reason_of(run))
-
-    def _target(self, gap: float, limit: float | None, slack: float) -> float:
-        """Return the bound at which the search ends."""
-        value = self._best.value
-        target = value - gap * max(abs(value), _NEAR_ZERO) if math.isfinite(value) else math.inf
-        if limit is None or value < limit - slack:
-            return target
-        undecided = limit if value >= limit else limit - slack
-        return max(target, undecided) if math.isfinite(target) else undecided
-
-    def _examined(self, cells: Cells) -> Examined:
+    def examine(self, boxes: Boxes[Followed], target: float) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
-        cells = in_workspace(self._family.problem, cells)
-        found = self._examiner.examine(cells)
-        self._boxes += len(cells.lower)
-        new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
-        if new.size:
-            self._roots.append(found.cells.some(new))
+        found = self.examined(boxes)
         known = np.flatnonzero(found.cells.is_known & np.isfinite(found.smallest))
         if known.size:
             order = np.argsort(found.smallest[known])[:_TRIED]
-            best = self._points.smallest_in(found.cells.some(known[order]))
-            if best is not None and best.value < self._best.value:
-                self._best = best
-        return found
-
-    def _result(self, reason: str) -> MachineMinimum:
-        """Return the result at this state of the search."""
-        bound = min(self._state.closed, float(self._state.bounds.min(initial=math.inf)), self._best.value)
-        if (
-            self._dependent
-            and math.isfinite(bound)
-            and not is_connected(self._examiner, joined(self._roots), self._independent)
-        ):
-            bound, reason = -math.inf, "the assemblies in two neighbouring boxes are not proved to be the same"
-        has_point = math.isfinite(self._best.value)
-        return MachineMinimum(
-            bound=bound if math.isfinite(bound) else -math.inf,
-            value=self._best.value if has_point else math.nan,
-            z=self._best.z if has_point else None,
-            boxes=self._boxes,
-            seconds=time.perf_counter() - self._began,
-            reason=reason,
-        )
+            best = self._points.smallest_in(some(found.cells, known[order]))
+            if best is not None and best.value < self.best.value:
+                self.best = best
+        width = self.widths(found)
+        score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
+        split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+        # Nothing is known of a box in which dependent coordinates are not.
+        bound = np.where(found.cells.is_known, -found.smallest, np.inf)
+        return self.verdicts(self.boxes_of(found, bound, split))

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
 from ...statement.machine import INSIDE
+from ..numbers.bound_search import Value
 from ..ranks.loop_boxes import Cells, are_between
 from ..regular.inverse import inverses
 from ..robot.tolerance_model import Family
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
 _INSIDE = 1e-13
-
-
-class PointValue(NamedTuple):
-    """A value of an expression, and the coordinates (n + 3 m,) of the machine and the pose that have it."""
-
-    value: float
-    z: FloatArray
 
 
 class MachinePoints:
@@ -62,13 +54,13 @@ class MachinePoints:
             found[:, D] = 0.0
         return found
 
-    def smallest_in(self, cells: Cells) -> PointValue | None:
+    def smallest_in(self, cells: Cells) -> Value | None:
         """Return the smallest value at few points of boxes; None where no loops close in them.
 
         The errors are along the gradient at the middle of a box, with the pose there or in the corner that the gradient
         points to.
         """
-        best: PointValue | None = None
+        best: Value | None = None
         centre = cells.centre
         with np.errstate(all="ignore"):
             z = self.closed(np.hstack([centre, np.zeros((len(centre), self._family.errors.numel()))]))
@@ -84,7 +76,7 @@ class MachinePoints:
                 if np.isfinite(values).any():
                     k = int(np.nanargmin(values))
                     if best is None or values[k] < best.value:
-                        best = PointValue(float(values[k]), moved[k])
+                        best = Value(float(values[k]), moved[k])
         return best
 
     def _steepest(self, slopes: FloatArray) -> FloatArray:
