@@ -14,11 +14,12 @@ from ..case.workspace import Workspace
 from ..interruption import is_requested, one_call
 from ..program.layout import Layout
 from .anybuilt.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
-from .anyrobot import Ranks, not_judged, prove_ranks, touched
+from .anyrobot import Ranks, not_judged, prove_ranks
 from .builtlegs import as_built, refined
 from .claims import SPECTRAL, Claim, claims_of
 from .closedlayout import closed_layout, reach_claims
 from .general.problem import NotJudgedError
+from .general.search import RankProgress
 from .homeposes import Homes
 from .looplimits import loop_extremes
 from .machine import Legs, check_leg_error, legs_of, workspace_of_case
@@ -29,7 +30,6 @@ from .numbers.robotlimits import limited_spectrum
 from .numbers.strokes import with_strokes
 from .posebox import PoseBox, pose_box
 from .posed import posed_layout
-from .regular.search import RankProgress, prove_regular
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
@@ -133,7 +133,15 @@ def judge_workspace(
     ranks = (
         Ranks(not_judged(box, unknown), None)
         if unknown
-        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
+        else prove_ranks(
+            closed.model,
+            homes,
+            legs=legs,
+            engine=engine,
+            time_limit=time_limit,
+            progress=rank_progress,
+            paper=paper,
+        )
     )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
@@ -154,24 +162,6 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -
         return machines_of(case, closed.model, box), ""
     except NotJudgedError as error:
         return None, str(error)
-
-
-def _ranks(
-    closed: ClosedForm,
-    homes: Homes,
-    legs: Legs | None,
-    engine: str | None,
-    time_limit: float | None,
-    progress: RankProgress | None,
-    paper: PaperRecord | None,
-) -> Ranks:
-    """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
-    case, box = homes.case, homes.box
-    if legs is not None:
-        recorder = None if paper is None else paper.rank
-        found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
-        return Ranks(touched(case, box, found), None)
-    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,8 @@ class _Bound:
         known = np.isfinite(lower)
         # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
         shares = np.abs(by_pose) + rest[:, None] / max(by_pose.shape[1], 1)
-        return Tested(np.zeros(len(c), dtype=bool), np.nan_to_num(shares), np.where(known, lower, -np.inf))
+        none = np.zeros(len(c), dtype=np.int32)
+        return Tested(none.astype(bool), np.nan_to_num(shares), np.where(known, lower, -np.inf), none)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from casadi import SX
 
 from ....models import FloatArray
 from ..machine import INSIDE
-from ..regular.inverse import inverses
 from .cells import Cells, are_between
 from .family import Family
+from .relation import inverses
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
 _INSIDE = 1e-13

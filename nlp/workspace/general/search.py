@@ -11,7 +11,6 @@ import numpy as np
 
 from ....models import FloatArray, frozen_array
 from ...interruption import Milestone, reached, reason_of, reason_to_stop
-from ..regular.search import REPORT_EVERY, RankProgress
 from ..verdict import Outcome, Regularity
 from .cells import Cells, Examined, Examiner, joined
 from .connected import is_connected
@@ -20,8 +19,7 @@ from .family import Family
 from .matrices import RankMatrix
 from .problem import Problem
 from .rank import RankTest
-from .singularmachine import SingularMachine
-from .singularpose import SingularPose
+from .refuters import NewtonRefuter, Refuter, Singular
 
 if TYPE_CHECKING:
     from ..paper.record import TreeRecord
@@ -30,15 +28,11 @@ if TYPE_CHECKING:
 _BLOCK = 1024
 #: Width of a box, in parts of the whole box, below which it is not bisected.
 _LEAST_WIDTH = 2.0**-24
-#: Smallest singular value, in parts of the largest, from which Newton's method looks for a singular pose, and most
-#: attempts.
-_SMALL, _MOST = 0.1, 24
-#: Number of boxes after which a singular machine is looked for first; later ones are twice as many each.
-_FIRST = 64
-#: Part of the value before at which it tries again.
-_SMALLER = 0.6
-#: How a singular pose of this search is known.
-BY_NEWTON = "found singular to 1e-10 by Newton's method"
+#: Seconds between two reports of progress.
+REPORT_EVERY = 0.1
+
+#: Callback with seconds, number of boxes examined, and number of boxes open.
+RankProgress = Callable[[float, int, int], None]
 
 
 def prove_rank(
@@ -51,7 +45,7 @@ def prove_rank(
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
-    is_shown: Callable[[FloatArray], bool] = lambda _: True,
+    refuter: Refuter | None = None,
 ) -> Regularity:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -64,12 +58,13 @@ def prove_rank(
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
-        is_shown: whether a singular point (n,), or (n + 3 m,) of another machine, is one in home's assembly.
+        refuter: looks for singular poses; Newton's method if left out.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, family, engine, recorder, is_shown)
+    refuter = NewtonRefuter(problem, matrix, family) if refuter is None else refuter
+    search = _Search(problem, matrix, family, engine, recorder, refuter)
     return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
 
 
@@ -96,14 +91,10 @@ class _Search:
         family: Family | None,
         engine: str | None,
         recorder: TreeRecord | None,
-        is_shown: Callable[[FloatArray], bool],
+        refuter: Refuter,
     ) -> None:
         self._began = time.perf_counter()
-        self._problem, self._family, self._recorder, self._is_shown = problem, family, recorder, is_shown
-        self._newton, self._machine = (
-            SingularPose(problem, matrix),
-            None if family is None else SingularMachine(family, family.matrix(matrix)),
-        )
+        self._problem, self._recorder, self._refuter = problem, recorder, refuter
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
             built = family.matrix(matrix)
@@ -115,10 +106,7 @@ class _Search:
         self._state = _State([whole], [], 0)
         # The boxes in which dependent coordinates became known.
         self._roots: list[Cells] = []
-        self._attempts, self._last = 0, _SMALL
-        # Number of boxes from which a singular machine is looked for, although no pose of the design is near to one.
-        self._due = _FIRST
-        self._singular: FloatArray | None = None
+        self._singular: Singular | None = None
 
     def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
@@ -144,7 +132,8 @@ class _Search:
             new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
             if new.size:
                 self._roots.append(found.cells.some(new))
-            if self._is_refuted(found, boxes):
+            self._singular = self._refuter.look(found, boxes)
+            if self._singular is not None:
                 self._state = self._state._replace(boxes=boxes)
                 return ""
             halves, undivided = self._halves(found)
@@ -170,37 +159,6 @@ class _Search:
             if j < len(free):
                 lower[:, free[j]], upper[:, free[j]] = cells.lower[:, j], cells.upper[:, j]
         return lower, upper
-
-    def _is_refuted(self, found: Examined, boxes: int) -> bool:
-        """Return whether a singular pose is found from the worst of these boxes."""
-        values = np.where(found.is_regular, np.inf, found.smallest)
-        order = np.argsort(values)[:2]
-        for k in order:
-            if not values[k] < self._last or self._attempts >= _MOST:
-                break
-            self._attempts += 1
-            near = self._newton.search(self._middle(found.cells, k))
-            self._singular = self._if_shown(near)
-            if self._singular is not None:
-                return True
-            # A singular pose of another assembly says nothing about where one of home's is.
-            self._last = _SMALLER * float(values[k]) if near is None else self._last
-        if self._machine is None or boxes < self._due or not np.isfinite(values[order[0]]):
-            return False
-        self._due = 2 * boxes
-        self._singular = self._if_shown(self._machine.search(self._middle(found.cells, order[0])))
-        return self._singular is not None
-
-    def _if_shown(self, z: FloatArray | None) -> FloatArray | None:
-        """Return a singular point if it is one in home's assembly: Newton's method may end in another one."""
-        return z if z is not None and self._is_shown(z) else None
-
-    def _middle(self, cells: Cells, k: np.int64) -> FloatArray:
-        """Return a point (n,) in the middle of a box, with closed loops or near them."""
-        z: FloatArray = cells.near[k].copy()
-        own = [*self._independent, *self._problem.dependent]
-        z[own] = cells.centre[k, own]
-        return z
 
     def _halves(self, found: Examined) -> tuple[list[Cells], list[Cells]]:
         """Return the halves of the open boxes, and those that are too small to bisect."""
@@ -228,12 +186,9 @@ class _Search:
         """Return the verdict at this state of the search."""
         problem = self._problem
         outcome, y, share, left = Outcome.PROVED, None, 0.0, [*self._state.stack, *self._state.small]
-        centres = None
-        if self._singular is not None:
-            outcome, reason = Outcome.REFUTED, BY_NEWTON
-            if self._family is not None and len(self._singular) > len(problem.start):
-                centres = self._family.errors_of(self._singular)
-            y = problem.pose_of(self._singular)
+        singular = self._singular
+        if singular is not None:
+            outcome, reason, y = Outcome.REFUTED, singular.reason, singular.y
         elif left:
             outcome, cells = Outcome.OPEN, joined(left)
             own = [j for j in self._independent if self._whole[self._independent.index(j)] > 0]
@@ -248,12 +203,13 @@ class _Search:
             outcome=outcome,
             box=problem.box,
             y=None if y is None else frozen_array(y, (6,)),
-            sides=None,
+            sides=None if singular is None else singular.sides,
             engine=self._examiner.engine,
             boxes=self._state.boxes,
             open=self._state.open,
             share=share,
             seconds=time.perf_counter() - self._began,
             reason="" if outcome is Outcome.PROVED else reason,
-            centres=centres,
+            errors=None if singular is None else singular.errors,
+            centres=None if singular is None else singular.centres,
         )

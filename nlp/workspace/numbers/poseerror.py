@@ -24,9 +24,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ....models import FloatArray
+from ..general.relation import inverses
 from ..machine import Legs
 from ..posebox import PoseBox
-from ..regular.inverse import CORNERS, inverse_over, inverses
+from ..regular.inverse import CORNERS, inverse_over
 from ..regular.rows import expand
 from .boundsearch import Bounds
 
