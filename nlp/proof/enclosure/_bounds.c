@@ -208,16 +208,16 @@ static PyObject *models(PyObject *module, PyObject *args)
 
 static PyObject *rank(PyObject *module, PyObject *args)
 {
-    PyObject *tuple, *at, *scale, *constant, *arrays[5];
+    PyObject *tuple, *at, *scale, *constant, *arrays[6], *change = Py_None;
     Tape tape = {0};
     Matrix matrix = {0};
     Ranks found = {0};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(iiiOOO)(OOOOO)n", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
+    if (!PyArg_ParseTuple(args, "iO!(iiiOOO)(OOOOOO)n|O", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
                           &matrix.nullity, &at, &scale, &constant, &arrays[0], &arrays[1], &arrays[2], &arrays[3],
-                          &arrays[4], &found.B))
+                          &arrays[4], &arrays[5], &found.B, &change))
         return NULL;
     int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t B = found.B, D = sizeof(double), E = matrix.entries = tape.outputs;
@@ -228,6 +228,8 @@ static PyObject *rank(PyObject *module, PyObject *args)
     good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
     good = good && (found.regular = borrow(&all, arrays[2], B, sizeof(int), 1));
     good = good && (found.shares = borrow(&all, arrays[3], n * B, D, 1)) && (found.smallest = borrow(&all, arrays[4], B, D, 1));
+    good = good && (found.sign = borrow(&all, arrays[5], B, sizeof(int), 1));
+    good = good && (change == Py_None || (found.change = borrow(&all, change, E * B, D, 0)));
     for (Py_ssize_t e = 0; good && e < E; e++)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;
@@ -251,8 +253,9 @@ static PyObject *rank(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"rank", rank, METH_VARARGS,
-     "rank(n, tape, (rows, columns, nullity, at, scale, constant), (lower, upper, regular, shares, smallest), B)\n\n"
-     "Judge the rank of a matrix over B boxes: arrays (n, B), (B,) of int, (n, B) and (B,)."},
+     "rank(n, tape, (rows, columns, nullity, at, scale, constant), (lower, upper, regular, shares, smallest, sign), B,\n"
+     "     change=None)\n\n"
+     "Judge the rank of a matrix over B boxes: arrays (n, B), (B,) of int, (n, B), (B,) and (B,) of int; (entries, B)."},
     {"models", models, METH_VARARGS,
      "models(n, (middle, b, H, w, slope_lo, slope_hi, rounding), B, bound)\n"
      "models(n, (...), B, level, low, high)\n\n"

@@ -23,8 +23,8 @@ from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.leg_numbers import own_searches, pose_errors
 from .numbers.robot_limits import limited_spectrum
 from .numbers.strokes import with_strokes
-from .ranks.ranks import Ranks, not_judged, prove_ranks, touched
-from .regular.search import RankProgress, prove_regular
+from .ranks.ranks import Ranks, not_judged, prove_ranks
+from .ranks.search import RankProgress
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
 from .tolerance.legs.limits import as_built, refined
@@ -132,7 +132,15 @@ def judge_workspace(
     ranks = (
         Ranks(not_judged(box, unknown), None)
         if unknown
-        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
+        else prove_ranks(
+            closed.model,
+            homes,
+            legs=legs,
+            engine=engine,
+            time_limit=time_limit,
+            progress=rank_progress,
+            paper=paper,
+        )
     )
     judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
     if not with_limits or (until_fault and not judged.is_regular):
@@ -153,24 +161,6 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -
         return machines_of(case, closed.model, box), ""
     except NotJudgedError as error:
         return None, str(error)
-
-
-def _ranks(
-    closed: ClosedForm,
-    homes: Homes,
-    legs: Legs | None,
-    engine: str | None,
-    time_limit: float | None,
-    progress: RankProgress | None,
-    paper: PaperRecord | None,
-) -> Ranks:
-    """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
-    case, box = homes.case, homes.box
-    if legs is not None:
-        recorder = None if paper is None else paper.rank
-        found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
-        return Ranks(touched(case, box, found), None)
-    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
 
 
 @dataclass(frozen=True, eq=False)

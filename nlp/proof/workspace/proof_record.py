@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ...program.nlp import Nlp
     from ..certificate.certificate import Certificate
     from ..statement.claims import Claim
-    from .regular.regularity import RankExamination
 
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
@@ -41,22 +40,16 @@ class TreeRecord:
         self._moved: dict[bytes, bytes] = {}
         self._cuts: dict[bytes, tuple[bytes, bytes, bytes]] = {}
 
-    def ranks(self, lower: FloatArray, upper: FloatArray, found: RankExamination) -> None:
-        """Record boxes (B, 6) that were examined for regular rows.
-
-        Args:
-            lower: their lower ends before the examination.
-            upper: their upper ends.
-            found: its results; an open box is cut next.
-        """
-        # The numbers of ``Rank``: open boxes are cut, and those outside are leaves of their own kind.
-        outside, open_ = found.verdict == 2, found.verdict == 0
-        self._add(lower, upper, found.lower, found.upper, found.split, open_, outside)
-
     def cuts(self, lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]) -> None:
         """Record boxes (B, 6) that are cut in the middle of a coordinate each, (B,)."""
-        every = np.ones(len(lower), dtype=bool)
-        self._add(lower, upper, lower, upper, split, every, ~every)
+        keys, every = _keys(lower, upper), np.arange(len(lower))
+        middle = 0.5 * lower[every, split] + 0.5 * upper[every, split]
+        below, above = upper.copy(), lower.copy()
+        below[every, split] = above[every, split] = middle
+        cuts = zip(keys, split.tolist(), middle.tolist(), _keys(lower, below), _keys(above, upper), strict=True)
+        for key, i, value, one, other in cuts:
+            self._root = self._root or key
+            self._cuts[key] = split_bytes(i, value), one, other
 
     def contractions(
         self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
@@ -67,32 +60,6 @@ class TreeRecord:
                 self._outside.add(old)
             elif old != new:
                 self._moved[old] = new
-
-    def _add(
-        self,
-        lower: FloatArray,
-        upper: FloatArray,
-        low: FloatArray,
-        high: FloatArray,
-        split: NDArray[np.signedinteger],
-        cut: NDArray[np.bool_],
-        outside: NDArray[np.bool_],
-    ) -> None:
-        """Record boxes with ends before and after their contraction."""
-        keys = _keys(lower, upper)
-        if not self._root:
-            self._root = keys[0]
-        self._outside.update(keys[k] for k in np.flatnonzero(outside))
-        rows = np.flatnonzero(cut)
-        part_low, part_high, along = low[rows], high[rows], split[rows]
-        every = np.arange(rows.size)
-        middle = 0.5 * part_low[every, along] + 0.5 * part_high[every, along]
-        below, above = part_high.copy(), part_low.copy()
-        below[every, along] = above[every, along] = middle
-        for k, one, other, i, value in zip(
-            rows.tolist(), _keys(part_low, below), _keys(above, part_high), along.tolist(), middle.tolist(), strict=True
-        ):
-            self._cuts[keys[k]] = split_bytes(i, value), one, other
 
     def tree(self) -> bytes:
         """Return the tree: every box that was not cut is claimed to be closed."""
@@ -136,7 +103,6 @@ class PaperRecord:
     """Records of all searches about one machine.
 
     Attributes:
-        rank: of the search of singular poses.
         programs: of numbers, by name and sense.
         boxes: of searches of their own, by name.
         firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
@@ -145,7 +111,6 @@ class PaperRecord:
             of one machine.
     """
 
-    rank: TreeRecord = field(default_factory=TreeRecord)
     programs: dict[tuple[str, str], ProgramRecord] = field(default_factory=dict)
     boxes: dict[str, TreeRecord] = field(default_factory=dict)
     firsts: dict[str, float] = field(default_factory=dict)

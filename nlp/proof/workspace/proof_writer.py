@@ -147,8 +147,6 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Mo
     if found is None:
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
-        if legs_of(judged.case) is not None:
-            return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
         own = record.own(each.name)
         return _BEYOND if own.lacks_boxes else PaperClaim(each.name, "", "regular", tree=own.tree())
     if found.outcome is Outcome.REFUTED:

@@ -18,7 +18,8 @@ typedef struct {
 
 typedef struct {
     const double *lower, *upper; /* (n, B) */
-    int *regular;                /* (B) */
+    const double *change;        /* (entries, B) by how much entries may be off, or NULL */
+    int *regular, *sign;         /* (B), (B) of the determinant of a square matrix, else 0 */
     double *shares, *smallest;   /* (n, B), (B) */
     Py_ssize_t B;
 } Ranks;
@@ -94,15 +95,18 @@ static void null_space(const double *A, int rows, int columns, int nullity, doub
     }
 }
 
-/* Writes a left inverse C (columns, rows) of A (rows, columns) of full column rank; returns 0 where it has none. */
+/* Writes a left inverse C (columns, rows) of A (rows, columns) of full column rank; returns 0 where it has none, else the
+ * sign of the determinant of a square A: each reflection changes it. */
 static int left_inverse(const double *A, int rows, int columns, double *C, double *work)
 {
     double *M = work, *diagonal = work + rows * columns, *factors = diagonal + columns;
+    int sign = 1;
     memcpy(M, A, (size_t)(rows * columns) * sizeof(double));
     for (int k = 0; k < columns; k++) {
         factors[k] = reflect(M, rows, columns, k, &diagonal[k]);
         if (!(fabs(diagonal[k]) > 0))
             return 0;
+        sign = diagonal[k] > 0 ? -sign : sign;
     }
     for (int r = 0; r < rows; r++) {
         /* Column r of the transposed reflections, then back substitution. */
@@ -124,7 +128,7 @@ static int left_inverse(const double *A, int rows, int columns, double *C, doubl
             C[k * rows + r] = sum / diagonal[k];
         }
     }
-    return 1;
+    return sign;
 }
 
 /* About the largest singular value of a matrix (rows, columns). */
@@ -202,7 +206,7 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 
 /* Middles of the entries, the sizes of what moves about them, and what is left; the square of a coordinate is a half,
  * plus or minus as much. */
-static void middles_of(const Matrix *m, int n, Store out, RankParts x)
+static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
         Form2 *v = form2_of(out, e);
@@ -225,10 +229,13 @@ static void middles_of(const Matrix *m, int n, Store out, RankParts x)
             double rounding = (n + 6) * ULP * (fabs(v->c[l]) + half + size[l] + fabs(middle[l]));
             rest[l] = scale * (half + v->s[l] + rounding) * (1 + 4 * ULP), middle[l] *= scale, size[l] *= scale;
         }
+        for (int l = 0; found->change && l < LANES && start + l < found->B; l++)
+            rest[l] = (rest[l] + scale * found->change[e * found->B + start + l]) * (1 + 4 * ULP);
     }
 }
 
-/* Whether the middle of lane l has a left inverse, which goes into C; how singular it is. */
+/* Whether the middle of lane l has a left inverse, which goes into C: the sign of left_inverse, or 0; how
+ * singular it is. */
 static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
 {
     int rows = m->rows + m->nullity, c = m->columns, known = 1;
@@ -240,7 +247,7 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
     *smallest = known ? 0 : INFINITY;
     if (known && m->nullity)
         null_space(x.A, m->rows, c, m->nullity, x.A + m->rows * c, x.work);
-    int good = known && left_inverse(x.A, rows, c, x.inverse, x.work);
+    int good = known ? left_inverse(x.A, rows, c, x.inverse, x.work) : 0;
     for (int k = 0; k < rows * c; k++)
         x.C[k][l] = good ? x.inverse[k] : 0.0;
     if (!good)
@@ -255,7 +262,7 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
             x.bound[i * c + j][l] = fabs(sum - (i == j)) + PRODUCTS * (size + (i == j));
         }
     }
-    return 1;
+    return good;
 }
 
 /* Adds the parts of |I - C M| that move with the coordinates, and what is left. */
@@ -330,13 +337,14 @@ static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, dou
     for (Py_ssize_t start = 0; start < found->B; start += LANES) {
         load(&form, &report, NULL, start, found->B, lanes[0], lanes[1], lanes[2], lanes[3]);
         run2(tape, n, work, out, lanes[0], lanes[1], lanes[2], lanes[3], terms);
-        middles_of(m, n, out, parts);
+        middles_of(m, n, out, found, start, parts);
         int ready[LANES] = {0};
         EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l);
         add_moving(m, n, out, parts);
         for (int l = 0; l < LANES && start + l < found->B; l++) {
             double shares[64] = {0};
             found->regular[start + l] = ready[l] && judge_lane(m, n, l, parts, shares);
+            found->sign[start + l] = m->rows == m->columns && !m->nullity ? ready[l] : 0;
             for (int i = 0; i < n; i++)
                 found->shares[i * found->B + start + l] = shares[i];
         }

@@ -25,7 +25,8 @@ import numpy as np
 
 from .....models import FloatArray
 from ...statement.machine import Legs
-from ..regular.inverse import CORNERS, inverse_over, inverses
+from ..ranks.krawczyk import inverses
+from ..regular.inverse import CORNERS, inverse_over
 from ..regular.rows import expand
 from ..robot.pose_box import PoseBox
 from .bound_search import Bounds

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from .....models import FloatArray
 
+#: Reason for which nothing is claimed although every box is closed.
+APART = "the assemblies in two neighbouring boxes are not proved to be the same"
+
 
 def whole_workspace(problem: Problem) -> Cells:
     """Return the whole workspace as one box; its dependent coordinates are not known."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import casadi as ca
@@ -11,11 +12,11 @@ import numpy as np
 from .....models import FloatArray
 from ...boxes.first_pass import MOST_VARIABLES
 from ...enclosure.forms import Encloser, Forms
-from ..regular.inverse import inverses
 from ..robot.closed_loops import Loops
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
-from .krawczyk import Relation, are_contractions, by_centres, relation_of
+from .entry_change import EntryChange, is_polynomial
+from .krawczyk import Relation, are_contractions, by_centres, inverses, relation_of
 from .rank_rule import RankTest, Tested
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ class Examined(NamedTuple):
         is_regular: (B,) whether the matrix has full rank at every pose of the box.
         shares: (B, f) share of each independent coordinate in the bounds.
         smallest: (B,) smallest singular value at the middle, in parts of the largest; infinite where it is not known.
+        signs: (B,) those of :class:`~.rank.Tested`.
     """
 
     cells: Cells
@@ -91,23 +93,18 @@ class Examined(NamedTuple):
     is_regular: NDArray[np.bool_]
     shares: FloatArray
     smallest: FloatArray
+    signs: NDArray[np.int32]
 
     def some(self, which: NDArray[np.int64]) -> Examined:
         """Return the results for some of the boxes."""
         relation = Relation(*(each[which] for each in self.relation))
-        regular, shares, smallest = self.is_regular[which], self.shares[which], self.smallest[which]
-        return Examined(self.cells.some(which), relation, regular, shares, smallest)
+        return Examined(self.cells.some(which), relation, *(each[which] for each in self[2:]))
 
     def followed_by(self, other: Examined) -> Examined:
         """Return these results, then those of other boxes."""
         relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
-        return Examined(
-            joined([self.cells, other.cells]),
-            relation,
-            np.concatenate([self.is_regular, other.is_regular]),
-            np.concatenate([self.shares, other.shares]),
-            np.concatenate([self.smallest, other.smallest]),
-        )
+        rest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
+        return Examined(joined([self.cells, other.cells]), relation, *rest)
 
 
 class Test(Protocol):
@@ -134,9 +131,14 @@ class Examiner:
         engine: ``"c"``, ``"numpy"``, or None.
         family: all machines that are meant; None for the design alone.
 
+    Attributes:
+        engine: ``c`` or ``numpy``.
+
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
+
+    engine: str
 
     def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
@@ -147,27 +149,40 @@ class Examiner:
         coordinates = problem.z if family is None else family.coordinates
         n, whole = int(problem.z.numel()), int(coordinates.numel())
         self._errors, self._tolerance = list(range(n, whole)), 0.0 if family is None else family.tolerance
-        slopes = [ca.jacobian(equations, problem.z)[:, k] for k in self._dependent]
-        own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
-        # A last entry that is not used, for a matrix that is constant.
-        entries = ca.vertcat(equations, own, test.entries, problem.z[0])
-        self._encloser = Encloser(coordinates, entries, engine)
+        self._forms_of = equations, coordinates, engine
         self.second: Encloser | None = None
-        if isinstance(test, RankTest) and not self.count and not self._errors and n <= MOST_VARIABLES:
-            second = Encloser(coordinates, test.entries, engine)
-            self.second, self._rank = (second, test) if second.module is not None else (None, None)
+        self._change: EntryChange | None = None
+        if isinstance(test, RankTest) and not self.count and n <= MOST_VARIABLES:
+            self._use_second_order(test, family, engine)
+        if self.second is None:
+            self.engine = self._encloser.name
         self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
-    @property
-    def engine(self) -> str:
-        """``c`` or ``numpy``."""
-        return self._encloser.name
+    @cached_property
+    def _encloser(self) -> Encloser:
+        """Forms of first order of the equations, their derivatives by dependent coordinates, and the entries."""
+        (equations, coordinates, engine), z = self._forms_of, self.problem.z
+        slopes = [ca.jacobian(equations, z)[:, k] for k in self._dependent]
+        own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
+        # A last entry that is not used, for a matrix that is constant.
+        return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]), engine)
+
+    def _use_second_order(self, test: RankTest, family: Family | None, engine: str | None) -> None:
+        """Examine by forms of second order where the kernel has them; with errors, of polynomials alone."""
+        if family is not None and not is_polynomial(test.entries, family):
+            return
+        change = None if family is None else EntryChange(family, test.entries, engine)
+        second = Encloser(self.problem.z, test.entries if change is None else change.exact, engine)
+        if second.module is not None:
+            self.second, self._rank, self._change, self.engine = second, test, change, second.name
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""
         if self.second is not None and self._rank is not None and len(cells.lower):
-            return self._examined(cells, self._rank.examine_second(self.second, cells.lower.T, cells.upper.T))
+            ends = cells.lower.T, cells.upper.T
+            change = None if self._change is None else self._change.over(*ends)
+            return self._examined(cells, self._rank.examine_second(self.second, *ends, change))
         f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
@@ -175,6 +190,7 @@ class Examiner:
         of_errors = np.zeros((B, k, len(self._errors)))
         relation = Relation(np.zeros((B, k)), np.zeros((B, k, f)), np.full((B, k), np.inf), of_errors)
         shares, smallest, regular = np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=bool)
+        signs = np.zeros(B, dtype=np.int32)
         if k and not known.all():
             new = np.flatnonzero(~known)
             slopes = self._guess(new, lower, upper, near)
@@ -201,12 +217,12 @@ class Examiner:
                 whole[rows] = part
             entries = forms.part(slice(k + k * k, -1))
             found = self._test.examine(entries, own, self._independent, self._dependent, self._errors)
-            regular[rows], shares[rows], smallest[rows] = found.is_regular, found.shares, found.smallest
+            regular[rows], shares[rows], smallest[rows], signs[rows] = found
         for j in self._dependent:
             lower[~known, j] = upper[~known, j] = np.nan
         finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
-        return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest)
+        return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest, signs)
 
     def _examined(self, cells: Cells, found: Tested) -> Examined:
         """Return the results of a test of boxes without dependent coordinates."""

@@ -36,11 +36,14 @@ class Tested(NamedTuple):
         is_regular: (B,) whether the rank is proved to be full.
         shares: (B, f) share of each independent coordinate in the bound.
         smallest: (B,) smallest singular value at the middle as a part of the largest: a computed number.
+        signs: (B,) sign of the determinant of a square matrix at the middle: a computed number; 0 for other matrices.
+            Where the rank is proved, it is that at every pose of the box.
     """
 
     is_regular: NDArray[np.bool_]
     shares: FloatArray
     smallest: FloatArray
+    signs: NDArray[np.int32]
 
 
 class RankTest:
@@ -81,21 +84,25 @@ class RankTest:
             np.ascontiguousarray(self._constant),
         )
 
-    def examine_second(self, encloser: Encloser, lower: FloatArray, upper: FloatArray) -> Tested:
+    def examine_second(
+        self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
+    ) -> Tested:
         """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
 
         Args:
             encloser: of the entries, by the kernel.
             lower: (n, B) lower ends of the coordinates.
             upper: (n, B) upper ends.
+            change: (E, B) by how much the entries may be off in other machines; None for the design alone.
         """
         n, count = lower.shape
-        regular, shares, smallest = np.empty(count, dtype=np.int32), np.empty((n, count)), np.empty(count)
+        regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+        shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         if encloser.module is None:
             raise TypeError("forms of second order of a matrix are those of the C kernel")
-        encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest), count)
-        return Tested(regular.astype(bool), shares.T, smallest)
+        encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest, signs), count, change)
+        return Tested(regular.astype(bool), shares.T, smallest, signs)
 
     def examine(
         self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
@@ -163,4 +170,6 @@ class RankTest:
             B = np.where(np.isfinite(B), B, np.inf)
             is_regular, v = are_contractions(B * (1 + ROUNDING))
             shares = (linear * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
-        return Tested(is_regular, np.nan_to_num(shares), smallest)
+            square = M0.shape[1] == columns and not self.nullity
+            signs = np.linalg.slogdet(M0)[0] if square else np.zeros(len(M0))
+        return Tested(is_regular, np.nan_to_num(shares), smallest, signs.astype(np.int32))

@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .....models import FloatArray, Model, frozen_array
-from ....case.case import Case
+from .....models import FloatArray, Model
 from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS, REGULAR
+from ...statement.machine import Legs
 from ..home_poses import Homes
-from ..regular.search import RankProgress
+from ..regular.signs import SignRefuter
 from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import Family, built_model, family_of
 from ..tolerance.singular_machine import SingularMachine
 from ..verdict import Outcome, Regularity
-from .search import BY_NEWTON, prove_rank
+from .refuters import NewtonRefuter, Refuter, singular_at
+from .search import RankProgress, prove_rank
 from .singular_pose import SingularPose
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def prove_ranks(
     model: Model,
     homes: Homes,
     *,
+    legs: Legs | None = None,
     engine: str | None = None,
     time_limit: float | None = None,
     progress: RankProgress | None = None,
@@ -53,56 +55,64 @@ def prove_ranks(
     Args:
         model: the robot, without unknowns that follow in closed form.
         homes: the case, its poses and the machines that are meant.
+        legs: joint centres of six straight legs; None for another robot.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds for each of the two searches.
         progress: called during them.
         paper: records the searches for a proof.
     """
-    box, family = homes.box, None if homes.machines is None else homes.machines.family
+    box = homes.box
     try:
+        family = _family(model, homes, legs)
         problem = build_problem(homes.case, model, box) if family is None else family.problem
         prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
         shown = partial(_is_shown, problem, family, homes)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is not None:
-                recorder = None if paper is None or family is not None else paper.own(name)
+                recorder = None if paper is None or (legs is None and family is not None) else paper.own(name)
                 is_shown = partial(shown, constraints=name == CONSTRAINTS)
-                found.append(prove(matrix, recorder=recorder, is_shown=is_shown))
+                refuter: Refuter
+                if legs is None:
+                    refuter = NewtonRefuter(problem, matrix, family, is_shown)
+                else:
+                    refuter = SignRefuter(legs, problem)
+                found.append(prove(matrix, recorder=recorder, refuter=refuter))
         regular, constraints = found[0], found[1] if len(found) > 1 else None
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(box, str(error)), None)
     is_shown = partial(shown, constraints=False)
-    return Ranks(_after_newton(regular, problem, problem.locked, family, is_shown), constraints)
+    return Ranks(_after_newton(regular, problem, problem.locked, None if legs else family, is_shown), constraints)
+
+
+def _family(model: Model, homes: Homes, legs: Legs | None) -> Family | None:
+    """Return the machines that are meant; None for the design alone."""
+    if homes.machines is not None:
+        return homes.machines.family
+    if legs is None or not legs.tolerance:
+        return None
+    problem = build_problem(homes.case, model, homes.box)
+    return family_of(homes.case, built_model(homes.case.model), problem, legs.tolerance)
 
 
 def _is_shown(problem: Problem, family: Family | None, homes: Homes, z: FloatArray, *, constraints: bool) -> bool:
     """Return whether a singular point, or one of another machine, is singular in home's assembly."""
-    is_machine = family is not None and len(z) > len(problem.start)
-    centres = family.errors_of(z) if family is not None and is_machine else None
-    return homes.is_singular(problem.pose_of(z), centres, constraints=constraints)
-
-
-def touched(case: Case, box: PoseBox, found: Regularity) -> Regularity:
-    """Return the verdict on six straight legs after Newton's method, where a search has left it open."""
-    if found.outcome is not Outcome.OPEN:
-        return found
-    problem = build_problem(case, case.model, box)
-    return _after_newton(found, problem, problem.locked)
+    at = singular_at(problem, family, z)
+    return homes.is_singular(at.y, at.centres, constraints=constraints)
 
 
 def _after_newton(
     found: Regularity,
     problem: Problem,
     matrix: RankMatrix,
-    family: Family | None = None,
-    is_shown: Callable[[FloatArray], bool] = lambda _: True,
+    family: Family | None,
+    is_shown: Callable[[FloatArray], bool],
 ) -> Regularity:
     """Return a verdict, refuted where it was open and Newton's method finds a singular pose from random ones."""
     if found.outcome is not Outcome.OPEN or problem.dependent:
         return found
-    newton, free = SingularPose(problem, matrix), list(problem.free)
-    points = problem.box.random(_POSES, np.random.default_rng(_SEED))[:, free]
+    newton = SingularPose(problem, matrix)
+    points = problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(problem.free)]
     values = np.array([newton.smallest(each) for each in points])
     searches: list[Callable[[FloatArray], FloatArray | None]] = [newton.search]
     if family is not None:
@@ -111,9 +121,8 @@ def _after_newton(
         for k in np.argsort(values)[:_WORST]:
             z = search(points[k]) if np.isfinite(values[k]) else None
             if z is not None and is_shown(z):
-                y = frozen_array(problem.pose_of(z), (6,))
-                centres = family.errors_of(z) if family is not None and len(z) > len(free) else None
-                return replace(found, outcome=Outcome.REFUTED, y=y, sides=None, reason=BY_NEWTON, centres=centres)
+                at = singular_at(problem, family, z)
+                return replace(found, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, centres=at.centres)
     return found
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ...statement.machine import LEGS, Legs
+from ..ranks.krawczyk import inverses
 from ..robot.pose_box import PoseBox
 from .rows import FIRST, SECOND, expand
 
@@ -80,12 +81,3 @@ def inverse_over(legs: Legs, box: PoseBox, lower: FloatArray, upper: FloatArray)
         most = size_of_C * off[:, None] + further * (size + far)[:, None] + first @ size_of_C * far[:, None]
     most = np.where(is_bound[:, None, None] & np.isfinite(most), most, np.inf)
     return Inverse(C * size[:, None], linear, most, np.nan_to_num((slopes**2).sum(axis=(2, 3))))
-
-
-def inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, k, k); NaN for singular ones."""
-    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
-    found: FloatArray = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
-    return found

@@ -71,6 +71,13 @@ class TurnForm(NamedTuple):
     most: FloatArray
 
 
+def rows_at(legs: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
+    """Return the rows (K, 6, 6) at points (K, 6) without the scale: vectors of the legs, and their moments."""
+    arm = np.einsum("kij,lj->kli", box.rotations(points), legs.platform)
+    span = points[:, None, :3] - legs.base + arm
+    return np.concatenate([span, _cross(arm, span)], axis=2)
+
+
 def expand(legs: Legs, box: PoseBox, centre: FloatArray, half: FloatArray) -> Expansion:
     """Return the rows over boxes.
 

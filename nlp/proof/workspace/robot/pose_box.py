@@ -24,8 +24,6 @@ from ....case.workspace import TurnKind, Workspace
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Codes of the kinds of rotations: those of ``_workspace.c``.
-CODES = {TurnKind.ANY_AXIS: 0, TurnKind.AXIS: 1, TurnKind.ROLL_PITCH_YAW: 2}
 #: Part of itself by which a tangent may be off: several times the error of a library's function.
 _TANGENT = 2.0**-50
 #: Unit by which ends move outwards: several roundings.
@@ -89,21 +87,28 @@ class PoseBox:
             1 - 16 * _TANGENT
         )
 
-    def quaternion(self, y: FloatArray) -> FloatArray:
-        """Return a quaternion (4,) of the rotation at a point (6,), of any size."""
-        a, b, c = (float(each) for each in y[3:])
+    def quaternions(self, points: FloatArray) -> FloatArray:
+        """Return quaternions (K, 4) of the rotations at points (K, 6), of any size."""
+        a, b, c = points[:, 3:].T
+        one = np.ones(len(points))
         if self.kind is TurnKind.ANY_AXIS:
-            return np.array([1.0, a, b, c])
+            return np.stack([one, a, b, c], axis=1)
         if self.kind is TurnKind.AXIS:
-            return np.concatenate([[1.0], a * self.axis])
+            return np.concatenate([one[:, None], a[:, None] * self.axis], axis=1)
         # The product of the quaternions of yaw, pitch and roll, in this order.
-        return np.array([1 + a * b * c, a - b * c, b + a * c, c - a * b])
+        return np.stack([1 + a * b * c, a - b * c, b + a * c, c - a * b], axis=1)
+
+    def rotations(self, points: FloatArray) -> FloatArray:
+        """Return the rotation matrices (K, 3, 3) at points (K, 6)."""
+        whole = self.quaternions(points)
+        w, x, y, z = (whole / np.linalg.norm(whole, axis=1, keepdims=True)).T
+        zero = np.zeros_like(w)
+        cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+        return np.asarray(np.eye(3) + 2 * w[:, None, None] * cross + 2 * cross @ cross)
 
     def pose(self, y: FloatArray) -> PoseNumbers:
         """Return the pose at a point (6,)."""
-        w, x, y_, z = self.quaternion(y) / np.linalg.norm(self.quaternion(y))
-        cross = np.array([[0.0, -z, y_], [z, 0.0, -x], [-y_, x, 0.0]])
-        rotation = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+        rotation = self.rotations(y[None])[0]
         axis, angle = axis_angle_from_matrix(rotation)
         return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
 

@@ -7,6 +7,7 @@ equations: all unknowns, and numbers of the pose that a robot with fewer freedom
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -117,9 +118,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=RankMatrix(
-            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed), 0
-        ),
+        locked=locked_rows(posed, columns, length),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
@@ -202,6 +201,18 @@ def _independent_screws(member: Member, posed: PosedModel, start: FloatArray, le
     if len(chosen) != member.rank:
         raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
     return tuple(sorted(chosen))
+
+
+def locked_rows(posed: PosedModel, columns: Sequence[Sequence[int]], length: float) -> RankMatrix:
+    """Return the matrix with locked actuators, rows that are linear in the rotation without a division.
+
+    Args:
+        posed: the robot.
+        columns: indices of the screws of each member that are kept.
+        length: by which rotations are multiplied.
+    """
+    plain, turned = (locked_matrix(each.reduced(columns, length)) for each in (posed.limbs, posed.turned))
+    return RankMatrix(polynomial_rows(plain, turned, posed), 0)
 
 
 def about_platform(rows: SX, position: SX, length: float) -> SX:

@@ -22,9 +22,9 @@ from .....models.member import scaled_twists
 from ....case.case import Case
 from ...statement.machine import INSIDE, CentreErrors
 from .closed_loops import Loops
-from .motion_matrix import RankMatrix, free_matrix, locked_matrix
+from .motion_matrix import RankMatrix, free_matrix
 from .posed_model import PosedModel, posed_model
-from .posed_robot import NotJudgedError, Problem, about_platform
+from .posed_robot import NotJudgedError, Problem, about_platform, locked_rows
 
 #: Errors at which equations that were left out are tested, as a part of the robot's length, and number of tests.
 _OFF, _TESTS = 1e-2, 4
@@ -191,7 +191,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         equations=posed.closure[list(problem.needed)] if problem.needed else SX(0, 1),
         every=posed.every,
         signs=posed.signs,
-        locked=RankMatrix(locked_matrix(limbs), 0),
+        locked=locked_rows(posed, problem.columns, problem.length),
         unactuated=unactuated,
         jacobian=about_platform(posed.jacobian, limbs.position, problem.length),
     )

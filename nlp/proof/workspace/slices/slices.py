@@ -19,9 +19,10 @@ from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind
 from ....errors import CaseError
 from ...statement.machine import Legs, legs_of, workspace_of_case
-from ..regular.engines import RankEngine, rank_engine
-from ..regular.regularity import Rank
+from ..ranks.loop_boxes import Cells, Examined, Examiner
+from ..ranks.rank_rule import RankTest
 from ..robot.pose_box import PoseBox, pose_box, scaled
+from ..robot.posed_robot import build_problem
 from ..scale import largest_factor
 from .anyslice import AnySlices, Covered
 from .firstviolated import POINTS, FirstViolated, grid_points
@@ -111,7 +112,9 @@ def _of_legs(case: Case, legs: Legs, wide: PoseBox, chosen: list[int]) -> Covere
         return limits.violated(points).reshape(-1, POINTS, POINTS)
 
     first = FirstViolated(violated, len(limits.limits), lower[chosen], upper[chosen])
-    cover = _cover(rank_engine(legs, wide), limits, first, whole, chosen)
+    problem = build_problem(case, case.model, wide)
+    examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None)
+    cover = _cover(examiner, limits, first, whole, chosen)
     return Covered(cover, limits.limits, limits.uncovered)
 
 
@@ -157,24 +160,30 @@ def _over_poses(case: Case) -> tuple[str, ...]:
     return tuple(f"actuator.{name}" for name in ("stroke_max", "dead_length") if getattr(limit, name) is not None)
 
 
-def _cover(engine: RankEngine, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]) -> Cover:
+def _cover(examiner: Examiner, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]) -> Cover:
     """Return boxes that cover a slice: each is decided, or as small as they get."""
-    middle = 0.5 * (whole.lower + whole.upper)
-    own = int(engine.examine(middle[None], middle[None]).sign[0])
+    middle, free = 0.5 * (whole.lower + whole.upper), list(examiner.problem.free)
+
+    def examined(lower: FloatArray, upper: FloatArray) -> Examined:
+        """Return the ranks of boxes (B, 6)."""
+        centre = 0.5 * (lower + upper)[:, free]
+        return examiner.examine(Cells(lower[:, free], upper[:, free], centre, np.ones(len(lower), dtype=bool)))
+
+    own = int(examined(middle[None], middle[None]).signs[0])
     lows, highs, known = whole.lower[None], whole.upper[None], limits.unknown
     boxes, regions, binding = [], [], []
     while len(lows):
-        found = engine.examine(lows, highs)
+        found = examined(lows, highs)
         known = limits.examine(known, lows, highs)
         states = limits.states(known)
         small = ((highs - lows)[:, chosen] <= LEAST * (whole.upper - whole.lower)[chosen]).all(axis=1)
         limit, is_same = first.of(states, lows[:, chosen], highs[:, chosen])
-        closed = ((found.verdict == Rank.REGULAR) & is_same) | small
+        closed = (found.is_regular & is_same) | small
         boxes.append(np.concatenate([lows[closed][:, chosen], highs[closed][:, chosen]], axis=1))
         binding.append(limit[closed])
         for k in np.flatnonzero(closed).tolist():
-            beyond = Region.REGULAR if found.sign[k] == own else Region.BEYOND
-            regions.append(beyond if found.verdict[k] == Rank.REGULAR else Region.OPEN)
+            beyond = Region.REGULAR if found.signs[k] == own else Region.BEYOND
+            regions.append(beyond if found.is_regular[k] else Region.OPEN)
         lows, highs = quarters(lows[~closed], highs[~closed], chosen)
         known = np.tile(known[:, ~closed], 4)
     parts = np.concatenate(binding)

@@ -22,7 +22,7 @@ from .....models import FloatArray
 from ...boxes.search import Boxes, Effort, Order, Search, Verdicts, some
 from ...enclosure.forms import Forms
 from ..numbers.bound_search import Goal, SmallestValue, Value
-from ..ranks.covering import Followed, LoopRule
+from ..ranks.covering import APART, Followed, LoopRule
 from ..ranks.krawczyk import ROUNDING, Relation, by_centres
 from ..ranks.loop_boxes import Examiner
 from ..ranks.rank_rule import Tested
@@ -61,7 +61,8 @@ class _Bound:
         known = np.isfinite(lower)
         # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
         shares = np.abs(by_pose) + rest[:, None] / max(by_pose.shape[1], 1)
-        return Tested(np.zeros(len(c), dtype=bool), np.nan_to_num(shares), np.where(known, lower, -np.inf))
+        none = np.zeros(len(c), dtype=np.int32)
+        return Tested(none.astype(bool), np.nan_to_num(shares), np.where(known, lower, -np.inf), none)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def smallest_of_machines(
     bound, (value, z) = -search.state.bound, rule.best
     bound = min(bound, value)
     if math.isfinite(bound) and not rule.is_one_assembly():
-        bound, reason = -math.inf, "the assemblies in two neighbouring boxes are not proved to be the same"
+        bound, reason = -math.inf, APART
     return MachineMinimum(
         bound=bound if math.isfinite(bound) else -math.inf,
         value=value if math.isfinite(value) else math.nan,

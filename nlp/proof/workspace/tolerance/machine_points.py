@@ -9,8 +9,8 @@ from casadi import SX
 from .....models import FloatArray
 from ...statement.machine import INSIDE
 from ..numbers.bound_search import Value
+from ..ranks.krawczyk import inverses
 from ..ranks.loop_boxes import Cells, are_between
-from ..regular.inverse import inverses
 from ..robot.tolerance_model import Family
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
