@@ -13,6 +13,7 @@ from ...case.case import Case
 from ...case.workspace import Workspace
 from ...interruption import is_requested, one_call
 from ...program.layout import Layout
+from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
 from ..statement.closed_layout import closed_layout, reach_claims
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
@@ -89,7 +90,6 @@ def judge_workspace(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     jobs: int | None = None,
-    engine: str | None = None,
     with_limits: bool = True,
     with_objective: bool = True,
     until_fault: bool = False,
@@ -107,7 +107,6 @@ def judge_workspace(
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for each search; it then stops with the bound reached.
         jobs: threads.
-        engine: ``"c"`` or ``"numpy"`` for the search of singular poses; left out, the C kernel where it was built.
         with_limits: whether numbers are bounded at all, and not regularity alone.
         with_objective: whether F of each task is bounded.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
@@ -119,10 +118,11 @@ def judge_workspace(
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a name, or the error of legs is negative, or for a robot that is not six
-            straight legs.
+        InputError: the robot has no measure of a name, the error of legs is negative, or for a robot that is not six
+            straight legs, or the C kernel was not built.
     """
     own = workspace_of_case(case)
+    kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     box, legs = pose_box(workspace), legs_of(case)
@@ -136,7 +136,6 @@ def judge_workspace(
             closed.model,
             homes,
             legs=legs,
-            engine=engine,
             time_limit=time_limit,
             progress=rank_progress,
             paper=paper,

@@ -6,7 +6,7 @@
 
 typedef struct {
     const double *lower, *upper;  /* (n, B) */
-    double *c, *p, *q, *s, *a;    /* (R, B), a: (R, n, B) */
+    double *c, *p, *q, *s, *lo, *hi, *a; /* (R, B), a: (R, n, B) */
     Py_ssize_t B;
 } Enclosed;
 
@@ -37,6 +37,7 @@ static void enclose_all(const Tape *tape, int n, Enclosed *found, double *memory
             size_t at = (size_t)(k * B + start), bytes = (size_t)lanes_used * sizeof(double);
             memcpy(found->c + at, v->c, bytes), memcpy(found->p + at, v->p, bytes);
             memcpy(found->q + at, v->q, bytes), memcpy(found->s + at, v->s, bytes);
+            memcpy(found->lo + at, v->lo, bytes), memcpy(found->hi + at, v->hi, bytes);
             for (int i = 0; i < n; i++)
                 memcpy(found->a + ((size_t)k * (size_t)n + (size_t)i) * (size_t)B + start, terms_of(v)[i], bytes);
         }

@@ -90,7 +90,7 @@ class RankTest:
         """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
 
         Args:
-            encloser: of the entries, by the kernel.
+            encloser: of the entries.
             lower: (n, B) lower ends of the coordinates.
             upper: (n, B) upper ends.
             change: (E, B) by how much the entries may be off in other machines; None for the design alone.
@@ -99,9 +99,9 @@ class RankTest:
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        if encloser.module is None:
-            raise TypeError("forms of second order of a matrix are those of the C kernel")
-        encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest, signs), count, change)
+        encloser.module.rank(
+            n, encloser.tape.head, self._head, (*ends, regular, shares, smallest, signs), count, change
+        )
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
     def examine(

@@ -10,6 +10,7 @@ import numpy as np
 
 from .....models import FloatArray, frozen_array
 from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...enclosure.engine import ENGINE
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
@@ -36,7 +37,6 @@ def prove_rank(
     matrix: RankMatrix,
     *,
     family: Family | None = None,
-    engine: str | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
@@ -49,7 +49,6 @@ def prove_rank(
         problem: the robot.
         matrix: one of its two matrices.
         family: all machines that are meant; None for the design alone.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
@@ -60,7 +59,7 @@ def prove_rank(
         UncoveredError: an expression holds an operation without a rule.
     """
     rule = _RankRule(
-        problem, matrix, family, engine, recorder, NewtonRefuter(problem, matrix, family) if refuter is None else refuter
+        problem, matrix, family, recorder, NewtonRefuter(problem, matrix, family) if refuter is None else refuter
     )
     search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
@@ -96,7 +95,7 @@ def prove_rank(
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),
         sides=None if singular is None else singular.sides,
-        engine=rule.engine,
+        engine=ENGINE,
         boxes=search.boxes,
         open=search.state.open,
         share=share,
@@ -111,10 +110,9 @@ class _RankRule(LoopRule):
     """Rule of the rank of a matrix.
 
     Args:
-        problem, matrix, family, engine, recorder, refuter: as in :func:`prove_rank`.
+        problem, matrix, family, recorder, refuter: as in :func:`prove_rank`.
 
     Attributes:
-        engine: ``c`` or ``numpy``.
         singular: a singular pose; None while none is known.
     """
 
@@ -123,16 +121,13 @@ class _RankRule(LoopRule):
         problem: Problem,
         matrix: RankMatrix,
         family: Family | None,
-        engine: str | None,
         recorder: TreeRecord | None,
         refuter: Refuter,
     ) -> None:
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
             test = RankTest(family.matrix(matrix), family.coordinates, family.start)
-        examiner = Examiner(problem, test, engine, family)
-        super().__init__(problem, examiner)
-        self.engine: str = examiner.engine
+        super().__init__(problem, Examiner(problem, test, family))
         self.singular: Singular | None = None
         self._recorder, self._refuter, self._examined = recorder, refuter, 0
 

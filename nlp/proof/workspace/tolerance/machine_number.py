@@ -95,7 +95,6 @@ def smallest_of_machines(
     slack: float = 0.0,
     time_limit: float | None = None,
     interrupted: Callable[[], bool] = lambda: False,
-    engine: str | None = None,
 ) -> MachineMinimum:
     """Prove the smallest value of an expression over all machines and poses.
 
@@ -107,13 +106,12 @@ def smallest_of_machines(
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
         interrupted: whether the work is requested to stop.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
     effort = Effort(time_limit, interrupted=interrupted)
-    rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True), engine)
+    rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
     search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
     reason = effort.run(search, rule.ending(search))
     bound, (value, z) = -search.state.bound, rule.best
@@ -133,8 +131,8 @@ def smallest_of_machines(
 class _MachineRule(LoopRule, SmallestValue[Followed]):
     """Rule of an expression over all machines."""
 
-    def __init__(self, family: Family, expression: SX, goal: Goal, engine: str | None) -> None:
-        LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), engine, family))
+    def __init__(self, family: Family, expression: SX, goal: Goal) -> None:
+        LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), family))
         SmallestValue.__init__(self, goal, Value(math.inf, family.start))
         self._points = MachinePoints(family, expression)
 
