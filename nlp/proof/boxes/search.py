@@ -44,9 +44,9 @@ _REPORT_EVERY = 0.1
 class Order(enum.Enum):
     """The boxes that a search takes first."""
 
-    NEWEST = "those of the step before: depth first"
-    LARGEST_CHUNK = "those of the step whose largest bound is the largest: cheap, for many boxes"
-    LARGEST = "those with the largest bounds; of many, as above"
+    NEWEST = "parts of the boxes of the step before: depth first"
+    LARGEST_CHUNK = "parts of the boxes of the step with the largest bound: cheap, for many boxes"
+    LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
 
 
 Columns = TypeVar("Columns")
@@ -104,13 +104,11 @@ def joined(parts: Sequence[Rows]) -> Rows:
 
 
 def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
-    """Return boxes that stay whole, then the lower halves of the others, then the upper ones."""
-    whole, cut = np.flatnonzero(boxes.split < 0), np.flatnonzero(boxes.split >= 0)
-    parts = some(boxes, np.concatenate([whole, cut, cut]))
-    low, split = len(whole) + np.arange(len(cut)), boxes.split[cut]
-    high = low + len(cut)
-    middle = 0.5 * parts.lower[low, split] + 0.5 * parts.upper[low, split]
-    parts.upper[low, split] = parts.lower[high, split] = middle
+    """Return the lower halves of all boxes, then the upper ones."""
+    every, count = np.arange(boxes.count), boxes.count
+    parts = some(boxes, np.concatenate([every, every]))
+    middle = 0.5 * boxes.lower[every, boxes.split] + 0.5 * boxes.upper[every, boxes.split]
+    parts.upper[every, boxes.split] = parts.lower[count + every, boxes.split] = middle
     return parts
 
 
@@ -139,7 +137,7 @@ class Rule(ABC, Generic[Columns]):
     """Examination of boxes for a kind of claim."""
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
-        """Return the parts of boxes, with what they carry: those that stay whole, all lower halves, all upper ones."""
+        """Return the halves of boxes, with what they carry: all lower ones, then all upper ones."""
         return bisected(boxes)
 
     @abstractmethod
@@ -165,7 +163,7 @@ class State(NamedTuple, Generic[Columns]):
     """A search after a step.
 
     Attributes:
-        waiting: examined boxes that are to be divided.
+        waiting: parts of examined boxes, or examined boxes that are to be divided, as the order has it.
         small: boxes that are too small to be divided.
         closed: largest bound of what was closed.
         examined: number of boxes examined.
@@ -237,7 +235,7 @@ class Search(Generic[Columns]):
     def step(self, target: float) -> None:
         """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
-        parts = self.rule.divided(self._take(waiting))
+        parts = self._divided(self._take(waiting))
         found = self.rule.examine(parts, target)
         split = self._divisions(found)
         self.rule.record(parts, found, split)
@@ -246,13 +244,24 @@ class Search(Generic[Columns]):
                 self._put(waiting, each._replace(split=np.full(each.count, WHOLE)))
             small = []
         left = found.left._replace(split=split)
-        is_cut = split >= 0
-        if not is_cut.all():
+        if not (split >= 0).all():
             self._put(waiting, some(left, split == WHOLE))
             small += [some(left, split == SMALL)] * bool((split == SMALL).any())
-            left = some(left, is_cut)
+            left = some(left, split >= 0)
+        if self._order is not Order.LARGEST:
+            left = self._divided(left)
+            left = left._replace(split=np.full(left.count, WHOLE))
         self._put(waiting, left)
-        self.state = State(waiting, small, max(self.state.closed, found.closed), self.state.examined + found.examined)
+        closed, examined = max(self.state.closed, found.closed), self.state.examined + found.examined
+        self.state = State(waiting, small, closed, examined)
+
+    def _divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
+        """Return the parts of boxes, of which some may stay whole."""
+        is_cut = boxes.split >= 0
+        if not is_cut.any():
+            return boxes
+        halves = self.rule.divided(some(boxes, is_cut))
+        return halves if is_cut.all() else joined([some(boxes, ~is_cut), halves])
 
     def _divisions(self, found: Verdicts[Columns]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""

@@ -112,12 +112,10 @@ class LoopRule(Rule[Followed]):
         return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), Followed(near, is_known, none))
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the parts of boxes, with their dependent coordinates."""
-        parts, cut = bisected(boxes), int((boxes.split >= 0).sum())
-        sides = np.zeros((parts.count, len(parts.lower[0])))
-        high = np.arange(parts.count - cut, parts.count)
-        sides[high, parts.split[high]], sides[high - cut, parts.split[high]] = 1.0, -1.0
-        sides[parts.split < 0] = 0.0
+        """Return the halves of boxes, with their dependent coordinates."""
+        parts, count = bisected(boxes), boxes.count
+        sides = np.zeros(parts.lower.shape)
+        sides[np.arange(2 * count), parts.split] = np.repeat([-1.0, 1.0], count)
         cells = Cells(parts.lower, parts.upper, parts.more.near, parts.more.is_known)
         found = self._examiner.narrowed(cells, parts.more.relation, sides[:, self._independent])
         return parts._replace(lower=found.lower, upper=found.upper)
