@@ -11,7 +11,7 @@ import pytest
 
 #: Modules of searches with a limit on their time; each looks at the clock once a step.
 SEARCHES = (
-    *("certificate.branch_and_bound", "workspace.regular.search", "workspace.ranks.search"),
+    *("certificate.branch_and_bound", "workspace.ranks.search"),
     *("workspace.numbers.loop_limits", "workspace.tolerance.machine_number"),
     *("workspace.numbers.bound_search", "workspace.numbers.extremes"),
 )

@@ -30,6 +30,7 @@ from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_ranks
+from screwsynth.nlp.proof.workspace.ranks.refuters import NewtonRefuter
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
@@ -202,7 +203,11 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem,
         problem.locked,
         most_boxes=4000,
-        is_shown=lambda z: homes.is_singular(problem.pose_of(z), None, constraints=False),
+        refuter=NewtonRefuter(
+            problem,
+            problem.locked,
+            is_shown=lambda z: homes.is_singular(problem.pose_of(z), None, constraints=False),
+        ),
     )
     assert found.outcome is Outcome.REFUTED
     assert found.y is not None

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, Free
+from screwsynth.models import FloatArray, hexapod
+from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.fractions import determinant_sign, tangent_ends
@@ -43,8 +43,10 @@ from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstE
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord, TreeRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
@@ -76,6 +78,7 @@ rotation = { roll = 3, pitch = { min = -5, max = 9 } }
 """
 LEG_ERROR = 0.008
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+HEXAPOD = hexapod()
 
 
 def case_of(text: str = TEXT) -> Case:
@@ -226,6 +229,13 @@ def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
             show(rank(root, robot), root, read_leaves(tree, root.lower, root.upper))
 
 
+def six_legs(robot: Legs) -> Case:
+    """A case about six legs with these joint centres."""
+    given = {f"{plate}_{i + 1}": getattr(robot, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
+    task = Task([0, 0, 0, 0, 0, 1])
+    return Case(HEXAPOD, given, [0.0, 0.0, 0.0], [task], joint_centre_tolerance=robot.tolerance or None)
+
+
 def rank(root: PoseRoot, robot: Legs) -> RankClaim:
     return RankClaim(root, ballrows.Joints(*robot[:2]))
 
@@ -301,7 +311,9 @@ def test_random_machines_are_accepted() -> None:
         place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
         workspace = Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
         record = TreeRecord()
-        found = prove_regular(machine, pose_box(workspace), engine="numpy", most_boxes=3000, recorder=record)
+        problem = build_problem(six_legs(machine), HEXAPOD, pose_box(workspace))
+        refuter = SignRefuter(machine, problem)
+        found = prove_rank(problem, problem.locked, most_boxes=3000, recorder=record, refuter=refuter)
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)
