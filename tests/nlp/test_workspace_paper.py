@@ -193,7 +193,7 @@ def test_other_trees_are_rejected(proof: WorkspaceProof) -> None:
     assert "ends" in rejected(changed(proof, "position error", "max", tree=tree[:-1]))
     assert "goes on" in rejected(changed(proof, "position error", "max", tree=tree + tree[-1:]))
     assert "where a box must be" in rejected(changed(proof, "regular", tree=b"\x07"))
-    assert "cuts no coordinate" in rejected(changed(proof, "regular", tree=b"\x01\x06" + bytes(8)))
+    assert "names variable 6" in rejected(changed(proof, "regular", tree=bytes([Node.CUT, 6]) + bytes(8)))
     assert "not outside" in rejected(changed(proof, "regular", tree=bytes([Node.OUTSIDE])))
     (at,) = struct.unpack("<d", tree[2:10])
     width = float(np.ptp(proof.workspace[0][0])) if tree[1] == 0 else 9.0  # type: ignore[index]

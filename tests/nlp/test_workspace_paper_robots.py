@@ -252,7 +252,7 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     _, proof = reachy
     case = reachy_case(one_motor(reachy_text(1.0)))
     assert case.workspace is not None
-    monkeypatch.setattr(pieces, "_MOST_PIECES", 100)
+    monkeypatch.setattr(pieces._PoseRule, "most_pieces", 100)
     other = replace(changed(proof, "regular"), workspace=workspace_numbers(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
