@@ -17,8 +17,8 @@ from ...statement.limb_separation import Limb, Separation
 from ...statement.standard_form import StandardForm
 from ..engines import engine_for
 from ..incumbent import Incumbent
-from ..proof_writer import ProofWriter
 from ..optimum import BoxSearch
+from ..proof_writer import ProofWriter
 from ..symmetry import grouped
 
 #: Rounding of a sum of a few terms, in parts of their sizes: many times the largest possible.

@@ -95,7 +95,7 @@ class _LimitsRule(LoopRule):
         self._best = _Best(np.full(count, -np.inf), np.full((count, n), np.nan))
         self._bound = np.full(count, -np.inf)
 
-    def examine(self, boxes: Boxes[Followed], target: float) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes on which a number is not decided."""
         found = self.examined(boxes)
         known = found.cells.is_known

@@ -1,4 +1,4 @@
-"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and rules for their search."""
+"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and how joints follow."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
 
 
 class Followed(NamedTuple):
-    """Columns of a search of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
+    """Columns of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
 
     near: FloatArray
     is_known: NDArray[np.bool_]
@@ -113,7 +113,7 @@ class LoopRule(Rule[Followed]):
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the halves of boxes, with their dependent coordinates."""
-        parts, count = bisected(boxes), boxes.count
+        parts, count = bisected(boxes), len(boxes.split)
         sides = np.zeros(parts.lower.shape)
         sides[np.arange(2 * count), parts.split] = np.repeat([-1.0, 1.0], count)
         cells = Cells(parts.lower, parts.upper, parts.more.near, parts.more.is_known)

@@ -60,7 +60,12 @@ def prove_rank(
         UncoveredError: an expression holds an operation without a rule.
     """
     rule = _RankRule(
-        problem, matrix, family, engine, recorder, NewtonRefuter(problem, matrix, family) if refuter is None else refuter
+        problem,
+        matrix,
+        family,
+        engine,
+        recorder,
+        NewtonRefuter(problem, matrix, family) if refuter is None else refuter,
     )
     search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
@@ -143,7 +148,7 @@ class _RankRule(LoopRule):
             self._recorder.cuts(*self._ends(boxes.lower, boxes.upper), along)
         return super().divided(boxes)
 
-    def examine(self, boxes: Boxes[Followed], target: float) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
         found = self.examined(boxes)
         count = len(found.is_regular)
