@@ -12,13 +12,11 @@ from tempfile import TemporaryDirectory
 
 from screwsynth.nlp import Case, Free, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.proof.statement.claims import claims_of
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
-from screwsynth.nlp.proof.workspace.regular.engines import kernel
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
-from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 
 # The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """
@@ -45,39 +43,30 @@ def machine() -> Case:
         return load_case(str(path))
 
 
-def legs_with_six(case: Case) -> Legs:
-    legs = legs_of(case)
-    if legs is None:
-        raise TypeError("the machine has six straight legs")
-    return legs
-
-
 def by_angle(case: Case) -> None:
-    legs = legs_with_six(case)
     for kind in (TurnKind.ANY_AXIS, TurnKind.ROLL_PITCH_YAW):
         for degrees in (20, 25, 30, 35, 40):
             angle = Free(-math.radians(degrees), math.radians(degrees))
-            box = pose_box(Workspace(POSITION, Turns(kind, (angle,) * (1 if kind is TurnKind.ANY_AXIS else 3))))
+            workspace = Workspace(POSITION, Turns(kind, (angle,) * (1 if kind is TurnKind.ANY_AXIS else 3)))
             cells = []
             for engine in ("c", "numpy") if kernel() is not None else ("numpy",):
                 best = math.inf
                 for _ in range(5):
                     began = time.process_time()
-                    found = prove_regular(legs, box, engine=engine)
+                    found = judge_workspace(case, workspace=workspace, engine=engine, with_limits=False).regularity
                     best = min(best, time.process_time() - began)
                 cells.append(f"{engine} {found.outcome.value} {found.boxes:,} boxes {1e3 * best:.1f} ms")
             print(f"{kind.value}, {degrees} deg: {'; '.join(cells)}")
 
 
 def by_dimension(case: Case) -> None:
-    legs = legs_with_six(case)
     angle = Free(-math.radians(25), math.radians(25))
     for free in range(1, 7):
         position = tuple(each if k < free else (each.lower + each.upper) / 2 for k, each in enumerate(POSITION))
         angles = tuple(angle if k + 3 < free else 0.0 for k in range(3))
         workspace = Workspace(position, Turns(TurnKind.ROLL_PITCH_YAW, angles))
         began = time.process_time()
-        regular = prove_regular(legs, pose_box(workspace))
+        regular = judge_workspace(case, workspace=workspace, with_limits=False).regularity
         taken = time.process_time() - began
         layout = posed_layout(case, workspace)
         boxes, seconds = {"length": 0, "F": 0}, {"length": 0.0, "F": 0.0}

@@ -399,7 +399,7 @@ def test_the_kernel_is_built_without_what_would_break_it() -> None:
     if not path.exists():
         pytest.skip("an installed package has no build settings")
     extensions = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["setuptools"]["ext-modules"]
-    assert {each["name"].rpartition(".")[2] for each in extensions} == {"_bounds", "_workspace", "_screen"}
+    assert {each["name"].rpartition(".")[2] for each in extensions} == {"_bounds", "_screen"}
     for extension in extensions:
         flags = extension["extra-compile-args"]
         assert "-ffp-contract=off" in flags

@@ -18,9 +18,9 @@ import pytest
 from limb_cases import machine, poses
 
 import screwsynth.nlp
-from screwsynth.models import FloatArray
+from screwsynth.models import FloatArray, hexapod
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Nlp, load_case, solve, sweep
+from screwsynth.nlp import Case, Nlp, Task, load_case, solve, sweep
 from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.reader import case_from_tables
@@ -36,9 +36,10 @@ from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
+from screwsynth.nlp.proof.workspace.ranks import search as ranks
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
-from screwsynth.nlp.proof.workspace.regular import search as regular
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family
@@ -57,7 +58,8 @@ LOOPS = (
     *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "open_boxes.py")),
     *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
     *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
-    *(str(ROOT / "proof" / "workspace" / name / "search.py") for name in ("regular", "ranks")),
+    str(ROOT / "proof" / "workspace" / "ranks" / "search.py"),
+    *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("loop_limits.py", "bound_search.py")),
     str(ROOT / "proof" / "workspace" / "tolerance" / "machine_number.py"),
 )
 assert all(Path(each).exists() for each in (*WATCHED, *LOOPS))
@@ -115,8 +117,27 @@ def legs_and_box() -> tuple[Legs, PoseBox]:
     return Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3))), box
 
 
+@cache
+def six_legs_problem() -> Problem:
+    (base, platform, _), box = legs_and_box()
+    model = hexapod()
+    given = {
+        f"{name}_{i + 1}": part[i].tolist() for name, part in (("base", base), ("platform", platform)) for i in range(6)
+    }
+    return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
+
+
+def regular(
+    *, engine: str | None = None, most_boxes: int | None = None, progress: Callable[..., None] | None = None
+) -> Regularity:
+    """The verdict on the rank of the rows of these legs."""
+    problem = six_legs_problem()
+    refuter = SignRefuter(legs_and_box()[0], problem)
+    return prove_rank(problem, problem.locked, refuter=refuter, engine=engine, most_boxes=most_boxes, progress=progress)
+
+
 def six_legs() -> Claim:
-    return from_regularity(prove_regular(*legs_and_box(), engine="numpy", most_boxes=600))
+    return from_regularity(regular(engine="numpy", most_boxes=300))
 
 
 @cache
@@ -365,7 +386,7 @@ def test_an_interrupted_scale_is_no_larger(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(scale, "ACCURACY", 0.5)
     whole = largest_scale(case, time_limit=None)
     assert whole.factor >= 1
-    monkeypatch.setattr(regular._Search, "_halves", interrupting(1, regular._Search._halves))
+    monkeypatch.setattr(ranks._Search, "_halves", interrupting(1, ranks._Search._halves))
     found = largest_scale(case, time_limit=None)
     assert found.factor <= whole.factor
     assert found.failed >= whole.failed
@@ -401,7 +422,7 @@ def test_an_error_of_a_callback_proves_nothing(error: type[BaseException]) -> No
     problem = any_robot()
     nlp = program("poses")[0]
     searches: tuple[Callable[[], Any], ...] = (
-        lambda: prove_regular(*legs_and_box(), progress=fail).outcome is Outcome.OPEN,
+        lambda: regular(progress=fail).outcome is Outcome.OPEN,
         lambda: prove_rank(problem, problem.locked, progress=fail).outcome is Outcome.OPEN,
         lambda: certify_program(nlp, progress=fail).status is CertificateStatus.INCOMPLETE,
     )

@@ -9,7 +9,7 @@ import pytest
 from casadi import SX
 
 from screwsynth.models import Dimension, hexapod
-from screwsynth.nlp import Case, Free, Nlp, Sense, load_case
+from screwsynth.nlp import Case, Free, Nlp, Sense, Task, load_case
 from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
@@ -18,14 +18,17 @@ from screwsynth.nlp.program.layout import lay_out
 from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.checker.proof import Node, Proof, Statement, fingerprint
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
-from screwsynth.nlp.proof.workspace.regular import search
-from screwsynth.nlp.proof.workspace.regular.regularity import NumpyRankEngine
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.ranks import search
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
+from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 NUMBER = Reading(Dimension.NUMBER)
@@ -98,16 +101,19 @@ def test_a_value_that_jumps_has_no_rule(jump: Callable[[SX], SX]) -> None:
 
 @pytest.mark.parametrize("place", ["examine", "branch"])
 def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(0)
+    rng, model = np.random.default_rng(0), hexapod()
     legs = Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
+    given = {f"{plate}_{i + 1}": getattr(legs, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
+    case = Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])])
     turns = Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))
     box = pose_box(Workspace((Free(-1.0, 1.0), Free(-1.0, 1.0), Free(3.0, 4.0)), turns))
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    target, name = (search._Search, "_halves") if place == "branch" else (NumpyRankEngine, "examine")
+    target, name = (search._Search, "_halves") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
-    found = prove_regular(legs, box, engine="numpy")
+    problem = build_problem(case, model, box)
+    found = search.prove_rank(problem, problem.locked, engine="numpy", refuter=SignRefuter(legs, problem))
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"

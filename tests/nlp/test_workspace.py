@@ -13,26 +13,27 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data, load_result, solve
+from screwsynth.models import FloatArray, hexapod
+from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, Task, json_data, load_result, solve
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle, prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
 from screwsynth.nlp.proof.workspace.regular import rows
-from screwsynth.nlp.proof.workspace.regular.engines import kernel, rank_engine
-from screwsynth.nlp.proof.workspace.regular.regularity import Rank
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.slices.regions import Region
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome
+from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -63,6 +64,7 @@ position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }
 rotation = { angle = { min = -20, max = 20 } }
 """
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
+HEXAPOD = hexapod()
 
 
 @pytest.fixture(scope="module")
@@ -89,11 +91,22 @@ def legs(case: Case) -> Legs:
     return found
 
 
+def case_of(robot: Legs) -> Case:
+    """A case about six legs with these joint centres."""
+    given = {f"{plate}_{i + 1}": getattr(robot, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
+    task = Task([0, 0, 0, 0, 0, 1])
+    return Case(HEXAPOD, given, [0.0, 0.0, 0.0], [task], joint_centre_tolerance=robot.tolerance or None)
+
+
+def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> Regularity:
+    """The verdict on the rank of the rows of six legs."""
+    problem = build_problem(case_of(robot), HEXAPOD, box)
+    return prove_rank(problem, problem.locked, refuter=SignRefuter(robot, problem), most_boxes=most_boxes)
+
+
 def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
-    w, x, y, z = (quaternions := np.array([box.quaternion(each) for each in points])).T / np.linalg.norm(
-        quaternions, axis=1
-    )
+    w, x, y, z = (quaternions := box.quaternions(points)).T / np.linalg.norm(quaternions, axis=1)
     turn = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -121,7 +134,7 @@ def test_the_machine_is_regular_up_to_an_angle(
     case: Case, kind: TurnKind, degrees: float, outcome: Outcome, most: int, engine: str
 ) -> None:
     box = pose_box(turned(kind, degrees))
-    found = prove_regular(legs(case), box, engine=engine)
+    found = judge_workspace(case, workspace=turned(kind, degrees), engine=engine, with_limits=False).regularity
     assert (found.outcome, found.engine) == (outcome, engine)
     assert found.boxes <= most
     if outcome is Outcome.REFUTED:
@@ -203,25 +216,11 @@ def _rounding(rest: FloatArray) -> FloatArray:
     return np.minimum(rest, 1e-6 * rest.max())
 
 
-@needs_kernel
-@pytest.mark.parametrize("kind", list(TurnKind))
-def test_both_engines_agree_box_by_box(case: Case, kind: TurnKind) -> None:
-    rng = np.random.default_rng(1)
-    box = pose_box(turned(kind, 45))
-    lower = box.random(1500, rng)
-    upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.4, (1500, 1))
-    ours, theirs = (rank_engine(legs(case), box, name).examine(lower, upper) for name in ("c", "numpy"))
-    assert (ours.verdict == theirs.verdict).mean() > 0.999
-    assert (ours.sign == theirs.sign).mean() > 0.999
-    assert np.array_equal(ours.lower, theirs.lower)
-    assert {Rank.OPEN, Rank.REGULAR} <= set(ours.verdict.tolist())
-
-
 def test_random_robots_are_never_called_regular_where_the_determinant_changes_its_sign() -> None:
-    """200 robots and boxes, against dense sampling and the determinant along paths between the samples."""
+    """120 robots and boxes, against dense sampling and the determinant along paths between the samples."""
     rng = np.random.default_rng(3)
     outcomes = []
-    for _ in range(200):
+    for _ in range(120):
         robot = Legs(
             np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
             np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
@@ -232,7 +231,7 @@ def test_random_robots_are_never_called_regular_where_the_determinant_changes_it
         near = rng.uniform((-3, -3, 9), (3, 3, 15))
         place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
         box = pose_box(Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8))))
-        found = prove_regular(robot, box, most_boxes=3000)
+        found = regular(robot, box, most_boxes=3000)
         outcomes.append(found.outcome)
         corners = box.clipped(box.random(30, rng) + rng.choice([-1, 1], (30, 6)) * (box.upper - box.lower))
         ends = np.concatenate([box.random(30, rng), corners])
@@ -244,8 +243,8 @@ def test_random_robots_are_never_called_regular_where_the_determinant_changes_it
             assert found.sides is not None
             positive, negative = determinants(robot, box, found.sides)
             assert positive > 0 > negative
-    assert outcomes.count(Outcome.PROVED) > 30
-    assert outcomes.count(Outcome.REFUTED) > 30
+    assert outcomes.count(Outcome.PROVED) > 18
+    assert outcomes.count(Outcome.REFUTED) > 18
 
 
 @pytest.mark.parametrize("name", ["smallest singular value", "condition number", "clearance"])

@@ -29,11 +29,12 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examined, Examiner
+from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.regular import rows
-from screwsynth.nlp.proof.workspace.regular.engines import kernel, rank_engine
-from screwsynth.nlp.proof.workspace.regular.regularity import Rank
-from screwsynth.nlp.proof.workspace.regular.search import prove_regular
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, built_model, family_of
 from screwsynth.nlp.proof.workspace.tolerance.legs.claims import built_claims
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
@@ -218,7 +219,7 @@ def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case
     assert len(seen) == 10
     determinants = np.linalg.det(machines.J)
     assert (determinants > 0).all() or (determinants < 0).all()
-    assert prove_regular(robot, pose_box(workspace)).outcome is Outcome.PROVED
+    assert judge_workspace(case, with_limits=False).regularity.outcome is Outcome.PROVED
 
 
 def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_tolerance(
@@ -253,30 +254,40 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     robot = legs(case)._replace(tolerance=0.3)
     lower = box.random(300, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.05, (300, 1)), box.upper)
-    found = rank_engine(robot, box, "numpy").examine(lower, upper)
-    exact = rank_engine(robot._replace(tolerance=0.0), box, "numpy").examine(lower, upper)
-    if kernel() is not None:
-        other = rank_engine(robot, box, "c").examine(lower, upper)
-        assert (found.verdict == other.verdict).mean() > 0.999
-    changed = 0
-    for k in np.flatnonzero(exact.verdict == Rank.REGULAR):
-        inside = replace(box, lower=found.lower[k], upper=found.upper[k])
-        signs = np.sign(np.linalg.det(Machines(robot, inside, 60, seed=int(k)).J))
-        if found.verdict[k] == Rank.REGULAR:
+    exact = build_problem(case, case.model, box)
+    family = family_of(case, built_model(case.model), exact, robot.tolerance)
+
+    def examined(family: Family | None) -> Examined:
+        """The boxes, for all machines of a family, or for the design."""
+        matrix, z, start = (
+            (exact.locked, exact.z, exact.start)
+            if family is None
+            else (family.locked, family.coordinates, family.start)
+        )
+        cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
+        return Examiner(exact, RankTest(matrix, z, start), None, family).examine(cells)
+
+    found, changed = examined(family), 0
+    for k in np.flatnonzero(examined(None).is_regular):
+        signs = np.sign(np.linalg.det(Machines(robot, replace(box, lower=lower[k], upper=upper[k]), 60, seed=int(k)).J))
+        if found.is_regular[k]:
             assert (signs == signs[0]).all()
         changed += (signs != signs[0]).any()
     # Without the tolerance boxes would be called regular that are not so for every machine: the test can fail. About
     # one axis no pose of this machine is near a singular one.
     assert changed or kind is TurnKind.AXIS
-    assert Rank.REGULAR in found.verdict
+    assert found.is_regular.any()
 
 
 def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> None:
     angle = Free(-math.radians(30), math.radians(30))
-    box = pose_box(Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), Turns(TurnKind.ANY_AXIS, (angle,))))
-    robot = legs(case)._replace(tolerance=0.8)
-    assert prove_regular(robot._replace(tolerance=0.0), box).outcome is Outcome.PROVED
-    found = prove_regular(robot, box)
+    workspace = Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), Turns(TurnKind.ANY_AXIS, (angle,)))
+    box, robot = pose_box(workspace), legs(case)
+    exact, found = (
+        judge_workspace(replace(case, joint_centre_tolerance=t), workspace=workspace, with_limits=False).regularity
+        for t in (None, 0.8)
+    )
+    assert exact.outcome is Outcome.PROVED
     assert found.outcome is Outcome.REFUTED
     assert found.errors is not None
     assert found.y is not None

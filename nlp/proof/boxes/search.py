@@ -17,7 +17,7 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -40,13 +40,12 @@ _FEW = 50_000
 _REPORT_EVERY = 0.1
 
 
-
 class Order(enum.Enum):
     """The boxes that a search takes first."""
 
-    NEWEST = "those of the step before: depth first"
-    LARGEST_CHUNK = "those of the step whose largest bound is the largest: cheap, for many boxes"
-    LARGEST = "those with the largest bounds; of many, as above"
+    NEWEST = "parts of the boxes of the step before: depth first"
+    LARGEST_CHUNK = "parts of the boxes of the step with the largest bound: cheap, for many boxes"
+    LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
 
 
 Columns = TypeVar("Columns")
@@ -69,15 +68,11 @@ class Boxes(NamedTuple, Generic[Columns]):
     split: NDArray[np.intp]
     more: Columns
 
-    @property
-    def count(self) -> int:
-        """Number of boxes."""
-        return len(self.split)
-
 
 def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
     """Return some rows of an array, or of all arrays of a tuple; other columns have a method ``some`` of their own."""
     each: Any = rows
+    found: Any
     if isinstance(each, np.ndarray):
         found = each[which]
     elif isinstance(each, tuple):
@@ -85,32 +80,31 @@ def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
         found = type(each)(*parts) if hasattr(each, "_fields") else tuple(parts)
     else:
         found = each.some(which)
-    return found  # type: ignore[no-any-return]
+    return cast("Rows", found)
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
     """Return the rows of arrays, or of tuples of them, one after the other."""
     first: Any = parts[0]
+    found: Any
     if len(parts) == 1:
         found = first
     elif isinstance(first, np.ndarray):
-        found = np.concatenate(parts)  # type: ignore[arg-type]
+        found = np.concatenate(cast("Any", parts))
     elif isinstance(first, tuple):
-        columns = [joined(each) for each in zip(*parts, strict=True)]  # type: ignore[call-overload]
+        columns = [joined(each) for each in zip(*cast("Any", parts), strict=True)]
         found = type(first)(*columns) if hasattr(first, "_fields") else tuple(columns)
     else:
         found = first.joined(parts)
-    return found  # type: ignore[no-any-return]
+    return cast("Rows", found)
 
 
 def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
-    """Return boxes that stay whole, then the lower halves of the others, then the upper ones."""
-    whole, cut = np.flatnonzero(boxes.split < 0), np.flatnonzero(boxes.split >= 0)
-    parts = some(boxes, np.concatenate([whole, cut, cut]))
-    low, split = len(whole) + np.arange(len(cut)), boxes.split[cut]
-    high = low + len(cut)
-    middle = 0.5 * parts.lower[low, split] + 0.5 * parts.upper[low, split]
-    parts.upper[low, split] = parts.lower[high, split] = middle
+    """Return the lower halves of all boxes, then the upper ones."""
+    every, count = np.arange(len(boxes.split)), len(boxes.split)
+    parts = some(boxes, np.concatenate([every, every]))
+    middle = 0.5 * boxes.lower[every, boxes.split] + 0.5 * boxes.upper[every, boxes.split]
+    parts.upper[every, boxes.split] = parts.lower[count + every, boxes.split] = middle
     return parts
 
 
@@ -136,15 +130,21 @@ class Verdicts(NamedTuple, Generic[Columns]):
 
 
 class Rule(ABC, Generic[Columns]):
-    """Examination of boxes for a kind of claim."""
+    """Examination of boxes for a kind of claim.
+
+    Attributes:
+        target: bound up to which boxes may be closed.
+    """
+
+    target: float = -math.inf
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
-        """Return the parts of boxes, with what they carry: those that stay whole, all lower halves, all upper ones."""
+        """Return the halves of boxes, with what they carry: all lower ones, then all upper ones."""
         return bisected(boxes)
 
     @abstractmethod
-    def examine(self, boxes: Boxes[Columns], target: float) -> Verdicts[Columns]:
-        """Return the results for boxes, of which those with a bound of at most the target may be closed."""
+    def examine(self, boxes: Boxes[Columns]) -> Verdicts[Columns]:
+        """Return the results for boxes."""
 
     def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
@@ -165,7 +165,7 @@ class State(NamedTuple, Generic[Columns]):
     """A search after a step.
 
     Attributes:
-        waiting: examined boxes that are to be divided.
+        waiting: parts of examined boxes, or examined boxes that are to be divided, as the order has it.
         small: boxes that are too small to be divided.
         closed: largest bound of what was closed.
         examined: number of boxes examined.
@@ -184,7 +184,7 @@ class State(NamedTuple, Generic[Columns]):
     @property
     def open(self) -> int:
         """Number of boxes that are left."""
-        return sum(each.count for each in self.left)
+        return sum(len(each.split) for each in self.left)
 
     @property
     def bound(self) -> float:
@@ -237,22 +237,34 @@ class Search(Generic[Columns]):
     def step(self, target: float) -> None:
         """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
-        parts = self.rule.divided(self._take(waiting))
-        found = self.rule.examine(parts, target)
+        parts = self._divided(self._take(waiting))
+        self.rule.target = target
+        found = self.rule.examine(parts)
         split = self._divisions(found)
         self.rule.record(parts, found, split)
         if found.is_better:
             for each in small:
-                self._put(waiting, each._replace(split=np.full(each.count, WHOLE)))
+                self._put(waiting, each._replace(split=np.full(len(each.split), WHOLE)))
             small = []
         left = found.left._replace(split=split)
-        is_cut = split >= 0
-        if not is_cut.all():
+        if not (split >= 0).all():
             self._put(waiting, some(left, split == WHOLE))
             small += [some(left, split == SMALL)] * bool((split == SMALL).any())
-            left = some(left, is_cut)
+            left = some(left, split >= 0)
+        if self._order is not Order.LARGEST:
+            left = self._divided(left)
+            left = left._replace(split=np.full(len(left.split), WHOLE))
         self._put(waiting, left)
-        self.state = State(waiting, small, max(self.state.closed, found.closed), self.state.examined + found.examined)
+        closed, examined = max(self.state.closed, found.closed), self.state.examined + found.examined
+        self.state = State(waiting, small, closed, examined)
+
+    def _divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
+        """Return the parts of boxes, of which some may stay whole."""
+        is_cut = boxes.split >= 0
+        if not is_cut.any():
+            return boxes
+        halves = self.rule.divided(some(boxes, is_cut))
+        return halves if is_cut.all() else joined([some(boxes, ~is_cut), halves])
 
     def _divisions(self, found: Verdicts[Columns]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
@@ -269,7 +281,7 @@ class Search(Generic[Columns]):
 
     def _put(self, waiting: list[_Chunk[Columns]], boxes: Boxes[Columns]) -> None:
         """Add boxes."""
-        if boxes.count:
+        if len(boxes.split):
             key = 0.0 if self._order is Order.NEWEST else float(boxes.bound.max())
             self._newest += 1
             insort(waiting, (key, self._newest, boxes))
@@ -289,7 +301,7 @@ class Search(Generic[Columns]):
             parts = np.where(boxes.split >= 0, 2, 1)
             if parts.sum() > room:
                 is_newest = self._order is Order.NEWEST
-                order = np.arange(boxes.count) if is_newest else np.argsort(-boxes.bound, kind="stable")
+                order = np.arange(len(boxes.split)) if is_newest else np.argsort(-boxes.bound, kind="stable")
                 fit = max(1, int(np.searchsorted(np.cumsum(parts[order]), room, side="right")))
                 self._put(waiting, some(boxes, order[fit:]))
                 boxes, room = some(boxes, order[:fit]), 0

@@ -25,8 +25,8 @@ from ..boxes.engines import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import SharedSearch
-from ..boxes.proof_writer import ProofWriter
 from ..boxes.optimum import BoxSearch
+from ..boxes.proof_writer import ProofWriter
 from ..boxes.symmetry import halved
 from ..enclosure.engine import ENGINE, kernel
 from ..statement.limb_separation import separate

@@ -22,6 +22,7 @@ from .home_poses import Homes
 from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.leg_numbers import own_searches, pose_errors
+from .numbers.loop_limits import loop_extremes
 from .numbers.robot_limits import limited_spectrum
 from .numbers.strokes import with_strokes
 from .ranks.ranks import Ranks, not_judged, prove_ranks
@@ -235,11 +236,11 @@ class _Numbers:
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         decided: list[Extreme] = []
         if legs is None and not case.joint_centre_tolerance:
-            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
-            shown = shown_extremes(
-                case, self.closed, box, names, effort, with_objective=with_objective, only_limits=not is_reached
-            )
-            decided = [each for each in shown if each.limit is None or each.outcome is not Outcome.OPEN]
+            search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
+            if is_reached:
+                effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..boxes.proof_writer import ProofWriter
 from ..certificate.certificate import CertificateStatus
-from ..checker.proof import Node
-from ..checker.workspace.tree import PoseNode, split_bytes
+from ..checker.tree import Node, node_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,7 +48,7 @@ class TreeRecord:
         cuts = zip(keys, split.tolist(), middle.tolist(), _keys(lower, below), _keys(above, upper), strict=True)
         for key, i, value, one, other in cuts:
             self._root = self._root or key
-            self._cuts[key] = split_bytes(i, value), one, other
+            self._cuts[key] = node_bytes(Node.CUT, i, value=value), one, other
 
     def contractions(
         self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
@@ -73,7 +72,7 @@ class TreeRecord:
                 parts.append(cut[0])
                 waiting += [cut[2], cut[1]]
             else:
-                parts.append(bytes([PoseNode.OUTSIDE if key in self._outside else PoseNode.CLOSED]))
+                parts.append(bytes([Node.OUTSIDE if key in self._outside else Node.BOUNDED]))
         return b"".join(parts)
 
 

@@ -155,7 +155,7 @@ class SmallestValue(Rule[Columns]):
     def verdicts(self, left: Boxes[Columns]) -> Verdicts[Columns]:
         """Close boxes whose bounds are good enough."""
         done = -left.bound >= self._goal.bounds(self.best.value)[0]
-        return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), left.count)
+        return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), len(left.split))
 
     def ending(self, search: Search[Columns]) -> Callable[[], str | None]:
         """Return the function that ends a search: at its goal, or at a box that is too small for it."""
@@ -188,7 +188,7 @@ class _OracleRule(SmallestValue[tuple[()]]):
             self._recorder.cuts(boxes.lower, boxes.upper, boxes.split)
         return bisected(boxes)
 
-    def examine(self, boxes: Boxes[tuple[()]], target: float) -> Verdicts[tuple[()]]:
+    def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
         """Return bounds of boxes, contracted to the workspace, and take note of small values in them."""
         parts = self._box.contracted(boxes.lower, boxes.upper)
         if self._recorder is not None:

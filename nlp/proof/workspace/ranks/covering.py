@@ -1,4 +1,4 @@
-"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and rules for their search."""
+"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and how joints follow."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
 
 
 class Followed(NamedTuple):
-    """Columns of a search of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
+    """Columns of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
 
     near: FloatArray
     is_known: NDArray[np.bool_]
@@ -112,12 +112,10 @@ class LoopRule(Rule[Followed]):
         return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), Followed(near, is_known, none))
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the parts of boxes, with their dependent coordinates."""
-        parts, cut = bisected(boxes), int((boxes.split >= 0).sum())
-        sides = np.zeros((parts.count, len(parts.lower[0])))
-        high = np.arange(parts.count - cut, parts.count)
-        sides[high, parts.split[high]], sides[high - cut, parts.split[high]] = 1.0, -1.0
-        sides[parts.split < 0] = 0.0
+        """Return the halves of boxes, with their dependent coordinates."""
+        parts, count = bisected(boxes), len(boxes.split)
+        sides = np.zeros(parts.lower.shape)
+        sides[np.arange(2 * count), parts.split] = np.repeat([-1.0, 1.0], count)
         cells = Cells(parts.lower, parts.upper, parts.more.near, parts.more.is_known)
         found = self._examiner.narrowed(cells, parts.more.relation, sides[:, self._independent])
         return parts._replace(lower=found.lower, upper=found.upper)

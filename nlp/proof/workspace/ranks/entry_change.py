@@ -35,7 +35,7 @@ _POLYNOMIAL = (
 def is_polynomial(entries: SX, family: Family) -> bool:
     """Return whether entries (E, 1) are polynomials in the coordinates of machines."""
     function = ca.Function("entries", [family.coordinates], [entries])
-    constant = set()  # work places, which are used again
+    constant: set[int] = set()  # work places, which are used again
     for k in range(function.n_instructions()):
         op, to, places = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if op not in _POLYNOMIAL and not (op == ca.OP_DIV and places[1] in constant):

@@ -85,7 +85,7 @@ class Examined(NamedTuple):
         is_regular: (B,) whether the matrix has full rank at every pose of the box.
         shares: (B, f) share of each independent coordinate in the bounds.
         smallest: (B,) smallest singular value at the middle, in parts of the largest; infinite where it is not known.
-        signs: (B,) those of :class:`~.rank.Tested`.
+        signs: (B,) those of :class:`~.rank_rule.Tested`.
     """
 
     cells: Cells
@@ -98,13 +98,20 @@ class Examined(NamedTuple):
     def some(self, which: NDArray[np.int64]) -> Examined:
         """Return the results for some of the boxes."""
         relation = Relation(*(each[which] for each in self.relation))
-        return Examined(self.cells.some(which), relation, *(each[which] for each in self[2:]))
+        regular, shares, smallest = self.is_regular[which], self.shares[which], self.smallest[which]
+        return Examined(self.cells.some(which), relation, regular, shares, smallest, self.signs[which])
 
     def followed_by(self, other: Examined) -> Examined:
         """Return these results, then those of other boxes."""
         relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
-        rest = (np.concatenate(pair) for pair in zip(self[2:], other[2:], strict=True))
-        return Examined(joined([self.cells, other.cells]), relation, *rest)
+        return Examined(
+            joined([self.cells, other.cells]),
+            relation,
+            np.concatenate([self.is_regular, other.is_regular]),
+            np.concatenate([self.shares, other.shares]),
+            np.concatenate([self.smallest, other.smallest]),
+            np.concatenate([self.signs, other.signs]),
+        )
 
 
 class Test(Protocol):

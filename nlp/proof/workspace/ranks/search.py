@@ -132,14 +132,13 @@ class _RankRule(LoopRule):
         self._recorder, self._refuter, self._examined = recorder, refuter, 0
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the parts of boxes."""
-        cut = np.flatnonzero(boxes.split >= 0)
-        if self._recorder is not None and cut.size:
-            along = np.array(self._problem.free)[boxes.split[cut]]
-            self._recorder.cuts(*self._ends(boxes.lower[cut], boxes.upper[cut]), along)
+        """Return the halves of boxes."""
+        if self._recorder is not None:
+            along = np.array(self._problem.free)[boxes.split]
+            self._recorder.cuts(*self._ends(boxes.lower, boxes.upper), along)
         return super().divided(boxes)
 
-    def examine(self, boxes: Boxes[Followed], target: float) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
         found = self.examined(boxes)
         count = len(found.is_regular)

@@ -136,7 +136,7 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
         SmallestValue.__init__(self, goal, Value(math.inf, family.start))
         self._points = MachinePoints(family, expression)
 
-    def examine(self, boxes: Boxes[Followed], target: float) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
         found = self.examined(boxes)
         known = np.flatnonzero(found.cells.is_known & np.isfinite(found.smallest))

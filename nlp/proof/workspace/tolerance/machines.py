@@ -117,16 +117,9 @@ def machine_extremes(
 
 
 def shown_extremes(
-    case: Case,
-    closed: ClosedForm,
-    box: PoseBox,
-    quantities: Sequence[str],
-    effort: Effort,
-    *,
-    with_objective: bool,
-    only_limits: bool = False,
+    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], effort: Effort, *, with_objective: bool
 ) -> Iterator[Extreme]:
-    """Yield the extremes of numbers of a design with loops, in the assembly of home.
+    """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
 
     Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is singular.
     The design is searched as the only machine within a tolerance of nothing. None is yielded of a robot without loops,
@@ -139,7 +132,6 @@ def shown_extremes(
         quantities: names of measures.
         effort: how they are proved.
         with_objective: whether F of each task is bounded.
-        only_limits: whether numbers without a limit are left out.
 
     Raises:
         InputError: the robot has no measure of a name.
@@ -154,7 +146,7 @@ def shown_extremes(
     machines = Machines(case, closed.model, built, family)
     layout = machine_layout(case, built, family)
     for claim in claims_of(layout, quantities, with_objective=with_objective):
-        if claim.limit is not None or not only_limits:
+        if claim.limit is None:
             yield _extreme(machines, None, claim, in_family(layout, family, claim.expression), effort)
 
 

@@ -1,0 +1,192 @@
+"""Limits of a robot whose loops have no closed form, over a workspace, in the assembly of home.
+
+Loop equations as conditions hold in every assembly of the joints. Here the closed loops of the assembly in the middle
+of the workspace are followed over boxes (:mod:`..ranks.loop_boxes`), and each number with a limit is bounded over these
+boxes. A box is bisected while its bound of some number is beyond the limit, or, where a value is known beyond it,
+beyond this value by more than the gap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .....models import FloatArray
+from .....models.joints.closedform import ClosedForm
+from ....case.case import Case
+from ....errors import UncoveredError
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
+from ..ranks.loop_boxes import Cells, Examiner, are_between
+from ..ranks.rank_rule import RankTest
+from ..robot.pose_box import PoseBox
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem
+from ..verdict import Outcome
+from .extremes import CLOSE, Extreme
+from .limit_values import Enclosed, LimitValues
+
+#: Boxes examined at once.
+_BLOCK = 128
+#: Widths of a box, in parts of the whole box, below which it is not bisected.
+_LEAST_WIDTHS = 2.0**-24, 2.0**-24
+#: Smallest size of a number that gaps are parts of.
+_NEAR_ZERO = 1e-6
+
+
+def loop_extremes(
+    case: Case,
+    closed: ClosedForm,
+    box: PoseBox,
+    *,
+    gap: float,
+    time_limit: float | None,
+    interrupted: Callable[[], bool],
+) -> list[Extreme]:
+    """Return the extremes of numbers with a limit, in the assembly of home; none of a robot without open loops.
+
+    Args:
+        case: with fixed dimensions.
+        closed: its robot without unknowns in closed form.
+        box: the poses.
+        gap: allowed distance of a bound from a value beyond its limit, as a part of the value.
+        time_limit: seconds after which the search stops.
+        interrupted: whether the work is requested to stop.
+    """
+    if not closed.model.unknowns:
+        return []
+    try:
+        problem = build_problem(case, closed.model, box)
+        values = LimitValues(case, closed, problem)
+        if not values.claims:
+            return []
+        rule = _LimitsRule(problem, values, gap)
+    except (NotJudgedError, UncoveredError):
+        return []
+    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
+
+    def ending() -> str | None:
+        if search.state.small:
+            return TOO_SMALL
+        return None if search.is_open or rule.is_one_assembly() else APART
+
+    effort = Effort(time_limit, interrupted=interrupted)
+    reason = effort.run(search, ending)
+    return rule.extremes(reason, search.boxes, effort.seconds)
+
+
+class _Best(NamedTuple):
+    """Largest values (K,) that are known of K numbers, -inf without one, and the points (K, n) that have them."""
+
+    value: FloatArray
+    z: FloatArray
+
+
+class _LimitsRule(LoopRule):
+    """Rule of K numbers."""
+
+    def __init__(self, problem: Problem, values: LimitValues, gap: float) -> None:
+        examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None, None)
+        super().__init__(problem, examiner)
+        self._values, self._gap, self._dependent = values, gap, list(problem.dependent)
+        count, n = len(values.claims), len(problem.start)
+        self._best = _Best(np.full(count, -np.inf), np.full((count, n), np.nan))
+        self._bound = np.full(count, -np.inf)
+
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
+        """Return the boxes on which a number is not decided."""
+        found = self.examined(boxes)
+        known = found.cells.is_known
+        shares, is_left, rows = found.shares.copy(), np.ones(len(known), dtype=bool), np.flatnonzero(known)
+        if rows.size:
+            cells = some(found.cells, rows)
+            enclosed = self._values.enclosed(cells)
+            upper = enclosed.numbers.upper
+            self._add_points(cells, enclosed)
+            is_open = upper > self._least
+            is_left[rows] = is_open.any(axis=1)
+            closed = ~is_left[rows]
+            self._bound = np.maximum(self._bound, upper[closed].max(axis=0, initial=-np.inf))
+            size = np.nan_to_num(upper - enclosed.numbers.lower, nan=1.0, posinf=1.0)
+            parts = np.abs(enclosed.numbers.slopes) * is_open[:, :, None] / np.maximum(size, 1e-300)[:, :, None]
+            shares[rows] = np.nan_to_num(parts).sum(axis=1)
+        left = some(found._replace(shares=shares), np.flatnonzero(is_left))
+        split = coordinates_to_split(left.shares, self.widths(left))
+        return Verdicts(self.boxes_of(left, np.zeros(len(split)), split), 0.0, len(known))
+
+    def is_one_assembly(self) -> bool:
+        """Return whether all boxes surely have the assembly of the middle."""
+        if not self._roots:
+            return True
+        roots, start = joined(self._roots), self._problem.start
+        inside = (roots.lower <= start) & (roots.upper >= start)
+        here, same = inside[:, self._independent].all(axis=1), inside[:, self._dependent].all(axis=1)
+        return bool((same | ~here).all()) and super().is_one_assembly()
+
+    @property
+    def _least(self) -> FloatArray:
+        """(K,) bounds up to which a number is decided."""
+        best = self._best.value
+        size = np.maximum(np.abs(best), _NEAR_ZERO)
+        with np.errstate(invalid="ignore"):
+            beyond = best + self._gap * size
+        return np.asarray(np.where(best > self._values.limit, beyond, self._values.limit))
+
+    def _add_points(self, cells: Cells, enclosed: Enclosed) -> None:
+        """Try the middles of boxes, and for each number the end of the box with the largest bound."""
+        upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
+        best = np.argmax(upper, axis=0)
+        rows = np.concatenate([np.arange(len(cells.lower)), best])
+        ends = np.concatenate(
+            [np.zeros((len(cells.lower), len(self._independent))), np.sign(slopes[best, np.arange(len(best))])]
+        )
+        z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
+        z[:, self._independent] += half[:, self._independent] * ends
+        off, T, _, _ = (each[rows] for each in enclosed.relation)
+        z[:, self._dependent] += half[:, self._dependent] * (off - (T @ ends[:, :, None])[:, :, 0])
+        free, count = list(self._problem.free), len(self._problem.free)
+        inside = self._problem.box.clipped(self._problem.pose_of(z))[:, free]
+        own = [k for k in self._independent if k < count]
+        z[:, own] = inside[:, own]
+        z = self._examiner.loops.all_closed(z.T, self._dependent).T
+        z[~are_between(z, some(cells, rows), self._dependent)] = np.nan
+        numbers = self._values.values(z)
+        y = self._problem.pose_of(np.nan_to_num(z))
+        held = np.array([self._problem.box.holds(each) for each in y]) & np.isfinite(z).all(axis=1)
+        numbers = np.where(held & np.isfinite(numbers), numbers, -np.inf)
+        place = np.argmax(numbers, axis=1)
+        value = numbers[np.arange(len(place)), place]
+        better = value > self._best.value
+        self._best = _Best(np.where(better, value, self._best.value), np.where(better[:, None], z[place], self._best.z))
+
+    def extremes(self, reason: str, boxes: int, seconds: float) -> list[Extreme]:
+        """Return the extremes of the numbers; with a reason for stopping before the end nothing is bounded."""
+        found, values = [], self._values
+        for k, claim in enumerate(values.claims):
+            sign, read = float(values.sign[k]), claim.reading.from_value
+            best = float(self._best.value[k])
+            bound = math.inf if reason else max(float(self._bound[k]), best)
+            pose = None
+            if math.isfinite(best):
+                pose = self._problem.box.pose(self._problem.pose_of(self._best.z[k]))
+            outcome = Outcome.PROVED if bound <= values.limit[k] else Outcome.OPEN
+            outcome = Outcome.REFUTED if best > values.limit[k] else outcome
+            found.append(
+                Extreme(
+                    name=claim.name,
+                    sense=claim.sense,
+                    dimension=claim.reading.dimension,
+                    key=claim.key,
+                    limit=read(claim.limit or 0.0),
+                    bound=read(sign * bound) if math.isfinite(bound) else sign * math.inf,
+                    reached=read(sign * best) if math.isfinite(best) else math.nan,
+                    pose=pose,
+                    outcome=outcome,
+                    boxes=boxes,
+                    seconds=seconds,
+                    reason="" if outcome is not Outcome.OPEN else reason or CLOSE,
+                )
+            )
+        return found
