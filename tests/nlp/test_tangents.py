@@ -5,11 +5,11 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from limb_cases import poses
 from numpy_engine import tangent_bounds
 from numpy_engine.bounding import NumpyEngine
 from numpy_engine.second_order import Forms, enclose_second, monomials
 from numpy_engine.tangent_bounds import tangent_forms
-from limb_cases import poses
 
 from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
 from screwsynth.nlp.proof.boxes.engines import Engine
