@@ -33,7 +33,7 @@ WHOLE, SMALL = -1, -2
 #: Reason for stopping at boxes below the least width.
 TOO_SMALL = "the boxes that are left are too small to be divided"
 #: With more open boxes than this the newest ones are taken first, so that a search needs no more memory.
-_MANY = 1_000_000
+_MANY = 2_000_000
 #: With more open boxes than this those with the largest bounds are no longer looked for among all.
 _FEW = 50_000
 #: Seconds between two reports of progress.
@@ -146,6 +146,14 @@ class Rule(ABC, Generic[Columns]):
     def examine(self, boxes: Boxes[Columns]) -> Verdicts[Columns]:
         """Return the results for boxes."""
 
+    def fault(self, small: Sequence[Boxes[Columns]]) -> str:
+        """Return the reason for stopping at boxes that are too small; empty for none."""
+        del small
+        return ""
+
+    def close(self) -> None:
+        """Stop what works beside the rule."""
+
     def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
 
@@ -193,7 +201,10 @@ class State(NamedTuple, Generic[Columns]):
         return max([self.closed, waiting, *(float(each.bound.max()) for each in self.small)])
 
 
-class Search(Generic[Columns]):
+AnyRule = TypeVar("AnyRule", bound=Rule[Any])
+
+
+class Search(Generic[AnyRule]):
     """A search of a box.
 
     Args:
@@ -211,8 +222,8 @@ class Search(Generic[Columns]):
 
     def __init__(
         self,
-        rule: Rule[Columns],
-        root: Boxes[Columns],
+        rule: AnyRule,
+        root: Boxes[Any],
         *,
         block: int,
         whole: FloatArray,
@@ -222,7 +233,7 @@ class Search(Generic[Columns]):
         self.rule, self._block, self._order = rule, block, order
         self._columns = np.flatnonzero(whole > 0)
         self._whole, self._least, self._newest = whole[self._columns], least, 0
-        self.state: State[Columns] = State([(math.inf, 0, root)], [], -math.inf, 0)
+        self.state: State[Any] = State([(math.inf, 0, root)], [], -math.inf, 0)
 
     @property
     def is_open(self) -> bool:
@@ -233,6 +244,25 @@ class Search(Generic[Columns]):
     def boxes(self) -> int:
         """Number of boxes examined."""
         return self.state.examined
+
+    @property
+    def left(self) -> int:
+        """Number of boxes that are left."""
+        return self.state.open
+
+    @property
+    def bound(self) -> float:
+        """Upper bound over the whole box; -inf where all of it is closed without one."""
+        return self.state.bound
+
+    @property
+    def fault(self) -> str:
+        """Reason for stopping at boxes that are too small; empty for none."""
+        return self.rule.fault(self.state.small)
+
+    def close(self) -> None:
+        """Stop what works beside the search."""
+        self.rule.close()
 
     def step(self, target: float) -> None:
         """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
@@ -258,7 +288,7 @@ class Search(Generic[Columns]):
         closed, examined = max(self.state.closed, found.closed), self.state.examined + found.examined
         self.state = State(waiting, small, closed, examined)
 
-    def _divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
+    def _divided(self, boxes: Boxes[Any]) -> Boxes[Any]:
         """Return the parts of boxes, of which some may stay whole."""
         is_cut = boxes.split >= 0
         if not is_cut.any():
@@ -266,7 +296,7 @@ class Search(Generic[Columns]):
         halves = self.rule.divided(some(boxes, is_cut))
         return halves if is_cut.all() else joined([some(boxes, ~is_cut), halves])
 
-    def _divisions(self, found: Verdicts[Columns]) -> NDArray[np.intp]:
+    def _divisions(self, found: Verdicts[Any]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
         lower, upper, bound, split, _ = found.left
         every = np.arange(len(split))
@@ -279,19 +309,19 @@ class Search(Generic[Columns]):
         once = False if found.again is None else found.again
         return np.where(is_small & (split >= 0), np.where(once, WHOLE, SMALL), split)
 
-    def _put(self, waiting: list[_Chunk[Columns]], boxes: Boxes[Columns]) -> None:
+    def _put(self, waiting: list[_Chunk[Any]], boxes: Boxes[Any]) -> None:
         """Add boxes."""
         if len(boxes.split):
             key = 0.0 if self._order is Order.NEWEST else float(boxes.bound.max())
             self._newest += 1
             insort(waiting, (key, self._newest, boxes))
 
-    def _take(self, waiting: list[_Chunk[Columns]]) -> Boxes[Columns]:
+    def _take(self, waiting: list[_Chunk[Any]]) -> Boxes[Any]:
         """Remove and return boxes whose parts are a block; there must be one.
 
         Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
         """
-        taken: list[Boxes[Columns]] = []
+        taken: list[Boxes[Any]] = []
         room, count = self._block, self.state.open
         if self._order is Order.LARGEST and count <= _FEW:
             waiting[:] = [(math.inf, 0, joined([boxes for _, _, boxes in waiting]))]

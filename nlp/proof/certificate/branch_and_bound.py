@@ -11,7 +11,6 @@ No solver is trusted: the value of an incumbent is that of the program's own fun
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
@@ -20,14 +19,15 @@ from ....models import FloatArray, frozen_array
 from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
-from ...interruption import Milestone, reached, reason_of, reason_to_stop
+from ...interruption import reason_of
 from ...program.nlp import Nlp
 from ..boxes.engines import engine_for
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import SharedSearch
-from ..boxes.optimum import BoxSearch
+from ..boxes.optimum import optimum_search
 from ..boxes.proof_writer import ProofWriter
+from ..boxes.search import TOO_SMALL, Effort
 from ..boxes.symmetry import halved
 from ..enclosure.engine import engine_name
 from ..statement.limb_separation import separate
@@ -45,8 +45,7 @@ _NEAR_ZERO = 1e-6
 _GAP_ROUNDING = 1e-9
 #: Number of variables up to which the whole box is searched although limbs share variables: it takes fewer boxes then.
 _WHOLE_BOX = 12
-#: Seconds between two reports of progress, and the largest number of entries in a history.
-_REPORT_EVERY = 0.1
+#: Largest number of entries in a history.
 _HISTORY = 200
 
 #: Callback with seconds, bound, incumbent, number of boxes examined, number of boxes open.
@@ -84,15 +83,15 @@ def certify_program(
         UncoveredError: an expression holds an operation without a rule.
         ValueError: ``above`` for a maximisation, or an engine that does not exist here.
     """
-    began = time.perf_counter()
+    effort = Effort(time_limit)
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
     if nlp.n == 0:
-        return _certify_point(nlp, above, time.perf_counter() - began)
+        return _certify_point(nlp, above, effort.seconds)
     form = standard_form(nlp)
     incumbent = Incumbent(form)
     method = _method(form, incumbent, engine, jobs, recorder)
-    search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
+    search = _Search(form, incumbent, method, engine_name(engine), gap, above, effort)
     try:
         search.incumbent.start(x, claimed)
     except IncumbentError as error:
@@ -100,13 +99,13 @@ def certify_program(
     search.first_value = incumbent.value
 
     def run() -> str:
-        reason = search.run(time_limit, progress)
+        reason = search.run(progress)
         while not reason and search.is_short():
             search.method.close()
             if recorder is not None:
                 recorder.clear()
             search.restart(_method(form, incumbent, engine, jobs, recorder))
-            reason = search.run(time_limit, progress)
+            reason = search.run(progress)
         return reason
 
     try:
@@ -146,7 +145,7 @@ def _method(
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return BoxSearch(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
+        return optimum_search(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
     return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
 
 
@@ -197,7 +196,7 @@ class _Search:
         method: examines boxes.
         gap: as for :func:`certify_program`.
         above: as for :func:`certify_program`.
-        began: time at the start.
+        effort: the clock, and the time there is.
         history: (seconds, bound, incumbent) in the program's own sense.
         first_value: value of the incumbent when the method began.
         boxes_before: number of boxes that methods before this one examined.
@@ -209,7 +208,7 @@ class _Search:
     engine: str
     gap: float
     above: float | None
-    began: float
+    effort: Effort
     history: list[tuple[float, float, float]] = field(default_factory=list)
     first_value: float = -math.inf
     boxes_before: int = 0
@@ -263,24 +262,20 @@ class _Search:
             return self.bound < -self.above
         return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
 
-    def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
+    def run(self, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
-        reported = -math.inf
-        reached(Milestone.BOUND)
-        while self.method.is_open:
-            if self._has_counterexample():
-                return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
-            seconds = time.perf_counter() - self.began
-            reason = reason_to_stop(seconds, time_limit)
-            if reason:
-                return reason
-            if seconds - reported >= _REPORT_EVERY:
-                reported = seconds
-                self._report(seconds, progress)
-            self.method.step(self.threshold)
-            if self.method.fault:
-                return self.method.fault
-        return "boxes are left that are too small to cut" if self.method.left else ""
+        effort = replace(self.effort, progress=lambda seconds: self._report(seconds, progress))
+        return effort.run(self.method, self._ending, lambda: self.threshold)
+
+    def _ending(self) -> str | None:
+        """Return the reason for ending; None for going on."""
+        if self.method.fault:
+            return self.method.fault
+        if not self.method.is_open:
+            return TOO_SMALL if self.method.left else ""
+        if self._has_counterexample():
+            return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
+        return None
 
     def _report(self, seconds: float, progress: CertifyProgress | None) -> None:
         """Report progress, and add to the history; a full history loses every second entry."""
@@ -295,7 +290,7 @@ class _Search:
     def certificate(self, reason: str) -> Certificate:
         """Return the certificate at this state of the search."""
         nlp, sign = self.form.nlp, self.form.sign
-        seconds = time.perf_counter() - self.began
+        seconds = self.effort.seconds
         self._report(seconds, None)
         left = self.method.left
         known = self.incumbent.x is not None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -157,7 +157,7 @@ class SmallestValue(Rule[Columns]):
         done = -left.bound >= self._goal.bounds(self.best.value)[0]
         return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), len(left.split))
 
-    def ending(self, search: Search[Columns]) -> Callable[[], str | None]:
+    def ending(self, search: Search[Any]) -> Callable[[], str | None]:
         """Return the function that ends a search: at its goal, or at a box that is too small for it."""
 
         def reason() -> str | None:
