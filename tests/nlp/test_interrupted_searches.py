@@ -55,7 +55,7 @@ WATCHED = tuple(str(ROOT / name) for name in ("proof", "interruption.py"))
 LOOPS = (
     str(ROOT / "interruption.py"),
     str(ROOT / "proof" / "certificate" / "branch_and_bound.py"),
-    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "open_boxes.py")),
+    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "optimum.py")),
     *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
     *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
     str(ROOT / "proof" / "workspace" / "ranks" / "search.py"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..statement.standard_form import StandardForm
 from .engines import Engine
@@ -14,9 +15,6 @@ from .examination import Examination, Verdict
 from .incumbent import PointKeeper
 from .proof_writer import ProofWriter
 from .search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, bisected
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
 #: hold a point without a value, and others.
@@ -93,7 +91,9 @@ class OptimumRule(Rule[NDArray[np.int64]]):
         moved = ((lower != boxes.lower[rest]) | (upper != boxes.upper[rest])).any(axis=1)
         nodes = self._nodes + 2 * np.arange(rest.size)
         self._nodes += 2 * rest.size
-        left = Boxes(lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest], nodes)
+        left = Boxes(
+            lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), nodes
+        )
         return Verdicts(left, self._closed, len(boxes.split), moved, reasons=(found, rest))
 
     def record(

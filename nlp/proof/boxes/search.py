@@ -112,7 +112,8 @@ class Verdicts(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
-        left: (O,) the parts of the open boxes that are left; those to be examined again have ``WHOLE`` to bisect.
+        left: (O,) the parts of the open boxes that are left; ``WHOLE`` or ``SMALL`` in the place of a
+            coordinate to bisect as for :meth:`Rule.record`.
         closed: largest bound of what was closed or cut off.
         examined: number of boxes examined.
         again: (O,) whether a part that is too small to be bisected is to be examined again, as one that was moved; None
@@ -272,19 +273,19 @@ class Search(Generic[AnyRule]):
         found = self.rule.examine(parts)
         split = self._divisions(found)
         self.rule.record(parts, found, split)
+        left = found.left._replace(split=split)
+        small += [some(left, split == SMALL)] * bool((split == SMALL).any())
+        cut = left if (split >= 0).all() else some(left, split >= 0)
+        if self._order is not Order.LARGEST:
+            cut = self._divided(cut)
+            cut = cut._replace(split=np.full(len(cut.split), WHOLE))
+        self._put(waiting, cut)
+        if (split == WHOLE).any():
+            self._put(waiting, some(left, split == WHOLE))
         if found.is_better:
             for each in small:
                 self._put(waiting, each._replace(split=np.full(len(each.split), WHOLE)))
             small = []
-        left = found.left._replace(split=split)
-        if not (split >= 0).all():
-            self._put(waiting, some(left, split == WHOLE))
-            small += [some(left, split == SMALL)] * bool((split == SMALL).any())
-            left = some(left, split >= 0)
-        if self._order is not Order.LARGEST:
-            left = self._divided(left)
-            left = left._replace(split=np.full(len(left.split), WHOLE))
-        self._put(waiting, left)
         closed, examined = max(self.state.closed, found.closed), self.state.examined + found.examined
         self.state = State(waiting, small, closed, examined)
 

@@ -24,7 +24,7 @@ from ...program.nlp import Nlp
 from ..boxes.engines import engine_for
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
-from ..boxes.limbs.shared import SharedSearch
+from ..boxes.limbs.shared import shared_search
 from ..boxes.optimum import optimum_search
 from ..boxes.proof_writer import ProofWriter
 from ..boxes.search import TOO_SMALL, Effort
@@ -146,7 +146,7 @@ def _method(
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
         return optimum_search(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
-    return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
+    return shared_search(form, separation, incumbent, engine, jobs, recorder)
 
 
 class SearchMethod(Protocol):
