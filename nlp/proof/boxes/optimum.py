@@ -14,7 +14,8 @@ from .engines import Engine
 from .examination import Examination, Verdict
 from .incumbent import PointKeeper
 from .proof_writer import ProofWriter
-from .search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, bisected
+from .rows import SMALL, WHOLE, Boxes, bisected
+from .search import Order, Rule, Search, Verdicts
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
 #: hold a point without a value, and others.

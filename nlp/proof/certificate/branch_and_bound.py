@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
@@ -27,7 +27,7 @@ from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
 from ..boxes.optimum import optimum_search
 from ..boxes.proof_writer import ProofWriter
-from ..boxes.search import TOO_SMALL, Effort
+from ..boxes.search import TOO_SMALL, Effort, SearchMethod
 from ..boxes.symmetry import halved
 from ..enclosure.engine import engine_name
 from ..statement.limb_separation import separate
@@ -147,36 +147,6 @@ def _method(
     if separation is None or form.n <= _WHOLE_BOX:
         return optimum_search(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
     return shared_search(form, separation, incumbent, engine, jobs, recorder)
-
-
-class SearchMethod(Protocol):
-    """A way to search a box, step by step."""
-
-    @property
-    def is_open(self) -> bool:
-        """Whether boxes are left to be examined."""
-
-    @property
-    def left(self) -> int:
-        """Number of open boxes."""
-
-    @property
-    def boxes(self) -> int:
-        """Number of boxes examined."""
-
-    @property
-    def bound(self) -> float:
-        """Upper bound of the maximum over the boxes; -inf where no point is feasible."""
-
-    @property
-    def fault(self) -> str:
-        """Reason for stopping at boxes without a finite bound; empty without any."""
-
-    def step(self, threshold: float) -> None:
-        """Examine some boxes, and close those whose bounds do not exceed a threshold."""
-
-    def close(self) -> None:
-        """Stop what works beside it."""
 
 
 class _Gap(NamedTuple):

@@ -20,7 +20,8 @@ from ...enclosure.quadratic_models import GradientModel, ranges
 from ..bounding import NumpyEngine
 from ..engines import limb_engine_for
 from ..optimum import LEAST_WIDTHS, reason_without_bound
-from ..search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, some
+from ..rows import SMALL, WHOLE, Boxes, some
+from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
 from .boxes import OwnBoxes, SharedBoxes
 from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...boxes.search import Boxes, Rule, bisected, joined, some
+from ...boxes.rows import Boxes, bisected, joined, some
+from ...boxes.search import Rule
 from ..robot.posed_robot import Problem
 from .connected import is_connected
 from .krawczyk import Relation
