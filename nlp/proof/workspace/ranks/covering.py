@@ -153,4 +153,4 @@ class LoopRule(Rule[Followed]):
 def in_workspace(problem: Problem, cells: Cells) -> Cells:
     """Return the boxes that hold poses of the workspace, contracted to them."""
     found = contracted_cells(problem, cells)
-    return found.cells.some(np.flatnonzero(found.kept))
+    return some(found.cells, found.kept)
