@@ -28,7 +28,7 @@ from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.boxes.optimum import BoxSearch
+from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -55,7 +55,7 @@ WATCHED = tuple(str(ROOT / name) for name in ("proof", "interruption.py"))
 LOOPS = (
     str(ROOT / "interruption.py"),
     str(ROOT / "proof" / "certificate" / "branch_and_bound.py"),
-    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "open_boxes.py")),
+    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "optimum.py")),
     *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
     *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
     str(ROOT / "proof" / "workspace" / "ranks" / "search.py"),
@@ -358,7 +358,7 @@ position = [{{ min = -2, max = 2 }}, {{ min = -2, max = 2 }}, {{ min = 28, max =
 def test_a_judgement_keeps_what_is_proved_before_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
     case = octahedral()
     whole = judge_workspace(case, gap=0.2)
-    monkeypatch.setattr(BoxSearch, "_step", interrupting(3, BoxSearch._step))
+    monkeypatch.setattr(OptimumRule, "examine", interrupting(3, OptimumRule.examine))
     found = judge_workspace(case, gap=0.2)
     assert found.regularity.outcome is whole.regularity.outcome
     assert [each.name for each in found.extremes] == [each.name for each in whole.extremes]
@@ -372,7 +372,7 @@ def test_a_judgement_keeps_what_is_proved_before_an_interrupt(monkeypatch: pytes
 
 
 def test_certificates_of_several_tasks_end_with_the_one_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(BoxSearch, "_step", interrupting(1, BoxSearch._step))
+    monkeypatch.setattr(OptimumRule, "examine", interrupting(1, OptimumRule.examine))
     found = certify(load_case("paper-4.2"), starts=2, jobs=1)
     assert [each.reason for each in found.tasks] == [STOPPED] * len(found.tasks)
     assert not found.is_proved
@@ -384,7 +384,7 @@ def test_an_interrupted_scale_is_no_larger(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(scale, "ACCURACY", 0.5)
     whole = largest_scale(case, time_limit=None)
     assert whole.factor >= 1
-    monkeypatch.setattr(ranks._Search, "_halves", interrupting(1, ranks._Search._halves))
+    monkeypatch.setattr(ranks._RankRule, "divided", interrupting(1, ranks._RankRule.divided))
     found = largest_scale(case, time_limit=None)
     assert found.factor <= whole.factor
     assert found.failed >= whole.failed
@@ -394,7 +394,7 @@ def test_an_interrupted_exchange_of_poses_proves_nothing(monkeypatch: pytest.Mon
     whole = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
     assert whole.workspace is not None
     assert whole.workspace.is_proved
-    monkeypatch.setattr(BoxSearch, "_step", interrupting(2, BoxSearch._step))
+    monkeypatch.setattr(OptimumRule, "examine", interrupting(2, OptimumRule.examine))
     found = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
     assert found.workspace is not None
     assert not found.workspace.is_proved
@@ -403,7 +403,7 @@ def test_an_interrupted_exchange_of_poses_proves_nothing(monkeypatch: pytest.Mon
 
 
 def test_an_interrupted_sweep_keeps_no_row_of_the_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(BoxSearch, "_step", interrupting(2, BoxSearch._step))
+    monkeypatch.setattr(OptimumRule, "examine", interrupting(2, OptimumRule.examine))
     out = tmp_path / "out.csv"
     over = {"over": {"x2": [7.0, 8.0]}, "out": out, "starts": 1, "jobs": 1, "certified": True}
     with pytest.raises(KeyboardInterrupt):

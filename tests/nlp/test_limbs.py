@@ -145,7 +145,7 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     of = np.repeat(np.arange(B), each)
     own_size = size[m:, of] * rng.random((limb.n - m, of.size))
     own_low = low[m:, of] + rng.random(own_size.shape) * (size[m:, of] - own_size)
-    own = OwnBoxes(own_low, own_low + own_size, of)
+    own = OwnBoxes(own_low, own_low + own_size, of, int(of[-1]) + 1)
     good = low[m:] + 0.5 * size[m:]
     models = engine.limb_models(
         np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
@@ -211,7 +211,7 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     monkeypatch.setattr(sharedsearch, "cut_own", careless)
     # No better incumbent is found, so a bound that is too low cannot hide behind it.
-    monkeypatch.setattr(sharedsearch.SharedSearch, "_improve", lambda *_: None)
+    monkeypatch.setattr(sharedsearch.SharedRule, "_improve", lambda *_: None)
     wrong = 0
     for seed in (0, 2, 6):
         bound, best = both_searches(seed)
@@ -238,13 +238,14 @@ def test_limbs_that_share_the_pose_are_bounded_soon() -> None:
 def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
     """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
     form, found = separated(poses(0))
-    search = sharedsearch.SharedSearch(form, found, Incumbent(form), 1)
+    search = sharedsearch.shared_search(form, found, Incumbent(form), 1)
     for _ in found.limbs:
         search.step(-np.inf)  # prepares a limb
-    boxes = search._opened.pop(1)
+    rule = search.rule
+    boxes = sharedsearch.view(search.state.left[0])
     for bound in (np.inf, 1.0):
         with np.errstate(all="ignore"):
-            sums = search._examine(replace(boxes, bound=np.array([bound])))
+            sums = rule._examine(replace(boxes, bound=np.array([bound])))
             lists = [
                 sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
                 for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)

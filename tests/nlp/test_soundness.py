@@ -111,7 +111,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    target, name = (search._Search, "_halves") if place == "branch" else (Examiner, "examine")
+    target, name = (search._RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
     problem = build_problem(case, model, box)
     found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))

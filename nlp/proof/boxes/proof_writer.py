@@ -11,7 +11,6 @@ import numpy as np
 from ..checker.proof_file import ProofError
 from ..checker.tree import Node, node_bytes
 from .examination import COLLAPSED, Examination, Verdict
-from .open_boxes import Boxes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,22 +82,30 @@ class ProofWriter:
                 parts += [struct.pack("<d", bound + _OUTWARDS * abs(bound)), each.writer.tree(with_open=with_open)]
         return b"".join(parts)
 
-    def record(self, boxes: Boxes, found: Examination, cut: FloatArray, first_child: NDArray[np.int64]) -> None:
+    def record(
+        self,
+        place: NDArray[np.int64],
+        upper: FloatArray,
+        found: Examination,
+        is_cut: NDArray[np.bool_],
+        first_child: NDArray[np.int64],
+    ) -> None:
         """Record a block of examined boxes.
 
         Args:
-            boxes: the boxes before their examination.
+            place: (B,) number of the box's node, the root's being 0.
+            upper: (B, n) upper ends before the examination.
             found: its results.
-            cut: (B,) place of the bisection of variable ``found.split``; NaN where a box is not bisected.
+            is_cut: (B,) whether a box is bisected, along variable ``found.split``.
             first_child: (B,) node of the lower half, the upper half's being the next; without a bisection, node of the
                 part of the box that is left; -1 for a leaf.
         """
-        for k, place in enumerate(boxes.place.tolist()):
-            child, is_cut = int(first_child[k]), bool(np.isfinite(cut[k]))
+        for k, number in enumerate(place.tolist()):
+            child = int(first_child[k])
             if found.verdict[k] == Verdict.OPEN and child < 0:
                 continue
-            following = [] if child < 0 else [child + 1, child] if is_cut else [child]
-            self._nodes[place] = _NodeRecord(self._node_bytes(found, k, is_cut, boxes.upper[:, k]), following)
+            following = [] if child < 0 else [child + 1, child] if is_cut[k] else [child]
+            self._nodes[number] = _NodeRecord(self._node_bytes(found, k, bool(is_cut[k]), upper[k]), following)
 
     def tree(self, *, with_open: bool = False) -> bytes:
         """Return the whole tree.

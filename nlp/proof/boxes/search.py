@@ -17,23 +17,22 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from ...interruption import Milestone, is_requested, reached, reason_of, reason_to_stop
+from .rows import SMALL, WHOLE, Boxes, Columns, bisected, joined, some
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
 
-#: Coordinates to bisect of boxes that are examined again as they are, and of those that are too small to be bisected.
-WHOLE, SMALL = -1, -2
 #: Reason for stopping at boxes below the least width.
 TOO_SMALL = "the boxes that are left are too small to be divided"
 #: With more open boxes than this the newest ones are taken first, so that a search needs no more memory.
-_MANY = 1_000_000
+_MANY = 2_000_000
 #: With more open boxes than this those with the largest bounds are no longer looked for among all.
 _FEW = 50_000
 #: Seconds between two reports of progress.
@@ -48,71 +47,12 @@ class Order(enum.Enum):
     LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
 
 
-Columns = TypeVar("Columns")
-Rows = TypeVar("Rows")
-
-
-class Boxes(NamedTuple, Generic[Columns]):
-    """B boxes.
-
-    Attributes:
-        lower, upper: (B, n) ends.
-        bound: (B,) upper bounds.
-        split: (B,) coordinate to bisect; ``WHOLE`` for none.
-        more: columns that a rule carries: arrays (B, ...), or tuples of them.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    bound: FloatArray
-    split: NDArray[np.intp]
-    more: Columns
-
-
-def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
-    """Return some rows of an array, or of all arrays of a tuple; other columns have a method ``some`` of their own."""
-    each: Any = rows
-    found: Any
-    if isinstance(each, np.ndarray):
-        found = each[which]
-    elif isinstance(each, tuple):
-        parts = [some(part, which) for part in each]
-        found = type(each)(*parts) if hasattr(each, "_fields") else tuple(parts)
-    else:
-        found = each.some(which)
-    return cast("Rows", found)
-
-
-def joined(parts: Sequence[Rows]) -> Rows:
-    """Return the rows of arrays, or of tuples of them, one after the other."""
-    first: Any = parts[0]
-    found: Any
-    if len(parts) == 1:
-        found = first
-    elif isinstance(first, np.ndarray):
-        found = np.concatenate(cast("Any", parts))
-    elif isinstance(first, tuple):
-        columns = [joined(each) for each in zip(*cast("Any", parts), strict=True)]
-        found = type(first)(*columns) if hasattr(first, "_fields") else tuple(columns)
-    else:
-        found = first.joined(parts)
-    return cast("Rows", found)
-
-
-def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
-    """Return the lower halves of all boxes, then the upper ones."""
-    every, count = np.arange(len(boxes.split)), len(boxes.split)
-    parts = some(boxes, np.concatenate([every, every]))
-    middle = 0.5 * boxes.lower[every, boxes.split] + 0.5 * boxes.upper[every, boxes.split]
-    parts.upper[every, boxes.split] = parts.lower[count + every, boxes.split] = middle
-    return parts
-
-
 class Verdicts(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
-        left: (O,) the parts of the open boxes that are left; those to be examined again have ``WHOLE`` to bisect.
+        left: (O,) the parts of the open boxes that are left; ``WHOLE`` or ``SMALL`` in the place of a
+            coordinate to bisect as for :meth:`Rule.record`.
         closed: largest bound of what was closed or cut off.
         examined: number of boxes examined.
         again: (O,) whether a part that is too small to be bisected is to be examined again, as one that was moved; None
@@ -145,6 +85,14 @@ class Rule(ABC, Generic[Columns]):
     @abstractmethod
     def examine(self, boxes: Boxes[Columns]) -> Verdicts[Columns]:
         """Return the results for boxes."""
+
+    def fault(self, small: Sequence[Boxes[Columns]]) -> str:
+        """Return the reason for stopping at boxes that are too small; empty for none."""
+        del small
+        return ""
+
+    def close(self) -> None:
+        """Stop what works beside the rule."""
 
     def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
@@ -181,19 +129,11 @@ class State(NamedTuple, Generic[Columns]):
         """All boxes that are left."""
         return [*(boxes for _, _, boxes in self.waiting), *self.small]
 
-    @property
-    def open(self) -> int:
-        """Number of boxes that are left."""
-        return sum(len(each.split) for each in self.left)
 
-    @property
-    def bound(self) -> float:
-        """Upper bound over the whole box; -inf where all of it is closed without one."""
-        waiting = self.waiting[-1][0] if self.waiting else -math.inf
-        return max([self.closed, waiting, *(float(each.bound.max()) for each in self.small)])
+AnyRule = TypeVar("AnyRule", bound=Rule[Any])
 
 
-class Search(Generic[Columns]):
+class Search(Generic[AnyRule]):
     """A search of a box.
 
     Args:
@@ -211,8 +151,8 @@ class Search(Generic[Columns]):
 
     def __init__(
         self,
-        rule: Rule[Columns],
-        root: Boxes[Columns],
+        rule: AnyRule,
+        root: Boxes[Any],
         *,
         block: int,
         whole: FloatArray,
@@ -222,7 +162,7 @@ class Search(Generic[Columns]):
         self.rule, self._block, self._order = rule, block, order
         self._columns = np.flatnonzero(whole > 0)
         self._whole, self._least, self._newest = whole[self._columns], least, 0
-        self.state: State[Columns] = State([(math.inf, 0, root)], [], -math.inf, 0)
+        self.state: State[Any] = State([(math.inf, 0, root)], [], -math.inf, 0)
 
     @property
     def is_open(self) -> bool:
@@ -234,6 +174,26 @@ class Search(Generic[Columns]):
         """Number of boxes examined."""
         return self.state.examined
 
+    @property
+    def left(self) -> int:
+        """Number of boxes that are left."""
+        return sum(len(each.split) for each in self.state.left)
+
+    @property
+    def bound(self) -> float:
+        """Upper bound over the whole box; -inf where all of it is closed without one."""
+        waiting = self.state.waiting[-1][0] if self.state.waiting else -math.inf
+        return max([self.state.closed, waiting, *(float(each.bound.max()) for each in self.state.small)])
+
+    @property
+    def fault(self) -> str:
+        """Reason for stopping at boxes that are too small; empty for none."""
+        return self.rule.fault(self.state.small)
+
+    def close(self) -> None:
+        """Stop what works beside the search."""
+        self.rule.close()
+
     def step(self, target: float) -> None:
         """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
@@ -242,23 +202,23 @@ class Search(Generic[Columns]):
         found = self.rule.examine(parts)
         split = self._divisions(found)
         self.rule.record(parts, found, split)
+        left = found.left._replace(split=split)
+        small += [some(left, split == SMALL)] * bool((split == SMALL).any())
+        cut = left if (split >= 0).all() else some(left, split >= 0)
+        if self._order is not Order.LARGEST:
+            cut = self._divided(cut)
+            cut = cut._replace(split=np.full(len(cut.split), WHOLE))
+        self._put(waiting, cut)
+        if (split == WHOLE).any():
+            self._put(waiting, some(left, split == WHOLE))
         if found.is_better:
             for each in small:
                 self._put(waiting, each._replace(split=np.full(len(each.split), WHOLE)))
             small = []
-        left = found.left._replace(split=split)
-        if not (split >= 0).all():
-            self._put(waiting, some(left, split == WHOLE))
-            small += [some(left, split == SMALL)] * bool((split == SMALL).any())
-            left = some(left, split >= 0)
-        if self._order is not Order.LARGEST:
-            left = self._divided(left)
-            left = left._replace(split=np.full(len(left.split), WHOLE))
-        self._put(waiting, left)
         closed, examined = max(self.state.closed, found.closed), self.state.examined + found.examined
         self.state = State(waiting, small, closed, examined)
 
-    def _divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
+    def _divided(self, boxes: Boxes[Any]) -> Boxes[Any]:
         """Return the parts of boxes, of which some may stay whole."""
         is_cut = boxes.split >= 0
         if not is_cut.any():
@@ -266,33 +226,31 @@ class Search(Generic[Columns]):
         halves = self.rule.divided(some(boxes, is_cut))
         return halves if is_cut.all() else joined([some(boxes, ~is_cut), halves])
 
-    def _divisions(self, found: Verdicts[Columns]) -> NDArray[np.intp]:
+    def _divisions(self, found: Verdicts[Any]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
         lower, upper, bound, split, _ = found.left
-        every = np.arange(len(split))
-        low, high = lower[every, split], upper[every, split]
-        middle = 0.5 * low + 0.5 * high
+        place = np.arange(len(split)), np.maximum(split, 0)
+        middle = 0.5 * lower[place] + 0.5 * upper[place]
         width = ((upper - lower)[:, self._columns] / self._whole).max(axis=1, initial=0.0)
-        is_small = (width < np.where(np.isfinite(bound), self._least[1], self._least[0])) | ~(
-            (low < middle) & (middle < high)
-        )
+        is_small = width < np.where(np.isfinite(bound), self._least[1], self._least[0])
+        is_small |= ~((lower[place] < middle) & (middle < upper[place]))
         once = False if found.again is None else found.again
         return np.where(is_small & (split >= 0), np.where(once, WHOLE, SMALL), split)
 
-    def _put(self, waiting: list[_Chunk[Columns]], boxes: Boxes[Columns]) -> None:
+    def _put(self, waiting: list[_Chunk[Any]], boxes: Boxes[Any]) -> None:
         """Add boxes."""
         if len(boxes.split):
             key = 0.0 if self._order is Order.NEWEST else float(boxes.bound.max())
             self._newest += 1
             insort(waiting, (key, self._newest, boxes))
 
-    def _take(self, waiting: list[_Chunk[Columns]]) -> Boxes[Columns]:
+    def _take(self, waiting: list[_Chunk[Any]]) -> Boxes[Any]:
         """Remove and return boxes whose parts are a block; there must be one.
 
         Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
         """
-        taken: list[Boxes[Columns]] = []
-        room, count = self._block, self.state.open
+        taken: list[Boxes[Any]] = []
+        room, count = self._block, self.left
         if self._order is Order.LARGEST and count <= _FEW:
             waiting[:] = [(math.inf, 0, joined([boxes for _, _, boxes in waiting]))]
         while waiting and room > 0:
@@ -312,8 +270,8 @@ class Search(Generic[Columns]):
         return joined(taken)
 
 
-class Steps(Protocol):
-    """A search that is run step by step."""
+class SearchMethod(Protocol):
+    """A search that is run step by step, of one box or of several; see :class:`Search`."""
 
     @property
     def is_open(self) -> bool:
@@ -323,13 +281,23 @@ class Steps(Protocol):
     def boxes(self) -> int:
         """Number of boxes examined."""
 
+    @property
+    def left(self) -> int:
+        """Number of boxes that are left."""
+
+    @property
+    def bound(self) -> float:
+        """Upper bound over all boxes."""
+
+    @property
+    def fault(self) -> str:
+        """Reason for stopping at boxes that are too small; empty for none."""
+
     def step(self, target: float) -> None:
         """Examine some boxes, and close those whose bounds do not exceed a target."""
 
-
-def _now() -> float:
-    """Return the time; the clock of a test is put in its place later than this function is made."""
-    return time.perf_counter()
+    def close(self) -> None:
+        """Stop what works beside it."""
 
 
 @dataclass(frozen=True)
@@ -348,18 +316,15 @@ class Effort:
     most_boxes: int | None = None
     interrupted: Callable[[], bool] = is_requested
     progress: Callable[[float], None] | None = None
-    began: float = field(default_factory=_now)
+    began: float = field(default_factory=lambda: time.perf_counter())  # noqa: PLW0108 - tests have a clock of their own
 
     @property
     def seconds(self) -> float:
         """Seconds since the start."""
-        return _now() - self.began
+        return time.perf_counter() - self.began
 
     def run(
-        self,
-        search: Steps,
-        ending: Callable[[], str | None] = lambda: None,
-        target: Callable[[], float] = lambda: -math.inf,
+        self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float] = lambda: -math.inf
     ) -> str:
         """Run a search until no box is open; return the reason for stopping before, or an empty text.
 
@@ -370,7 +335,7 @@ class Effort:
         """
         return reason_of(lambda: self._run(search, ending, target))
 
-    def _run(self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
+    def _run(self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
         """Run a search that may be interrupted."""
         reported = -math.inf
         reached(Milestone.BOUND)

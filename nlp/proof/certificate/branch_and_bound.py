@@ -10,23 +10,23 @@ No solver is trusted: the value of an incumbent is that of the program's own fun
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
-from ...interruption import Milestone, reached, reason_of, reason_to_stop
+from ...interruption import reason_of
 from ...program.nlp import Nlp
 from ..boxes.engines import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
-from ..boxes.limbs.shared import SharedSearch
-from ..boxes.optimum import BoxSearch
+from ..boxes.limbs.shared import shared_search
+from ..boxes.optimum import optimum_search
 from ..boxes.proof_writer import ProofWriter
+from ..boxes.search import TOO_SMALL, Effort, SearchMethod
 from ..boxes.symmetry import halved
 from ..enclosure.engine import ENGINE, kernel
 from ..statement.limb_separation import separate
@@ -44,8 +44,7 @@ _NEAR_ZERO = 1e-6
 _GAP_ROUNDING = 1e-9
 #: Number of variables up to which the whole box is searched although limbs share variables: it takes fewer boxes then.
 _WHOLE_BOX = 12
-#: Seconds between two reports of progress, and the largest number of entries in a history.
-_REPORT_EVERY = 0.1
+#: Largest number of entries in a history.
 _HISTORY = 200
 
 #: Callback with seconds, bound, incumbent, number of boxes examined, number of boxes open.
@@ -82,16 +81,16 @@ def certify_program(
         ValueError: ``above`` for a maximisation.
         InputError: the C kernel was not built.
     """
-    began = time.perf_counter()
+    effort = Effort(time_limit)
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
     if nlp.n == 0:
-        return _certify_point(nlp, above, time.perf_counter() - began)
+        return _certify_point(nlp, above, effort.seconds)
     kernel()  # before any work where it is missing
     form = standard_form(nlp)
     incumbent = Incumbent(form)
     method = _method(form, incumbent, jobs, recorder)
-    search = _Search(form, incumbent, method, gap, above, began)
+    search = _Search(form, incumbent, method, gap, above, effort)
     try:
         search.incumbent.start(x, claimed)
     except IncumbentError as error:
@@ -99,13 +98,13 @@ def certify_program(
     search.first_value = incumbent.value
 
     def run() -> str:
-        reason = search.run(time_limit, progress)
+        reason = search.run(progress)
         while not reason and search.is_short():
             search.method.close()
             if recorder is not None:
                 recorder.clear()
             search.restart(_method(form, incumbent, jobs, recorder))
-            reason = search.run(time_limit, progress)
+            reason = search.run(progress)
         return reason
 
     try:
@@ -143,38 +142,8 @@ def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return BoxSearch(form, Engine(form, jobs, tangents=recorder is None), incumbent, recorder)
-    return SharedSearch(form, separation, incumbent, jobs, recorder)
-
-
-class SearchMethod(Protocol):
-    """A way to search a box, step by step."""
-
-    @property
-    def is_open(self) -> bool:
-        """Whether boxes are left to be examined."""
-
-    @property
-    def left(self) -> int:
-        """Number of open boxes."""
-
-    @property
-    def boxes(self) -> int:
-        """Number of boxes examined."""
-
-    @property
-    def bound(self) -> float:
-        """Upper bound of the maximum over the boxes; -inf where no point is feasible."""
-
-    @property
-    def fault(self) -> str:
-        """Reason for stopping at boxes without a finite bound; empty without any."""
-
-    def step(self, threshold: float) -> None:
-        """Examine some boxes, and close those whose bounds do not exceed a threshold."""
-
-    def close(self) -> None:
-        """Stop what works beside it."""
+        return optimum_search(form, Engine(form, jobs, tangents=recorder is None), incumbent, recorder)
+    return shared_search(form, separation, incumbent, jobs, recorder)
 
 
 class _Gap(NamedTuple):
@@ -194,7 +163,7 @@ class _Search:
         method: examines boxes.
         gap: as for :func:`certify_program`.
         above: as for :func:`certify_program`.
-        began: time at the start.
+        effort: the clock, and the time there is.
         history: (seconds, bound, incumbent) in the program's own sense.
         first_value: value of the incumbent when the method began.
         boxes_before: number of boxes that methods before this one examined.
@@ -205,7 +174,7 @@ class _Search:
     method: SearchMethod
     gap: float
     above: float | None
-    began: float
+    effort: Effort
     history: list[tuple[float, float, float]] = field(default_factory=list)
     first_value: float = -math.inf
     boxes_before: int = 0
@@ -259,24 +228,20 @@ class _Search:
             return self.bound < -self.above
         return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
 
-    def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
+    def run(self, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
-        reported = -math.inf
-        reached(Milestone.BOUND)
-        while self.method.is_open:
-            if self._has_counterexample():
-                return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
-            seconds = time.perf_counter() - self.began
-            reason = reason_to_stop(seconds, time_limit)
-            if reason:
-                return reason
-            if seconds - reported >= _REPORT_EVERY:
-                reported = seconds
-                self._report(seconds, progress)
-            self.method.step(self.threshold)
-            if self.method.fault:
-                return self.method.fault
-        return "boxes are left that are too small to cut" if self.method.left else ""
+        effort = replace(self.effort, progress=lambda seconds: self._report(seconds, progress))
+        return effort.run(self.method, self._ending, lambda: self.threshold)
+
+    def _ending(self) -> str | None:
+        """Return the reason for ending; None for going on."""
+        if self.method.fault:
+            return self.method.fault
+        if not self.method.is_open:
+            return TOO_SMALL if self.method.left else ""
+        if self._has_counterexample():
+            return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
+        return None
 
     def _report(self, seconds: float, progress: CertifyProgress | None) -> None:
         """Report progress, and add to the history; a full history loses every second entry."""
@@ -291,7 +256,7 @@ class _Search:
     def certificate(self, reason: str) -> Certificate:
         """Return the certificate at this state of the search."""
         nlp, sign = self.form.nlp, self.form.sign
-        seconds = time.perf_counter() - self.began
+        seconds = self.effort.seconds
         self._report(seconds, None)
         left = self.method.left
         known = self.incumbent.x is not None

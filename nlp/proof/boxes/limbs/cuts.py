@@ -185,5 +185,5 @@ def cut_own(
     best = first_largest(found.value, own)
     better = found.value[best] > part.value_of_good
     good = np.where(better, centre[:, best], good)
-    left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep])
+    left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep], own.count)
     return LeftOwn(left, spread, good, is_near[keep], change.argmax(axis=0)[keep])

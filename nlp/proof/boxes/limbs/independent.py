@@ -17,7 +17,7 @@ from ...statement.limb_separation import Limb, Separation
 from ...statement.standard_form import StandardForm
 from ..engines import Engine
 from ..incumbent import Incumbent
-from ..optimum import BoxSearch
+from ..optimum import optimum_search
 from ..proof_writer import ProofWriter
 from ..symmetry import grouped
 
@@ -102,7 +102,7 @@ class IndependentSearch:
         self._copies = [len(group) for group in groups]
         parts: dict[tuple[int, ...], FloatArray] = {}
         self._searches = [
-            BoxSearch(
+            optimum_search(
                 limbs[group[0]].form,
                 Engine(limbs[group[0]].form, jobs, tangents=recorder is None),
                 LimbPoint([limbs[each] for each in group], incumbent, parts),
@@ -143,7 +143,7 @@ class IndependentSearch:
 
     def _limb_bound(self, k: int) -> float:
         """Return the upper bound of one limb."""
-        return max(self._searches[k].bound, self._searches[k].incumbent.value)
+        return max(self._searches[k].bound, self._searches[k].rule.incumbent.value)
 
     @property
     def fault(self) -> str:
@@ -152,7 +152,7 @@ class IndependentSearch:
 
     def step(self, threshold: float) -> None:
         """Examine a block of boxes of the limb that is furthest from its part of the threshold."""
-        values = [each.incumbent.value for each in self._searches]
+        values = [each.rule.incumbent.value for each in self._searches]
         every = [*(count * value for count, value in zip(self._copies, values, strict=True)), self._constant]
         room = threshold - math.fsum(every) if all(map(math.isfinite, values)) else -math.inf
         # Twice, since the sum of the bounds is rounded up too.

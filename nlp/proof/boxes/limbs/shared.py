@@ -9,6 +9,7 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,8 +17,9 @@ import numpy as np
 
 from ...enclosure.quadratic_models import ranges
 from ..engines import Engine
-from ..open_boxes import BoundedSearch
-from ..optimum import reason_without_bound
+from ..optimum import LEAST_WIDTHS, reason_without_bound
+from ..rows import SMALL, WHOLE, Boxes, some
+from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
 from .boxes import OwnBoxes, SharedBoxes
 from .common import CommonPart
@@ -43,8 +45,6 @@ _LONGEST = 512
 _SPREAD = 0.25
 #: How many times more the limbs' lists must promise than bisections of the shared box to be refined.
 _PATIENCE = 1.0
-#: Widths, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
-_SINGULAR_WIDTH, _LEAST_WIDTH = 2.0**-16, 2.0**-40
 
 
 class _ExaminedLimb(NamedTuple):
@@ -54,8 +54,41 @@ class _ExaminedLimb(NamedTuple):
     bound: LimbBound
 
 
-class SharedSearch(BoundedSearch[SharedBoxes]):
-    """A search of limbs with shared variables.
+class SharedColumns(NamedTuple):
+    """Columns of shared boxes: lists of each limb's own boxes, and the best point (B, d) of its own variables known."""
+
+    own: tuple[OwnBoxes, ...]
+    good: tuple[FloatArray, ...]
+
+
+def view(boxes: Boxes[SharedColumns]) -> SharedBoxes:
+    """Return shared boxes as the bounds read them."""
+    ends = np.ascontiguousarray(boxes.lower.T), np.ascontiguousarray(boxes.upper.T)
+    return SharedBoxes(*ends, boxes.bound, boxes.more.own, tuple(np.ascontiguousarray(g.T) for g in boxes.more.good))
+
+
+def shared_search(
+    form: StandardForm,
+    separation: Separation,
+    incumbent: Incumbent,
+    jobs: int | None,
+    recorder: ProofWriter | None = None,
+) -> Search[SharedRule]:
+    """Return the search of limbs with shared variables: see :class:`SharedRule`."""
+    rule = SharedRule(form, separation, incumbent, jobs, recorder)
+    common, m = rule.common_form, len(separation.shared)
+    own = tuple(
+        OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64), 1)
+        for limb in separation.limbs
+    )
+    columns = SharedColumns(own, tuple((0.5 * (each.lower + each.upper)).T for each in own))
+    root = Boxes(common.lower[None], common.upper[None], np.array([np.inf]), np.array([WHOLE]), columns)
+    whole = common.upper - common.lower
+    return Search(rule, root, block=_BLOCK, whole=whole, least=LEAST_WIDTHS, order=Order.LARGEST_CHUNK)
+
+
+class SharedRule(Rule[SharedColumns]):
+    """Rule of the maximum of limbs with shared variables.
 
     Args:
         form: the whole form.
@@ -77,69 +110,48 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         if separation.common is None:
             raise ValueError("the limbs share no variable")
         self._form, self._separation, self._incumbent = form, separation, incumbent
-        self._common_form = separation.common
+        self.common_form = separation.common
         self._common = CommonPart(separation.common)
-        m = self._m = len(separation.shared)
+        self._m, self._turn = len(separation.shared), 0
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
         # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
         self._engines, self._opposites = list[Engine](), list[Engine]()
-        own = tuple(
-            OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64))
-            for limb in separation.limbs
-        )
-        good = tuple(0.5 * (each.lower + each.upper) for each in own)
-        root = SharedBoxes(
-            self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
-        )
         self._record: SharedRecord | None = None
         if recorder is not None:
-            self._record = SharedRecord(self._common_form.lower, self._common_form.upper)
+            self._record = SharedRecord(self.common_form.lower, self.common_form.upper)
             recorder.leave_to(self._record.tree)
-        super().__init__(root)
 
-    @property
-    def fault(self) -> str:
-        """Reason for stopping at boxes without a finite bound; empty without any."""
-        undefined = [each for each in self._undivided if not np.isfinite(each.bound).all()]
-        if undefined:
-            each = undefined[0]
-            return reason_without_bound(self._common_form, each.lower, each.upper, each.bound)
-        return ""
+    def fault(self, small: Sequence[Boxes[SharedColumns]]) -> str:
+        """Return the reason for stopping at boxes without a finite bound; empty without any."""
+        return reason_without_bound(self.common_form, small)
 
     def close(self) -> None:
         """Stop the threads."""
         self._threads.close()
 
-    def _step(self, threshold: float) -> None:
-        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold.
-
-        The first steps prepare one limb each.
-        """
+    def examine(self, boxes: Boxes[SharedColumns]) -> Verdicts[SharedColumns]:
+        """Return bounds of shared boxes, and improve the incumbent; the first steps prepare one limb each."""
         if len(self._engines) < len(self._separation.limbs):
             form = self._separation.limbs[len(self._engines)].form
             # Minus a limb's function, for lower models.
             self._opposites.append(Engine(replace(form, functions=(-form.functions[0],)), 1, self._m))
             self._engines.append(Engine(form, 1, self._m))
-            return
-        current = self._opened.pop(_BLOCK if self._turn else 1)
+            return Verdicts(boxes, -math.inf, 0)
+        current, before = view(boxes), self._incumbent.value
         self._turn += 1
-        before = self._incumbent.value
         with np.errstate(all="ignore"):
             sums = self._examine(current)
             self._improve(current, sums)
-            self._branch(current, sums, threshold)
-        if self._incumbent.value > before:
-            # What was too small to bisect may be closed by the better point.
-            for boxes in self._undivided:
-                self._opened.push(boxes)
-            self._undivided.clear()
+            left = self._branch(current, sums, self.target)
+        # What contraction or dropping of own boxes excluded may reach the threshold.
+        examined = sum(own.of.size + own.count for own in current.own)
+        return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before)
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""
         found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
         models, parts = [each.models for each in found], [each.bound for each in found]
-        self.boxes += sum(own.of.size + boxes.count for own in boxes.own)
         common = self._common.model(boxes.lower, boxes.upper)
         low, high = ranges(common)
         impossible, binding = self._common.states(low, high)
@@ -199,57 +211,46 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
             point[list(limb.own)] = 0.5 * own.lower[:, place] + 0.5 * own.upper[:, place]
         return point
 
-    def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> None:
-        """Drop and contract, and bisect shared boxes or own boxes."""
+    def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> Boxes[SharedColumns]:
+        """Drop and contract boxes, and refine the lists of those that are not to be bisected."""
         bounded = sums.bound <= threshold
         if self._record is not None:
             # An inherited bound says nothing of the numbers of this box, which the proof needs.
             bounded = sums.sums <= self._record.closing(threshold, self._incumbent.value)
-        if (bounded & sums.is_possible).any():
-            self._closed_bound = max(self._closed_bound, float(sums.bound[bounded & sums.is_possible].max()))
         limbs = range(len(self._engines))
         if self._record is None:
-            left = contract_shared(self._common_form, boxes, sums, threshold)
-            lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
+            left = contract_shared(self.common_form, boxes, sums, threshold)
+            lower, upper, alive = collapse_monotone(self.common_form, boxes, sums, left)
             below = threshold
         else:
             lower, upper, alive = boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool)
             below = -math.inf
         lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), limbs)
-        good = tuple(each.good for each in lists)
-        # What contraction or dropping of own boxes excluded may reach the threshold.
-        self._closed_bound = max(self._closed_bound, threshold)
         sizes = np.array([np.bincount(each.own.of, minlength=boxes.count) for each in lists])
         alive = alive & sums.is_possible & ~bounded & (sizes > 0).all(axis=0)
-        whole = (self._common_form.upper - self._common_form.lower)[:, None]
+        whole = (self.common_form.upper - self.common_form.lower)[:, None]
         width = ((upper - lower) / whole).max(axis=0)
         finite = np.isfinite(sums.bound)
-        can_cut = width > np.where(finite, _LEAST_WIDTH, _SINGULAR_WIDTH)
+        can_cut = width > np.where(finite, LEAST_WIDTHS[1], LEAST_WIDTHS[0])
         change = self._shared_change(boxes, sums, lower, upper)
         spread = np.array([each.spread for each in lists])
         wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
-        rest = SharedBoxes(lower, upper, sums.bound, tuple(each.own for each in lists), good)
         if self._record is not None:
             emptied = sizes == 0
             self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
             self._record.bisect(boxes, np.where(cut, change.argmax(axis=0), -1))
-        if cut.any():
-            places = np.flatnonzero(cut)
-            self._opened.push(rest.select(places).bisect(change.argmax(axis=0)[places]))
-        if refine.any():
-            own = tuple(_refined(each, spread[k] >= _SPREAD * spread.max(axis=0)) for k, each in enumerate(lists))
-            refined = SharedBoxes(lower, upper, sums.bound, own, good)
-            self._opened.push(refined.select(np.flatnonzero(refine)))
-        done = alive & ~refine & ~cut
         # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
         moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
         for before, each in zip(boxes.own, lists, strict=True):
-            moved |= each.own.width(boxes.count) < before.width(boxes.count)
-        for which, push in ((done & moved, self._opened.push), (done & ~moved, self._undivided.append)):
-            if which.any():
-                push(rest.select(np.flatnonzero(which)))
+            moved |= each.own.width < before.width
+        split = np.where(cut, change.argmax(axis=0), np.where(refine | moved, WHOLE, SMALL))
+        own = tuple(
+            _refined(each, refine & (spread[k] >= _SPREAD * spread.max(axis=0))) for k, each in enumerate(lists)
+        )
+        columns = SharedColumns(own, tuple(each.good.T for each in lists))
+        return some(Boxes(lower.T, upper.T, sums.bound, split, columns), alive)
 
     def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
@@ -259,7 +260,7 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
             change = change + part.L.w[:m, part.top] + np.abs(part.L.H[:m, :, part.top]).sum(axis=1)
         width = boxes.upper - boxes.lower
         change = change * (upper - lower) / np.where(width > 0, width, 1.0)
-        relative = (upper - lower) / (self._common_form.upper - self._common_form.lower)[:, None]
+        relative = (upper - lower) / (self.common_form.upper - self.common_form.lower)[:, None]
         return np.where(np.isfinite(change).all(axis=0) & (change > 0).any(axis=0), change, relative)
 
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from .....models import FloatArray
-from ...boxes.search import TOO_SMALL, Boxes, Columns, Effort, Order, Rule, Search, Verdicts, bisected, some
+from ...boxes.rows import Boxes, Columns, bisected, some
+from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
 from ..robot.pose_box import PoseBox
 
 if TYPE_CHECKING:
@@ -104,8 +105,8 @@ def prove_minimum(
     search = Search(rule, root, block=_BLOCK, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
     reason = effort.run(search, rule.ending(search))
     value, y = rule.best
-    least = min(-search.state.bound, value)
-    return Minimum(least, value, y, search.boxes, search.state.open, effort.seconds, reason)
+    least = min(-search.bound, value)
+    return Minimum(least, value, y, search.boxes, search.left, effort.seconds, reason)
 
 
 class Goal(NamedTuple):
@@ -157,15 +158,15 @@ class SmallestValue(Rule[Columns]):
         done = -left.bound >= self._goal.bounds(self.best.value)[0]
         return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), len(left.split))
 
-    def ending(self, search: Search[Columns]) -> Callable[[], str | None]:
+    def ending(self, search: Search[Any]) -> Callable[[], str | None]:
         """Return the function that ends a search: at its goal, or at a box that is too small for it."""
 
         def reason() -> str | None:
             state = search.state
-            if -state.bound >= self._goal.bounds(self.best.value)[1]:
+            if -search.bound >= self._goal.bounds(self.best.value)[1]:
                 return ""
             small = max((float(each.bound.max()) for each in state.small), default=-math.inf)
-            return TOO_SMALL if state.small and small >= state.bound else None
+            return TOO_SMALL if state.small and small >= search.bound else None
 
         return reason
 

@@ -18,7 +18,8 @@ from .....models import FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....errors import UncoveredError
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...boxes.rows import Boxes, joined, some
+from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
 from ..ranks.loop_boxes import Cells, Examiner, are_between
 from ..ranks.rank_rule import RankTest

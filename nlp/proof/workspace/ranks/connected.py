@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...boxes.rows import some
 from .loop_boxes import Cells, Examiner
 
 #: Number of boxes beyond which pairs of them are too many, and number of pairs that are compared at once.
@@ -41,7 +42,7 @@ def is_connected(examiner: Examiner, cells: Cells, independent: list[int]) -> bo
             if not block:
                 continue
             first, second = np.array(block).T
-            new = np.unique(second[examiner.tied(cells.some(first), cells.some(second))])
+            new = np.unique(second[examiner.tied(some(cells, first), some(cells, second))])
             is_reached[new] = True
             border += new.tolist()
     return bool(is_reached.all())

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...boxes.search import Boxes, Rule, bisected, joined, some
+from ...boxes.rows import Boxes, bisected, joined, some
+from ...boxes.search import Rule
 from ..robot.posed_robot import Problem
 from .connected import is_connected
 from .krawczyk import Relation
@@ -152,4 +153,4 @@ class LoopRule(Rule[Followed]):
 def in_workspace(problem: Problem, cells: Cells) -> Cells:
     """Return the boxes that hold poses of the workspace, contracted to them."""
     found = contracted_cells(problem, cells)
-    return found.cells.some(np.flatnonzero(found.kept))
+    return some(found.cells, found.kept)

@@ -53,20 +53,10 @@ class Cells(NamedTuple):
     near: FloatArray
     is_known: NDArray[np.bool_]
 
-    def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Cells:
-        """Return some of the boxes."""
-        return Cells(self.lower[which], self.upper[which], self.near[which], self.is_known[which])
-
     @property
     def centre(self) -> FloatArray:
         """Centres (B, n)."""
         return np.clip(0.5 * self.lower + 0.5 * self.upper, self.lower, self.upper)
-
-
-def joined(parts: Sequence[Cells]) -> Cells:
-    """Return boxes one after the other."""
-    lower, upper, near, is_known = zip(*parts, strict=True)
-    return Cells(np.concatenate(lower), np.concatenate(upper), np.concatenate(near), np.concatenate(is_known))
 
 
 def are_between(z: FloatArray, cells: Cells, dependent: Sequence[int]) -> NDArray[np.bool_]:
@@ -94,24 +84,6 @@ class Examined(NamedTuple):
     shares: FloatArray
     smallest: FloatArray
     signs: NDArray[np.int32]
-
-    def some(self, which: NDArray[np.int64]) -> Examined:
-        """Return the results for some of the boxes."""
-        relation = Relation(*(each[which] for each in self.relation))
-        regular, shares, smallest = self.is_regular[which], self.shares[which], self.smallest[which]
-        return Examined(self.cells.some(which), relation, regular, shares, smallest, self.signs[which])
-
-    def followed_by(self, other: Examined) -> Examined:
-        """Return these results, then those of other boxes."""
-        relation = Relation(*(np.concatenate(pair) for pair in zip(self.relation, other.relation, strict=True)))
-        return Examined(
-            joined([self.cells, other.cells]),
-            relation,
-            np.concatenate([self.is_regular, other.is_regular]),
-            np.concatenate([self.shares, other.shares]),
-            np.concatenate([self.smallest, other.smallest]),
-            np.concatenate([self.signs, other.signs]),
-        )
 
 
 class Test(Protocol):

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...boxes.rows import Boxes, joined, some
+from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ...enclosure.engine import ENGINE
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
@@ -74,7 +75,7 @@ def prove_rank(
 
     effort = Effort(time_limit, most_boxes)
     if progress is not None:
-        effort = replace(effort, progress=lambda seconds: progress(seconds, search.boxes, search.state.open))
+        effort = replace(effort, progress=lambda seconds: progress(seconds, search.boxes, search.left))
     reason = effort.run(search, ending)
     singular, left = rule.singular, search.state.left
     outcome, y, share = Outcome.PROVED, None, 0.0
@@ -97,7 +98,7 @@ def prove_rank(
         sides=None if singular is None else singular.sides,
         engine=ENGINE,
         boxes=search.boxes,
-        open=search.state.open,
+        open=search.left,
         share=share,
         seconds=effort.seconds,
         reason="" if outcome is Outcome.PROVED else reason,

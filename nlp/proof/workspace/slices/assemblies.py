@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....models import FloatArray
+from ...boxes.rows import some
 from ..ranks.loop_boxes import Cells, Examiner
 from ..robot.posed_robot import Problem
 from .regions import LEAST
@@ -55,11 +56,11 @@ def same_assembly(
         new = np.where(turned, both[which, 0], both[which, 1])
         _, order = np.unique(new, return_index=True)
         for begin, end in itertools.pairwise([*range(0, len(order), _BLOCK), len(order)]):
-            some = order[begin:end]
-            one = np.where(turned[some], both[which[some], 1], both[which[some], 0])
-            tried[which[some]] = True
-            tied = examiner.tied(cells.some(one), cells.some(new[some]))
-            is_reached[new[some[tied]]] = True
+            part = order[begin:end]
+            one = np.where(turned[part], both[which[part], 1], both[which[part], 0])
+            tried[which[part]] = True
+            tied = examiner.tied(some(cells, one), some(cells, new[part]))
+            is_reached[new[part[tied]]] = True
 
 
 def _holds(cells: Cells, z: FloatArray) -> NDArray[np.bool_]:

@@ -18,6 +18,8 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind
 from ....errors import CaseError
+from ...boxes.rows import WHOLE, Boxes, joined, some
+from ...boxes.search import Verdicts
 from ...statement.machine import Legs, legs_of, workspace_of_case
 from ..ranks.loop_boxes import Cells, Examined, Examiner
 from ..ranks.rank_rule import RankTest
@@ -27,8 +29,10 @@ from ..scale import largest_factor
 from .anyslice import AnySlices, Covered
 from .firstviolated import POINTS, FirstViolated, grid_points
 from .limitcells import LimitCells, SliceLimit
-from .regions import LEAST, Cover, Region, quarters
+from .regions import Cover, CoverRule, Region, cover_of, index_of
 
+#: Boxes that are examined at once.
+_BLOCK = 4096
 #: Factor by which a slice is wider than the workspace.
 _WIDER = 3.0
 #: Names of the coordinates of a pose, by the kind of its rotations.
@@ -114,7 +118,7 @@ def _of_legs(case: Case, legs: Legs, wide: PoseBox, chosen: list[int]) -> Covere
     first = FirstViolated(violated, len(limits.limits), lower[chosen], upper[chosen])
     problem = build_problem(case, case.model, wide)
     examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start))
-    cover = _cover(examiner, limits, first, whole, chosen)
+    cover = _LegsRule(examiner, limits, first, whole, chosen).result
     return Covered(cover, limits.limits, limits.uncovered)
 
 
@@ -160,32 +164,43 @@ def _over_poses(case: Case) -> tuple[str, ...]:
     return tuple(f"actuator.{name}" for name in ("stroke_max", "dead_length") if getattr(limit, name) is not None)
 
 
-def _cover(examiner: Examiner, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]) -> Cover:
-    """Return boxes that cover a slice: each is decided, or as small as they get."""
-    middle, free = 0.5 * (whole.lower + whole.upper), list(examiner.problem.free)
+#: States (B, K) of the parts of limits.
+_States = NDArray[np.int8]
 
-    def examined(lower: FloatArray, upper: FloatArray) -> Examined:
-        """Return the ranks of boxes (B, 6)."""
-        centre = 0.5 * (lower + upper)[:, free]
-        return examiner.examine(Cells(lower[:, free], upper[:, free], centre, np.ones(len(lower), dtype=bool)))
 
-    own = int(examined(middle[None], middle[None]).signs[0])
-    lows, highs, known = whole.lower[None], whole.upper[None], limits.unknown
-    boxes, regions, binding = [], [], []
-    while len(lows):
-        found = examined(lows, highs)
-        known = limits.examine(known, lows, highs)
-        states = limits.states(known)
-        small = ((highs - lows)[:, chosen] <= LEAST * (whole.upper - whole.lower)[chosen]).all(axis=1)
-        limit, is_same = first.of(states, lows[:, chosen], highs[:, chosen])
-        closed = (found.is_regular & is_same) | small
-        boxes.append(np.concatenate([lows[closed][:, chosen], highs[closed][:, chosen]], axis=1))
-        binding.append(limit[closed])
-        for k in np.flatnonzero(closed).tolist():
-            beyond = Region.REGULAR if found.signs[k] == own else Region.BEYOND
-            regions.append(beyond if found.is_regular[k] else Region.OPEN)
-        lows, highs = quarters(lows[~closed], highs[~closed], chosen)
-        known = np.tile(known[:, ~closed], 4)
-    parts = np.concatenate(binding)
-    parts.flags.writeable = False
-    return Cover(np.concatenate(boxes), tuple(regions), parts)
+class _LegsRule(CoverRule[_States]):
+    """Rule of ranks and limits of six straight legs."""
+
+    def __init__(
+        self, examiner: Examiner, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]
+    ) -> None:
+        super().__init__(chosen, whole.lower[chosen], whole.upper[chosen])
+        self._examiner, self._limits, self._first = examiner, limits, first
+        middle = 0.5 * (whole.lower + whole.upper)[None]
+        self._sign = self._ranks(middle, middle).signs[0]
+        self._done: list[tuple[FloatArray, FloatArray, NDArray[np.int8], NDArray[np.int16]]] = []
+        ends = whole.lower[None], whole.upper[None]
+        self.cover(Boxes(*ends, np.zeros(1), np.array([WHOLE]), limits.unknown.T), _BLOCK)
+
+    def _ranks(self, lower: FloatArray, upper: FloatArray) -> Examined:
+        """Return the ranks over boxes (B, 6)."""
+        free = list(self._examiner.problem.free)
+        low, high = lower[:, free], upper[:, free]
+        return self._examiner.examine(Cells(low, high, 0.5 * (low + high), np.ones(len(low), dtype=bool)))
+
+    def examine(self, boxes: Boxes[_States]) -> Verdicts[_States]:
+        """Return the boxes that are not decided."""
+        found = self._ranks(boxes.lower, boxes.upper)
+        known = self._limits.examine(boxes.more.T, boxes.lower, boxes.upper)
+        low, high, small = self.ends(boxes.lower, boxes.upper)
+        limit, is_same = self._first.of(self._limits.states(known), low, high)
+        region = np.where(found.signs == self._sign, index_of(Region.REGULAR), index_of(Region.BEYOND))
+        region = np.where(found.is_regular, region, index_of(Region.OPEN)).astype(np.int8)
+        done = (found.is_regular & is_same) | small
+        self._done.append(some((low, high, region, limit), done))
+        return self.open(boxes._replace(more=known.T), done)
+
+    @property
+    def result(self) -> Cover:
+        """The boxes that cover the slice."""
+        return cover_of(*joined(self._done))

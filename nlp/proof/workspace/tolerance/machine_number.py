@@ -19,7 +19,8 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
-from ...boxes.search import Boxes, Effort, Order, Search, Verdicts, some
+from ...boxes.rows import Boxes, some
+from ...boxes.search import Effort, Order, Search, Verdicts
 from ...enclosure.forms import Forms
 from ..numbers.bound_search import Goal, SmallestValue, Value
 from ..ranks.covering import APART, Followed, LoopRule
@@ -114,7 +115,7 @@ def smallest_of_machines(
     rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
     search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
     reason = effort.run(search, rule.ending(search))
-    bound, (value, z) = -search.state.bound, rule.best
+    bound, (value, z) = -search.bound, rule.best
     bound = min(bound, value)
     if math.isfinite(bound) and not rule.is_one_assembly():
         bound, reason = -math.inf, APART

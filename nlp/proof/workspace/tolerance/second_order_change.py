@@ -19,16 +19,18 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from ...boxes.rows import WHOLE, Boxes
+from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
 from ..ranks.covering import in_workspace, whole_workspace
-from ..ranks.loop_boxes import joined
+from ..ranks.loop_boxes import Cells
 from ..robot.tolerance_model import Family
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Number of boxes examined at once, and of all boxes.
-_BLOCK, _MOST = 64, 4096
+_BLOCK, _MOST = 128, 4096
 #: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
 _SHARE, _NEAR = 0.02, 1.2
 #: Part of itself by which a bound moves outwards: its own rounding.
@@ -78,35 +80,41 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float) -> floa
     encloser = Encloser(
         ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())])
     )
-    factor = 0.5 * family.tolerance**2 * _OUTWARDS
-    cells, bounds, middles = whole_workspace(problem), np.array([math.inf]), np.array([0.0])
-    widths = cells.upper - cells.lower
-    whole, done = np.where(widths > 0, widths, np.inf), 0
-    while done < _MOST:
-        worst = int(np.argmax(bounds))
-        if bounds[worst] <= max(_SHARE * first, _NEAR * middles[worst]):
+    rule, whole = _ChangeRule(family, encloser, blocks, len(places)), whole_workspace(problem)
+    width = (whole.upper - whole.lower)[0]
+    root = Boxes(whole.lower, whole.upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
+    search = Search(rule, root, block=_BLOCK, whole=width, least=(0.0, 0.0), order=Order.LARGEST)
+    while search.is_open and search.boxes < _MOST:
+        worst = search.state.waiting[-1][2]
+        k = int(np.argmax(worst.bound))
+        if worst.bound[k] <= max(_SHARE * first, _NEAR * worst.more[k]):
             break
-        order = np.argsort(-bounds)
-        now, later = cells.some(order[:_BLOCK]), order[_BLOCK:]
-        if done:
-            split, every, middle = (
-                np.argmax((now.upper - now.lower) / whole, axis=1),
-                np.arange(len(now.near)),
-                now.centre,
-            )
-            low, high = now.lower.copy(), now.upper.copy()
-            high[every, split] = low[every, split] = middle[every, split]
-            now = in_workspace(problem, joined([now._replace(upper=high), now._replace(lower=low)]))
-        errors = np.full((len(now.lower), len(places)), family.tolerance)
-        forms = encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
+        search.step(-math.inf)
+    return max(search.bound, 0.0)
+
+
+class _ChangeRule(Rule[FloatArray]):
+    """Rule of the change of second order; boxes carry its value at their middles."""
+
+    def __init__(self, family: Family, encloser: Encloser, blocks: _Blocks, errors: int) -> None:
+        self._family, self._encloser, self._blocks, self._errors = family, encloser, blocks, errors
+        whole = whole_workspace(family.problem)
+        widths = whole.upper - whole.lower
+        self._whole = np.where(widths > 0, widths, np.inf)
+
+    def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
+        """Return bounds of boxes."""
+        known = np.ones(len(boxes.split), dtype=bool)
+        now = in_workspace(self._family.problem, Cells(boxes.lower, boxes.upper, boxes.lower, known))
+        errors = np.full((len(now.lower), self._errors), self._family.tolerance)
+        forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
+        factor = 0.5 * self._family.tolerance**2 * _OUTWARDS
         with np.errstate(all="ignore"):
-            sizes = np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r
-            found = factor * blocks.sums(sizes)
-        cells = joined([cells.some(later), now])
-        bounds = np.concatenate([bounds[later], np.where(np.isfinite(found), found, np.inf)])
-        middles = np.concatenate([middles[later], np.nan_to_num(factor * blocks.sums(np.abs(forms.c)))])
-        done += len(now.lower)
-    return float(bounds.max(initial=0.0))
+            found = factor * self._blocks.sums(np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r)
+        middles = np.nan_to_num(factor * self._blocks.sums(np.abs(forms.c)))
+        split = np.argmax((now.upper - now.lower) / self._whole, axis=1)
+        bound = np.where(np.isfinite(found), found, np.inf)
+        return Verdicts(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
 
 
 class _Blocks:
