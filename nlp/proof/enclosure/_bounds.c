@@ -101,6 +101,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     for (int k = 0; good && k < form.tangents; k++)
         fits = fits && form.squared[k] >= 0 && form.squared[k] < form.functions;
     fits = fits && (values == Py_None || form.values.outputs == R + rows_of_tangents(&form));
+    fits = fits && (values == Py_None || n <= MOST_VARIABLES);
     if (good && !(fits && (objective == Py_None || form.objective.outputs == form.functions * (n + 1)))) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
@@ -108,7 +109,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     size_t count = finish > begin ? (size_t)(finish - begin) : 1;
     Kept kept = {NULL, NULL};
     if (good) {
-        memory = malloc(memory_needed(&form) * sizeof(double));
+        memory = calloc(memory_needed(&form), sizeof(double));
         kept.open = malloc(count * sizeof(Py_ssize_t));
         kept.scores = malloc((form.objective.length ? count * (size_t)n : 1) * sizeof(double));
     }
@@ -221,7 +222,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
         return NULL;
     int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t B = found.B, D = sizeof(double), E = matrix.entries = tape.outputs;
-    good = good && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
+    good = good && n <= MOST_VARIABLES && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
            matrix.rows + matrix.nullity >= matrix.columns;
     good = good && (matrix.at = borrow(&all, at, 2 * E, sizeof(int), 0)) && (matrix.scale = borrow(&all, scale, E, D, 0));
     good = good && (matrix.constant = borrow(&all, constant, (Py_ssize_t)matrix.rows * matrix.columns, D, 0));
@@ -234,7 +235,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;
     double *memory = NULL;
-    if (good && !(memory = malloc(memory_for_ranks(&tape, &matrix, n) * sizeof(double))))
+    if (good && !(memory = calloc(memory_for_ranks(&tape, &matrix, n), sizeof(double))))
         PyErr_NoMemory();
     if (memory) {
         Py_BEGIN_ALLOW_THREADS

@@ -214,13 +214,17 @@ static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        for (int i = 0, t = n; i < n; i++) {
+        EACH_OF(i, 0, v->terms.linear)
+        {
             EACH size[l] += fabs(terms[i][l]);
-            for (int j = i; j < n; j++, t++)
+            EACH_OF(j, i, v->terms.pairs[i])
+            {
+                const double *term = terms[n + row_of(n, i) + j];
                 if (i == j)
-                    EACH middle[l] += 0.5 * terms[t][l], size[l] += 0.5 * fabs(terms[t][l]);
+                    EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
                 else
-                    EACH size[l] += fabs(terms[t][l]);
+                    EACH size[l] += fabs(term[l]);
+            }
         }
         /* The middle is a sum of n + 2 terms, the half width of two. */
         EACH
@@ -283,7 +287,10 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
                 double part = a >= n && b == a - n ? 0.5 : 1.0;
                 memset(x.row, 0, (size_t)c * sizeof(Lane));
                 for (int e = 0; e < m->entries; e++) {
-                    const double *term = terms_of_form2(form2_of(out, e))[t], *by = C[m->at[2 * e]];
+                    Form2 *v = form2_of(out, e);
+                    if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
+                        continue;
+                    const double *term = terms_of_form2(v)[t], *by = C[m->at[2 * e]];
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
