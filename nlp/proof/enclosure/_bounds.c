@@ -135,21 +135,21 @@ static PyObject *enclose(PyObject *module, PyObject *args)
 {
     PyObject *tuple, *arrays[7];
     Tape tape = {0};
-    Enclosed found = {0};
+    Enclosed found = {.order = 1};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B))
+    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n|i", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
+                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B, &found.order))
         return NULL;
-    int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
+    int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t R = tape.outputs, B = found.B, D = sizeof(double);
     good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
     good = good && (found.c = borrow(&all, arrays[2], R * B, D, 1)) && (found.p = borrow(&all, arrays[3], R * B, D, 1));
     good = good && (found.q = borrow(&all, arrays[4], R * B, D, 1)) && (found.s = borrow(&all, arrays[5], R * B, D, 1));
-    good = good && (found.a = borrow(&all, arrays[6], R * n * B, D, 1));
+    good = good && (found.a = borrow(&all, arrays[6], R * (Py_ssize_t)terms_to_enclose(n, found.order) * B, D, 1));
     double *memory = NULL;
-    if (good && !(memory = malloc(memory_to_enclose(&tape, n) * sizeof(double))))
+    if (good && !(memory = calloc(memory_to_enclose(&tape, n, found.order), sizeof(double))))
         PyErr_NoMemory();
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
@@ -262,8 +262,9 @@ static PyMethodDef methods[] = {
      "models(n, (...), B, level, low, high)\n\n"
      "Write upper bounds (B,) of B quadratic models, or the ends (n, B) of points that can reach levels (B,)."},
     {"enclose", enclose, METH_VARARGS,
-     "enclose(n, tape, (lower, upper, c, p, q, s, a), B)\n\n"
-     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a."},
+     "enclose(n, tape, (lower, upper, c, p, q, s, a), B, order=1)\n\n"
+     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a; with order 2\n"
+     "a has the coefficients of pairs of variables too."},
     {"examine", examine, METH_VARARGS,
      "examine((n, functions, equation, depends, low, high, whose, tape, values, objective, squared), arrays, B,\n"
      "        begin, finish, threshold, shared=0, models=None, least=None)\n\n"
