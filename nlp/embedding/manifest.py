@@ -75,8 +75,14 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
             for each, own in zip(limits, units.limit_multipliers(limits), strict=True)
         ],
         "constraints": [
-            {"name": each.name, "lower": _finite(lower), "upper": _finite(upper)}
-            for each, lower, upper in zip(program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
+            {"name": each.name, "multiplier_unit": own, "lower": _finite(lower), "upper": _finite(upper)}
+            for each, own, lower, upper in zip(
+                program.constraints,
+                units.constraint_multipliers,
+                nlp.g_lower.tolist(),
+                nlp.g_upper.tolist(),
+                strict=True,
+            )
         ],
         "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.frame_rows],
         "tasks": [

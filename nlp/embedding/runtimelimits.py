@@ -18,7 +18,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import Dimension
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.constraint import Constraint, Reading
 from ..case.pose import MAX_FREE_ROTATION
 from ..program.layout import WIDENING
 from ..program.nlp import Nlp
@@ -116,8 +116,8 @@ class RunTimeLimits:
 def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
     """Return the limits of a program that depend on its variables.
 
-    A limit that is also a constraint on fixed numbers alone cannot be set beyond what these numbers measure: the C does
-    not have that constraint.
+    Where a limit is a constraint on fixed numbers too, the C judges answers by that one with the number that is set. A
+    limit that it reads otherwise than the program does cannot be set.
 
     Args:
         nlp: the program.
@@ -135,13 +135,13 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
         ball = balls.get(id(constraint))
         reading = constraint.reading if ball is None else _ROTATION
         for key, is_upper in zip(_keys(nlp, index, ball), (False, True), strict=True):
-            if not key:
+            if not key or not _is_settable(nlp, key):
                 continue
             bound = float((nlp.g_upper if is_upper else nlp.g_lower)[index])
             value = float(constraint.reading.from_value(bound))
             if key not in limits:
                 symbols[key], places[key] = SX.sym(key), []
-                limits[key] = _limit(key, reading, value, _measured(nlp, key))
+                limits[key] = _limit(key, reading, value)
             expression = reading.to_value(symbols[key])
             same = [k for k in places[key] if ca.is_equal(outputs[k], expression, _DEPTH)]
             if not same:
@@ -181,40 +181,20 @@ def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
     return f"{constraint.name}.min" if math.isfinite(nlp.g_lower[index]) else "", f"{constraint.name}.max"
 
 
-class _Range(NamedTuple):
-    """Smallest and largest number that the constraints on fixed numbers allow a limit to have."""
-
-    least: float
-    most: float
-
-
-def _measured(nlp: Nlp, key: str) -> _Range:
-    """Return the range of a limit's number from its constraints that depend on fixed numbers alone."""
-    least, most = -math.inf, math.inf
-    program = nlp.program
-    found = [item for item in nlp.constant_limits if key in item.constraint.keys]
-    for item in found:
-        value = _value(item, program.x, program.p, nlp)
-        if item.constraint.keys[0] == key:
-            most = min(most, value)
-        if item.constraint.keys[1] == key:
-            least = max(least, value)
-    return _Range(least, most)
+def _is_settable(nlp: Nlp, key: str) -> bool:
+    """Return whether constraints on fixed numbers read a limit as one of the program's does, whose bound they share."""
+    number, others = SX.sym("number"), [item.constraint for item in nlp.constant_limits]
+    bounds, fixed = (
+        [each.reading.to_value(number) for each in constraints if key in each.keys]
+        for constraints in (nlp.program.constraints, others)
+    )
+    return all(any(ca.is_equal(each, bound, _DEPTH) for bound in bounds) for each in fixed)
 
 
-def _value(item: BoundedConstraint, x: SX, p: SX, nlp: Nlp) -> float:
-    """Return the number for people that a constraint on fixed numbers measures."""
-    function = ca.Function("constant", [x, p], [ca.densify(item.constraint.expression)])
-    return float(item.constraint.reading.from_value(float(function(nlp.start, nlp.arguments))))
-
-
-def _limit(key: str, reading: Reading, value: float, measured: _Range) -> RunTimeLimit:
-    """Return a limit with its range, and as yet without a name in C; a measured number is itself allowed."""
-    above = max(reading.above, float(np.nextafter(measured.least, -math.inf)))
-    most = min(reading.most, measured.most)
-    # The case's own number is allowed, also where it differs from a measured one by rounding.
-    above = above if value > above else float(np.nextafter(value, -math.inf))
-    return RunTimeLimit(key, "", reading.dimension, value, above, max(most, value))
+def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
+    """Return a limit with its range, in which the case's own number always is, and as yet without a name in C."""
+    above = reading.above if value > reading.above else float(np.nextafter(value, -math.inf))
+    return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
 def limit_texts(

@@ -98,7 +98,7 @@ MULTIPLIERS = ("lower_multipliers", "upper_multipliers", "g_lower_multipliers", 
 
 
 #: Flags by which generated C compiles without a warning.
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
 #: The first compiler there is; empty without one.
 COMPILER = next((name for name in ("gcc", "clang", "cc") if shutil.which(name)), "")
 

@@ -22,7 +22,7 @@ from screwsynth.nlp.embedding.subject import find_subject
 Run = Callable[..., tuple[int, str, str]]
 Embedded = Any
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -O2"
 #: An average optimises nothing: C is not generated for it.
 CASES = [
     name
@@ -129,6 +129,9 @@ def test_units_of_f_twists_rates_and_multipliers_are_data() -> None:
     header = next(text for name, text in files.items() if name.endswith(".h") and "_F_unit" in text)
     assert '_F_unit = "(in/rad)\\302\\262";' in header
     assert "_limit_multiplier_units[" in header
+    constraints = {each["name"]: each["multiplier_unit"] for each in data["constraints"]}
+    leg = next(name for name in constraints if "leg_length" in name)
+    assert constraints[leg] == f"{data['F_unit']}/in\N{SUPERSCRIPT TWO}"
     # A translation has no angle to be measured by.
     drill = json.loads(generate_c(load_case("drilling-spindle"), "")["manifest.json"])
     assert (drill["F_unit"], drill["tasks"][0]["rate_unit"]) == ("(mm/mm)\N{SUPERSCRIPT TWO}", "mm/mm")

@@ -18,7 +18,7 @@ from screwsynth.nlp.embedding.ctext import identifier
 
 Run = Callable[..., tuple[int, str, str]]
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -O2"
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
 

@@ -21,7 +21,7 @@ from screwsynth.nlp.program.sampling import starting_points
 
 Embedded = Any
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -O2"
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
 

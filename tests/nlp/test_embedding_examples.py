@@ -14,8 +14,8 @@ import pytest
 from screwsynth.nlp import generate_c, load_case
 from screwsynth.nlp.embedding.ctext import identifier
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O1"
-STRICT_CPP = "-std=c++17 -Wall -Wextra -Wpedantic -Werror -O1"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -O1"
+STRICT_CPP = "-std=c++17 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -O1"
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
 
@@ -204,6 +204,7 @@ int main(void) {
 
 PROJECT = """cmake_minimum_required(VERSION 3.13)
 project(both C)
+add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
 add_subdirectory(one)
 add_subdirectory(two)
 add_executable(both both.c)
