@@ -242,7 +242,6 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
     units = UnitData(nlp)
-    lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
     bounds = bounds_in_c(nlp)
     if program.places.epigraph is not None:
@@ -271,8 +270,8 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         "/* Constraints: names, units of their multipliers, and bounds; 1e300 is none. */",
         string_table(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
         string_table(f"{prefix}_constraint_multiplier_units", C, units.constraint_multipliers),
-        number_table(f"{prefix}_constraint_lower", C, lower),
-        number_table(f"{prefix}_constraint_upper", C, upper),
+        number_table(f"{prefix}_constraint_lower", C, nlp.g_lower),
+        number_table(f"{prefix}_constraint_upper", C, nlp.g_upper),
         "/* Tasks: names, and twists of six numbers each. */",
         string_table(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
         number_table(

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from ...models import FloatArray
 from ..errors import one_line
 
-#: Between two entries of a table: each has a line of its own, so that lines stay short and differences are seen.
-_BY_LINE = ",\n    "
+#: Size of a bound that is none, in tables of C.
+NO_BOUND = 1e300
 
 
 def identifier(name: str) -> str:
@@ -39,20 +39,24 @@ def c_names(names: Iterable[str]) -> list[str]:
 
 
 def string_table(name: str, size: str, values: Iterable[str]) -> str:
-    """Return a constant table of strings; it ends with a null, so that it is never empty."""
-    quoted = _BY_LINE.join([*(string_literal(text) for text in values), "0"])
-    return f"static const char *const {name}[{size} + 1] = {{\n    {quoted}}};"
+    """Return a constant table of strings."""
+    return _table(f"char *const {name}", size, [*map(string_literal, values), "0"])
 
 
 def number_table(name: str, size: str, values: Iterable[float]) -> str:
-    """Return a constant table of numbers; it ends with a zero, so that it is never empty."""
-    listed = _BY_LINE.join([*(repr(float(value)) for value in values), "0.0"])
-    return f"static const double {name}[{size} + 1] = {{\n    {listed}}};"
+    """Return a constant table of numbers; infinite ones become bounds that are none."""
+    return _table(f"double {name}", size, [repr(max(-NO_BOUND, min(float(each), NO_BOUND))) for each in [*values, 0]])
 
 
 def integer_table(name: str, size: str, values: Iterable[int]) -> str:
-    """Return a constant table of whole numbers; it ends with a zero, so that it is never empty."""
-    return f"static const int {name}[{size} + 1] = {{\n    {_BY_LINE.join(map(str, [*values, 0]))}}};"
+    """Return a constant table of whole numbers."""
+    return _table(f"int {name}", size, map(str, [*values, 0]))
+
+
+def _table(name: str, size: str, cells: Iterable[str]) -> str:
+    """Return a constant table, each entry in a line; it has one entry more at the end, so that it is never empty."""
+    lines = ",\n    ".join(cells)
+    return f"static const {name}[{size} + 1] = {{\n    {lines}}};"
 
 
 def short_table(name: str, values: Iterable[int]) -> str:

@@ -8,7 +8,6 @@ bound belongs to.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -23,12 +22,10 @@ from ..case.pose import MAX_FREE_ROTATION
 from ..program.layout import WIDENING
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation
-from .ctext import c_names, comment_text, integer_table, number_table, string_table
+from .ctext import NO_BOUND, c_names, comment_text, integer_table, number_table, string_table
 
 #: Depth to which two expressions of one limit are compared: above that of every reading.
 _DEPTH = 30
-#: Size of a number that stands for none in tables of C.
-_NONE = 1e300
 
 
 @dataclass(frozen=True)
@@ -223,8 +220,8 @@ def limit_texts(
                 string_table(f"{prefix}_limit_units", L, [unit_of(each.dimension) for each in limits]),
                 string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
                 number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
-                number_table(f"{prefix}_limit_above", L, [max(each.above, -_NONE) for each in limits]),
-                number_table(f"{prefix}_limit_most", L, [min(each.most, _NONE) for each in limits]),
+                number_table(f"{prefix}_limit_above", L, [each.above for each in limits]),
+                number_table(f"{prefix}_limit_most", L, [each.most for each in limits]),
             ]
         ),
         "nconverted": str(found.converted),
@@ -247,7 +244,7 @@ def limit_texts(
 
 def _description(limit: RunTimeLimit, unit: str) -> str:
     """Return a limit in words for a comment of C: its key, its unit, its default, and the allowed numbers."""
-    allowed = [f"above {limit.above:.6g}"] if limit.above > -_NONE else []
-    allowed += [f"at most {limit.most:.6g}"] if limit.most < _NONE else []
-    shown = re.sub(r"\s+$", "", f"{limit.default:.6g} {unit}")
+    allowed = [f"above {limit.above:.6g}"] if limit.above > -NO_BOUND else []
+    allowed += [f"at most {limit.most:.6g}"] if limit.most < NO_BOUND else []
+    shown = f"{limit.default:.6g} {unit}".rstrip()
     return comment_text(f"{limit.key}: {shown}{'; ' if allowed else ''}{', '.join(allowed)}")

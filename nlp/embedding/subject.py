@@ -21,14 +21,13 @@ from ..program.pairs import with_all_pairs
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
+from .ctext import NO_BOUND
 
 #: Names of joints that a message shows.
 _MOST_SHOWN = 8
 
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
-#: Size of a bound that is none, in tables of C.
-NO_BOUND = 1e300
 #: Digits of numbers that come from a solve: few enough to be the same on every machine.
 _DIGITS = 9
 
