@@ -137,7 +137,12 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
     return f"{words}, most of it for {key} and its derivatives: compiling it may take a minute"
 
 
-def _fill_template(template: str, names: dict[str, str]) -> str:
+def budget_files(prefix: str) -> dict[str, str]:
+    """Return C by which each of many problems has a budget of its own, for the library that Python loads."""
+    return {f"{prefix}-deadline.c": _fill_template("deadline.c.in", {"id": prefix})}
+
+
+def _fill_template(template: str, names: Mapping[str, str]) -> str:
     """Return a template's text with its placeholders replaced."""
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
 

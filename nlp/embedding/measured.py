@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 
 from ..errors import one_line
 from .ctext import comment_text
-from .manifest import MANIFEST
+from .manifest import MANIFEST, json_text
 from .measure import Figures
 
-#: The stack that other compilers and flags may take, in parts of the bound of the one measured: clang took 1.27.
-_ROOM = 1.5
 #: What stands in the place of the figures where no compiler was run.
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
@@ -38,7 +35,7 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
             "compiler": each.compiler,
             "flash_bytes": each.flash,
             "stack_bytes": each.stack,
-            "stack_bytes_with_room": None if each.stack is None else with_room(each.stack),
+            "stack_bytes_with_room": each.with_room,
             "painted_stack_bytes": each.painted,
             "fault": each.fault,
         }
@@ -48,13 +45,8 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
         **files,
         header: files[header].replace(header_texts()["measured_macros"], _macros(prefix.upper(), figures)),
         readme: files[readme].replace(NOT_MEASURED, _rows(figures)),
-        MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n",
+        MANIFEST: json_text(manifest),
     }
-
-
-def with_room(stack: int) -> int:
-    """Return the stack in bytes that other compilers may need, from the bound of one: a multiple of 16."""
-    return 16 * math.ceil(_ROOM * stack / 16)
 
 
 def figure_words(figures: Figures) -> str:
@@ -84,7 +76,7 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
                     f"/* bound of a solve by that compiler, without functions of math.h{painted} */"
                 ),
                 (
-                    f"#define {prefix}_STACK_BYTES_{name} {with_room(each.stack)} "
+                    f"#define {prefix}_STACK_BYTES_{name} {each.with_room} "
                     "/* with room for other compilers, and for functions of math.h */"
                 ),
             ]
@@ -102,15 +94,10 @@ def _rows(figures: Sequence[Figures]) -> str:
         ),
         "|---|---|---|---|---|---|",
         *(
-            f"| {each.target.name} | {_cell(each.flash)} | {_cell(each.stack)} "
-            f"| {_cell(None if each.stack is None else with_room(each.stack))} | {_cell(each.painted)} "
+            f"| {each.target.name} | {' | '.join('-' if own is None else str(own) for own in each.numbers)} "
             f"| {comment_text(each.compiler) or '-'} |"
             for each in figures
         ),
     ]
     faults = [f"{each.target.name}: not measured: {comment_text(each.fault)}." for each in figures if each.fault]
     return "\n".join([*rows, *(line for fault in faults for line in ("", fault))])
-
-
-def _cell(value: int | None) -> str:
-    return "-" if value is None else str(value)
