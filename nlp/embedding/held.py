@@ -56,10 +56,6 @@ def held_texts(held: Held, limits: RunTimeLimits) -> dict[str, str]:
     """Return the texts for the placeholders about what the fixed numbers make hold.
 
     A bound that C sets at run time is the tightest one of the constraints that it is a bound of.
-
-    Args:
-        held: the constraints.
-        limits: the limits that C sets.
     """
     bounds = [np.array([item.lower for item in held.items]), np.array([item.upper for item in held.items])]
     shared: list[tuple[int, int, int]] = []

@@ -24,14 +24,7 @@ _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=r
 
 
 def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, str], files: Mapping[str, str]) -> str:
-    """Return the manifest's text.
-
-    Args:
-        nlp: the program.
-        limits: the limits that are set at run time.
-        names: texts of the templates' placeholders.
-        files: text of every other file of the folder by name.
-    """
+    """Return the manifest's text, from the texts of the templates' placeholders and of all other files by name."""
     case, program, prefix = nlp.case, nlp.program, names["id"]
     bounds = bounds_in_c(nlp)
     units = UnitData(nlp)

@@ -123,10 +123,12 @@ class _Running(NamedTuple):
 
 def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder: Path) -> _Running:
     """Start a target's compiler."""
-    found = _compiler(target)
+    own = os.environ.get("CC")
+    names = (own,) if own and target is X86_64 else target.compilers
+    found = first_program(names)
     if found is None:
-        names = " or ".join(_names(target))
-        return _Running(Figures(target, fault=f"no compiler for it was found: {names}"), (), folder, None)
+        fault = f"no compiler for it was found: {' or '.join(names)}"
+        return _Running(Figures(target, fault=fault), (), folder, None)
     words = (found, *target.flags, *_FLAGS)
     try:
         version = run_program([found, "--version"]).splitlines()[0]
@@ -169,17 +171,6 @@ def _end(running: _Running, sources: list[str], prefix: str) -> Figures:
     if stack is None and not figures.fault:
         return figures._replace(fault="this compiler writes no call graph, so the stack has no bound here")
     return figures._replace(stack=stack)
-
-
-def _names(target: Target) -> tuple[str, ...]:
-    """Return the names of the compilers to look for."""
-    own = os.environ.get("CC")
-    return (own,) if own and target is X86_64 else target.compilers
-
-
-def _compiler(target: Target) -> str | None:
-    """Return the path of a target's compiler; None where there is none."""
-    return first_program(_names(target))
 
 
 def _writes_graphs(words: tuple[str, ...], folder: Path) -> bool:

@@ -14,20 +14,8 @@ from .measure import Figures
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
 
-def header_texts() -> dict[str, str]:
-    """Return the texts of the placeholders for figures, as they are before a measurement."""
-    return {"measured_macros": f"/* {NOT_MEASURED} */", "measured_rows": NOT_MEASURED}
-
-
 def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figures]) -> dict[str, str]:
-    """Return the files of a folder with figures in the header, the README and the manifest.
-
-    Args:
-        files: text by file name, as :func:`~screwsynth.nlp.generate_c` returns it.
-        prefix: of the case's names in C.
-        figures: of each target.
-    """
-    header, readme = f"{prefix}.h", "README.md"
+    """Return the files of a folder with figures in the header, the README and the manifest."""
     manifest = json.loads(files[MANIFEST])
     manifest["measured"] = [
         {
@@ -41,10 +29,11 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
         }
         for each in figures
     ]
+    header = f"{prefix}.h"
     return {
         **files,
-        header: files[header].replace(header_texts()["measured_macros"], _macros(prefix.upper(), figures)),
-        readme: files[readme].replace(NOT_MEASURED, _rows(figures)),
+        header: files[header].replace(f"/* {NOT_MEASURED} */", _macros(prefix.upper(), figures)),
+        "README.md": files["README.md"].replace(NOT_MEASURED, _rows(figures)),
         MANIFEST: json_text(manifest),
     }
 
@@ -70,16 +59,10 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
             lines.append(f"#define {prefix}_FLASH_BYTES_{name} {each.flash} /* code and constants of the library */")
         if each.stack is not None:
             painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
-            lines += [
-                (
-                    f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} "
-                    f"/* bound of a solve by that compiler, without functions of math.h{painted} */"
-                ),
-                (
-                    f"#define {prefix}_STACK_BYTES_{name} {each.with_room} "
-                    "/* with room for other compilers, and for functions of math.h */"
-                ),
-            ]
+            said = f"bound of a solve by that compiler, without functions of math.h{painted}"
+            room = "with room for other compilers, and for functions of math.h"
+            lines.append(f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} /* {said} */")
+            lines.append(f"#define {prefix}_STACK_BYTES_{name} {each.with_room} /* {room} */")
         if each.fault:
             lines.append(f"/* {each.target.name}: not measured: {comment_text(each.fault)} */")
     return "\n".join(lines)
@@ -87,17 +70,11 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 
 def _rows(figures: Sequence[Figures]) -> str:
     """Return a table for the README; a line says what is not measured."""
-    rows = [
-        (
-            "| machine | flash, bytes | bound of the stack, bytes | with room for others | stack measured, bytes "
-            "| compiler and flags |"
-        ),
-        "|---|---|---|---|---|---|",
-        *(
-            f"| {each.target.name} | {' | '.join('-' if own is None else str(own) for own in each.numbers)} "
-            f"| {comment_text(each.compiler) or '-'} |"
-            for each in figures
-        ),
-    ]
-    faults = [f"{each.target.name}: not measured: {comment_text(each.fault)}." for each in figures if each.fault]
-    return "\n".join([*rows, *(line for fault in faults for line in ("", fault))])
+    heads = ("flash, bytes", "bound of the stack, bytes", "with room for others", "stack measured, bytes")
+    lines = [f"| machine | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
+    for each in figures:
+        numbers = " | ".join("-" if own is None else str(own) for own in each.numbers)
+        lines.append(f"| {each.target.name} | {numbers} | {comment_text(each.compiler) or '-'} |")
+    for each in figures:
+        lines += ["", f"{each.target.name}: not measured: {comment_text(each.fault)}."] if each.fault else []
+    return "\n".join(lines)

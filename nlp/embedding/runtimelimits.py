@@ -101,13 +101,8 @@ class RunTimeLimits:
             return []
         (values,) = self.function.sx_in()
         number, converted = values[keys.index(key)], self.function(values)
-        same = [ca.is_equal(converted[k], reading.to_value(number), _DEPTH) for k in range(self.converted)]
-        return [each.constraint for each in self.sides if each.is_upper == is_upper and same[each.converted]]
-
-    @property
-    def work(self) -> int:
-        """Size of the functions' workspace in doubles."""
-        return max((int(each.sz_w()) for each in self.functions), default=0)
+        same = _equal(ca.vertsplit(converted), reading.to_value(number))
+        return [each.constraint for each in self.sides if each.is_upper == is_upper and each.converted in same]
 
 
 def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
@@ -116,14 +111,11 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
     Where a limit is a constraint on fixed numbers too, the C judges answers by that one with the number that is set. A
     limit that it reads otherwise than the program does cannot be set.
 
-    Args:
-        nlp: the program.
-        prefix: beginning of the function's name.
+    The functions' names begin with the prefix.
     """
     balls = {id(each.ball): each for each in nlp.program.places.rotations if isinstance(each, FreeRotation)}
     symbols: dict[str, SX] = {}
     limits: dict[str, RunTimeLimit] = {}
-    places: dict[str, list[int]] = {}
     outputs: list[SX] = []
     owners: list[int] = []
     sides: list[Side] = []
@@ -137,15 +129,14 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
             bound = float((nlp.g_upper if is_upper else nlp.g_lower)[index])
             value = float(constraint.reading.from_value(bound))
             if key not in limits:
-                symbols[key], places[key] = SX.sym(key), []
+                symbols[key] = SX.sym(key)
                 limits[key] = _limit(key, reading, value)
             expression = reading.to_value(symbols[key])
-            same = [k for k in places[key] if ca.is_equal(outputs[k], expression, _DEPTH)]
+            same = _equal(outputs, expression)
             if not same:
-                places[key].append(len(outputs))
                 outputs.append(expression)
                 owners.append(list(limits).index(key))
-            converted = same[0] if same else places[key][-1]
+            converted = same[0] if same else len(outputs) - 1
             sides.append(Side(index, is_upper, converted))
             if ball is not None and is_upper:
                 widenings += [Widening(variable, converted) for variable in ball.q]
@@ -162,11 +153,10 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
 
 
 def _squared_sine(angle: SX) -> SX:
-    """Return ``sin^2(angle / 2)``, the squared length of a rotation's ``q``."""
     return ca.sin(0.5 * angle) ** 2
 
 
-#: The angle of a rotation about a free axis, as it is set.
+#: The angle of a rotation about a free axis, as it is set: the squared length of ``q`` is ``sin^2(angle / 2)``.
 _ROTATION = Reading(Dimension.ANGLE, to_value=_squared_sine, above=0.0, most=MAX_FREE_ROTATION)
 
 
@@ -185,7 +175,12 @@ def _is_settable(nlp: Nlp, key: str) -> bool:
         [each.reading.to_value(number) for each in constraints if key in each.keys]
         for constraints in (nlp.program.constraints, others)
     )
-    return all(any(ca.is_equal(each, bound, _DEPTH) for bound in bounds) for each in fixed)
+    return all(_equal(bounds, each) for each in fixed)
+
+
+def _equal(expressions: Sequence[SX], wanted: SX) -> list[int]:
+    """Return the indices of the expressions (1, 1) that equal another one."""
+    return [k for k, each in enumerate(expressions) if ca.is_equal(each, wanted, _DEPTH)]
 
 
 def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
@@ -197,48 +192,39 @@ def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
 def limit_texts(
     found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str], multiplier_units: Sequence[str]
 ) -> dict[str, str]:
-    """Return the texts for the placeholders about limits.
-
-    Args:
-        found: the limits.
-        prefix: of the case's names in C.
-        unit_of: unit of a dimension, empty for a pure number.
-        multiplier_units: unit of each limit's multiplier.
-    """
-    ID, L = prefix.upper(), f"{prefix.upper()}_LIMITS"
-    limits = found.limits
+    """Return the texts for the placeholders about limits."""
+    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
+    units = [unit_of(each.dimension) for each in limits]
     members = [
-        f"    {ID}_LIMIT_{each.name} = {k}, /* {_description(each, unit_of(each.dimension))} */"
-        for k, each in enumerate(limits)
+        f"    {prefix.upper()}_LIMIT_{each.name} = {k}, /* {_description(each, unit)} */\n"
+        for k, (each, unit) in enumerate(zip(limits, units, strict=True))
+    ]
+    tables = [
+        string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
+        string_table(f"{prefix}_limit_units", L, units),
+        string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
+        number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
+        number_table(f"{prefix}_limit_above", L, [each.above for each in limits]),
+        number_table(f"{prefix}_limit_most", L, [each.most for each in limits]),
+    ]
+    of_sides = [
+        integer_table("side_constraints", "SIDES", [each.constraint for each in sides]),
+        integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in sides]),
+        integer_table("side_converted", "SIDES", [each.converted for each in sides]),
+        integer_table("converted_limits", "CONVERTED", found.owners),
+        integer_table("widened", "WIDENED", [each.variable for each in widenings]),
+        integer_table("widened_converted", "WIDENED", [each.converted for each in widenings]),
     ]
     return {
         "nlimits": str(len(limits)),
-        "limit_members": "".join(f"{member}\n" for member in members),
-        "limit_tables": "\n".join(
-            [
-                string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
-                string_table(f"{prefix}_limit_units", L, [unit_of(each.dimension) for each in limits]),
-                string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
-                number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
-                number_table(f"{prefix}_limit_above", L, [each.above for each in limits]),
-                number_table(f"{prefix}_limit_most", L, [each.most for each in limits]),
-            ]
-        ),
+        "limit_members": "".join(members),
+        "limit_tables": "\n".join(tables),
         "nconverted": str(found.converted),
-        "limit_work": str(found.work),
-        "nsides": str(len(found.sides)),
-        "nwidened": str(len(found.widenings)),
+        "limit_work": str(max((int(each.sz_w()) for each in found.functions), default=0)),
+        "nsides": str(len(sides)),
+        "nwidened": str(len(widenings)),
         "widening": repr(WIDENING),
-        "limit_sides": "\n".join(
-            [
-                integer_table("side_constraints", "SIDES", [each.constraint for each in found.sides]),
-                integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in found.sides]),
-                integer_table("side_converted", "SIDES", [each.converted for each in found.sides]),
-                integer_table("converted_limits", "CONVERTED", found.owners),
-                integer_table("widened", "WIDENED", [each.variable for each in found.widenings]),
-                integer_table("widened_converted", "WIDENED", [each.converted for each in found.widenings]),
-            ]
-        ),
+        "limit_sides": "\n".join(of_sides),
     }
 
 

@@ -128,22 +128,12 @@ def _rounded(nlp: Nlp) -> Nlp:
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
         return nlp
-    arguments, lower, upper, start = (np.array(each) for each in (nlp.arguments, nlp.lower, nlp.upper, nlp.start))
-    for index in (epigraph.ceiling, *epigraph.best):
-        arguments[index] = _shortened(arguments[index])
-    for values in (lower, upper, start):
-        values[epigraph.level] = _shortened(values[epigraph.level])
-    return replace(
-        nlp,
-        arguments=frozen_vector(arguments),
-        lower=frozen_vector(lower),
-        upper=frozen_vector(upper),
-        start=frozen_vector(start),
-    )
-
-
-def _shortened(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+    level, best = [epigraph.level], [epigraph.ceiling, *epigraph.best]
+    places = {"lower": level, "upper": level, "start": level, "arguments": best}
+    vectors = {name: np.array(getattr(nlp, name)) for name in places}
+    for name, indices in places.items():
+        vectors[name][indices] = [float(f"{value:.{_DIGITS}g}") for value in vectors[name][indices]]
+    return replace(nlp, **{name: frozen_vector(vector) for name, vector in vectors.items()})
 
 
 def objective_words(nlp: Nlp) -> str:

@@ -15,11 +15,7 @@ from .runtimelimits import RunTimeLimit
 
 @dataclass(frozen=True)
 class UnitData:
-    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number.
-
-    Args:
-        nlp: the program.
-    """
+    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number."""
 
     nlp: Nlp
 
