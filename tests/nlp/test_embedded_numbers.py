@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import itertools
-import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from generated import COMPILERS, written
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import CompiledCase, case_from_tables, formulate, generate_c, load_compiled
+from screwsynth.nlp import CompiledCase, case_from_tables, formulate, load_compiled
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.embedding.held import held_by_fixed_numbers
 
@@ -57,11 +57,9 @@ def delta_tables() -> dict[str, Any]:
 
 
 def compiled(tables: dict[str, Any], name: str, folder: Path) -> CompiledCase:
-    if not any(shutil.which(each) for each in ("cc", "gcc", "clang")):
+    if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    for file, text in generate_c(case_from_tables(tables, name=name, source=name), "").items():
-        (folder / file).write_text(text, encoding="utf-8")
-    return load_compiled(folder)
+    return load_compiled(written(case_from_tables(tables, name=name, source=name), folder))
 
 
 def numbers(own: CompiledCase, **changed: float) -> np.ndarray:

@@ -256,11 +256,14 @@ def test_units_of_multipliers_are_those_of_a_change_of_the_unit_of_lengths(embed
         assert ratio == pytest.approx(2.0**power, rel=1e-5), unit
 
 
-def twice(value: Any) -> Any:
+def twice(value: object) -> object:
     """Numbers of a case file, times 2."""
     if isinstance(value, dict):
         return {key: twice(each) for key, each in value.items()}
-    return [twice(each) for each in value] if isinstance(value, list) else 2 * value
+    if isinstance(value, list):
+        return [twice(each) for each in value]
+    assert isinstance(value, int | float)
+    return 2 * value
 
 
 def strings(c: Embedded, name: str) -> list[str]:
