@@ -65,7 +65,7 @@ def test_the_command_writes_what_the_compilers_say(tmp_path: Path, cli: Run) -> 
 
 @pytest.mark.slow
 @pytest.mark.skipif(set(COMPILERS) != {"gcc", "clang"}, reason="gcc and clang are not both installed")
-@pytest.mark.parametrize("name", ["drilling-spindle", "hexapod-workspace"])
+@pytest.mark.parametrize("name", ["paper-4.3", "hexapod-workspace"])
 def test_another_compiler_stays_within_the_room_for_others(name: str, tmp_path: Path) -> None:
     where = written(name, tmp_path)
     own = measure(generate_c(load_case(name), ""), identifier(name))[0]
