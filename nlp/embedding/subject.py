@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -133,7 +133,8 @@ def _rounded(nlp: Nlp) -> Nlp:
     vectors = {name: np.array(getattr(nlp, name)) for name in places}
     for name, indices in places.items():
         vectors[name][indices] = [float(f"{value:.{_DIGITS}g}") for value in vectors[name][indices]]
-    return replace(nlp, **{name: frozen_vector(vector) for name, vector in vectors.items()})
+    changed: dict[str, Any] = {name: frozen_vector(vector) for name, vector in vectors.items()}
+    return replace(nlp, **changed)
 
 
 def objective_words(nlp: Nlp) -> str:
