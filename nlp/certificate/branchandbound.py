@@ -20,7 +20,7 @@ from ...models import FloatArray, frozen_array
 from ..case.task import Sense
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import ZERO_F
-from ..interruption import Milestone, reached, reason_of, reason_to_stop
+from ..interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ..program.nlp import Nlp
 from .boxes.boxsearch import BoxSearch
 from .boxes.engines import engine_for, engine_name
@@ -83,9 +83,25 @@ def certify_program(
         UncoveredError: an expression holds an operation without a rule.
         ValueError: ``above`` for a maximisation, or an engine that does not exist here.
     """
-    began = time.perf_counter()
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
+    with one_search(time_limit):
+        return _certified(nlp, x, claimed, gap, above, jobs, engine, progress, recorder)
+
+
+def _certified(
+    nlp: Nlp,
+    x: FloatArray | None,
+    claimed: float | None,
+    gap: float,
+    above: float | None,
+    jobs: int | None,
+    engine: str | None,
+    progress: CertifyProgress | None,
+    recorder: ProofWriter | None,
+) -> Certificate:
+    """Return the certificate that is reached within the time left; the arguments are those of `certify_program`."""
+    began = time.perf_counter()
     if nlp.n == 0:
         return _certify_point(nlp, above, time.perf_counter() - began)
     form = standard_form(nlp)
@@ -99,13 +115,13 @@ def certify_program(
     search.first_value = incumbent.value
 
     def run() -> str:
-        reason = search.run(time_limit, progress)
+        reason = search.run(progress)
         while not reason and search.is_short():
             search.method.close()
             if recorder is not None:
                 recorder.clear()
             search.restart(_method(form, incumbent, engine, jobs, recorder))
-            reason = search.run(time_limit, progress)
+            reason = search.run(progress)
         return reason
 
     try:
@@ -262,7 +278,7 @@ class _Search:
             return self.bound < -self.above
         return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
 
-    def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
+    def run(self, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
@@ -270,7 +286,7 @@ class _Search:
             if self._has_counterexample():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began
-            reason = reason_to_stop(seconds, time_limit)
+            reason = reason_to_stop(seconds)
             if reason:
                 return reason
             if seconds - reported >= _REPORT_EVERY:

@@ -49,6 +49,32 @@ Jobs = Annotated[
     int | None,
     typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; the result does not depend on it."),
 ]
+
+
+def _begin(context: typer.Context, seconds: float | None) -> float | None:
+    """Begin the time of a command: its searches take from what is left of it.
+
+    Raises:
+        InputError: the number is not positive.
+    """
+    from ..errors import check_seconds
+    from ..interruption import within
+
+    check_seconds(seconds)
+    context.with_resource(within(seconds))
+    return seconds
+
+
+Time = Annotated[
+    float | None,
+    typer.Option(
+        "--time",
+        parser=Number("--time"),
+        metavar="SECONDS",
+        callback=_begin,
+        help="Seconds for the whole command, which then shows what it has.",
+    ),
+]
 AllAssemblies = Annotated[
     bool,
     typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),

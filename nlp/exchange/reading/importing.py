@@ -19,8 +19,8 @@ from ....models.mechanism import (
 )
 from ...errors import InputError, listing
 from .description import Description
-from .meeting import with_meeting_joints
 from .leastgaps import close_from_other_starts, least_gaps
+from .meeting import with_meeting_joints
 from .mjcf import read_mjcf
 from .newton import CLOSED, LEAST, Closed, Gap, close
 from .reduction import Ends, Reduced, reduce
@@ -160,7 +160,7 @@ def _not_closed(given: Description, loops: Description, reduced: Reduced, reques
         each = [f"{name} by {value:.2g}" for name, value in list(apart.items())[:_MOST_NAMES]]
         words += f"; even by itself, with every joint free, a loop stays open by parts of the size: {', '.join(each)}"
         return f"{words}; correct the frames of these loops or the joints between them in the file{others}"
-    return f"{words}; each loop closes by itself, but not with the others: correct the file's lengths and frames{others}"
+    return f"{words}; each loop closes by itself, but not with the others: correct the lengths in the file{others}"
 
 
 def _open_loop(given: Description, reduced: Reduced) -> str:
