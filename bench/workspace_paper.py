@@ -13,12 +13,12 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import read_paper
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.written import paper_of
+from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.workspace.check import check_paper
+from screwsynth.nlp.proof.checker.workspace.document import read_paper
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 
 _PART, _DEGREES = 0.02, 5.0
 

@@ -11,7 +11,7 @@ from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_set
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..certificate.paper.proof import Proof
+    from ..proof.checker.proof import Proof
 
 
 def verify_proof(
@@ -35,10 +35,10 @@ def verify_proof(
     What it is about comes from the case and from the options, which are those of the command that wrote it.
     """
     from .. import __version__
-    from ..certificate.paper.proof import Proof, read_proof
     from ..errors import InputError
     from ..output.files import read_text
-    from ..workspace.paper.document import is_paper, read_paper
+    from ..proof.checker.proof import Proof, read_proof
+    from ..proof.checker.workspace.document import is_paper, read_paper
     from .dimensions import read_machine
     from .paper import verify_paper
 
@@ -69,10 +69,10 @@ def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bo
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..certificate.paper.proof import ProofError
-    from ..certificate.paper.proofcheck import check_proof
-    from ..certificate.paper.statement import claim_words, hold_statement, program_of
     from ..errors import one_line
+    from ..proof.checker.premises import claim_words, hold_statement, program_of
+    from ..proof.checker.proof import ProofError
+    from ..proof.checker.proofcheck import check_proof
 
     try:
         hold_statement(case, proof.statement, above=above, all_assemblies=all_assemblies)

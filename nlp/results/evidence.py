@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from ..certificate.certificate import Certificate
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
+from ..proof.certificate.certificate import Certificate
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
 from .jsondata import finite_or_none, vector

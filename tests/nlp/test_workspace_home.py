@@ -13,27 +13,27 @@ from screwsynth.nlp import Case
 from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.workspace.anyrobot import prove_ranks
-from screwsynth.nlp.workspace.general.problem import NotJudgedError, build_problem
-from screwsynth.nlp.workspace.general.search import prove_rank
-from screwsynth.nlp.workspace.homeposes import Homes
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.paper.anyrobot.looppoints import start_of
-from screwsynth.nlp.workspace.paper.anyrobot.posedrobot import posed_robot
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import PaperProof, read_paper
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import PoseNumbers, pose_box
-from screwsynth.nlp.workspace.posed import at_one_pose
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.workspace.anyrobot.looppoints import start_of
+from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import posed_robot
+from screwsynth.nlp.proof.checker.workspace.check import check_paper
+from screwsynth.nlp.proof.checker.workspace.document import PaperProof, read_paper
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
+from screwsynth.nlp.proof.workspace.home_poses import Homes
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_ranks
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 #: Robots whose platform does not turn.
 TRANSLATIONS = ("3-puu", "3-upu", "delta", "delta-parallelogram", "orthoglide", "tripteron")

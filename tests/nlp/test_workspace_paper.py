@@ -21,31 +21,31 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of
-from screwsynth.nlp.workspace.numbers.boundsearch import Oracle
-from screwsynth.nlp.workspace.numbers.clearance import Clearance
-from screwsynth.nlp.workspace.numbers.poseerror import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.workspace.paper import ballrows, check
-from screwsynth.nlp.workspace.paper.ballslopes import BallSlopes, coordinates
-from screwsynth.nlp.workspace.paper.clearanceclaim import ClearanceClaim
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
-from screwsynth.nlp.workspace.paper.errorclaim import ErrorClaim, whole_errors
-from screwsynth.nlp.workspace.paper.exactly import determinant_sign, tangent_ends
-from screwsynth.nlp.workspace.paper.inverserows import inverse_rows
-from screwsynth.nlp.workspace.paper.pieces import BoxClaim, show
-from screwsynth.nlp.workspace.paper.poseroot import PoseRoot, pose_root
-from screwsynth.nlp.workspace.paper.positive import are_positive, contraction
-from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
-from screwsynth.nlp.workspace.paper.record import PaperRecord, TreeRecord
-from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
-from screwsynth.nlp.workspace.paper.tree import Leaves, PoseNode, read_leaves, split_bytes
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.fractions import determinant_sign, tangent_ends
+from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.workspace import ballrows, check
+from screwsynth.nlp.proof.checker.workspace.ballslopes import BallSlopes, coordinates
+from screwsynth.nlp.proof.checker.workspace.clearanceclaim import ClearanceClaim
+from screwsynth.nlp.proof.checker.workspace.document import PaperClaim, PaperProof, Unproved, read_paper
+from screwsynth.nlp.proof.checker.workspace.errorclaim import ErrorClaim, whole_errors
+from screwsynth.nlp.proof.checker.workspace.inverserows import inverse_rows
+from screwsynth.nlp.proof.checker.workspace.pieces import BoxClaim, show
+from screwsynth.nlp.proof.checker.workspace.poseroot import PoseRoot, pose_root
+from screwsynth.nlp.proof.checker.workspace.positive import are_positive, contraction
+from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
+from screwsynth.nlp.proof.checker.workspace.singularclaim import SingularClaim
+from screwsynth.nlp.proof.checker.workspace.tree import Leaves, PoseNode, read_leaves, split_bytes
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
+from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
+from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord, TreeRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 #: The machine of LinuxCNC's hexapod kinematics, with a limit of every kind.
@@ -492,15 +492,12 @@ def test_signs_of_determinants_are_those_of_rotation_matrices(robot: Legs) -> No
 
 
 def test_the_check_loads_nothing_of_the_search() -> None:
-    """Loaded in an interpreter of its own: what the check needs of the room, and no engine and no search."""
-    room = "screwsynth.nlp.workspace."
-    script = (
-        f"import sys, screwsynth.nlp.workspace.paper.check\nprint(*[m for m in sys.modules if m.startswith('{room}')])"
-    )
+    """Loaded in an interpreter of its own: the statement and the checker, and no engine and no search."""
+    room = "screwsynth.nlp.proof."
+    script = "import sys, screwsynth.nlp.proof.checker.workspace.check\nprint(*sys.modules)"
     run = subprocess.run([sys.executable, "-P", "-c", script], capture_output=True, text=True, check=True)
-    loaded = {name.removeprefix(room) for name in run.stdout.split()}
-    assert {name for name in loaded if not name.startswith("paper")} == {"claims", "closedlayout", "machine", "posed"}
-    assert not loaded & {"paper.record", "paper.written", "paper.anyrobot.singularsides"}
+    loaded = {name.removeprefix(room).split(".")[0] for name in run.stdout.split() if name.startswith(room)}
+    assert loaded == {"statement", "checker"}
 
 
 def test_leaves_that_are_no_boxes_of_the_workspace_count_for_nothing(robot: Legs) -> None:

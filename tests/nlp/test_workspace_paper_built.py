@@ -19,26 +19,26 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.built.builtclaims import built_claims
-from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
-from screwsynth.nlp.workspace.numbers.askedvalues import spectral_extremes
-from screwsynth.nlp.workspace.paper import check
-from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
-from screwsynth.nlp.workspace.paper.built import rules
-from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
-from screwsynth.nlp.workspace.paper.built.statement import BuiltNumbers, with_further
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.posed import extreme_program, posed_layout
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.workspace import check
+from screwsynth.nlp.proof.checker.workspace.ballrows import Joints, ball_rows
+from screwsynth.nlp.proof.checker.workspace.built import rules
+from screwsynth.nlp.proof.checker.workspace.built.changes import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.checker.workspace.built.statement import BuiltNumbers, with_further
+from screwsynth.nlp.proof.checker.workspace.document import PaperClaim, PaperProof, Unproved, read_paper
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
+from screwsynth.nlp.proof.checker.workspace.singularclaim import SingularClaim
+from screwsynth.nlp.proof.statement.claims import claims_of
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.proof.statement.posed_layout import extreme_program, posed_layout
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.asked_values import spectral_extremes
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.tolerance.legs.claims import built_claims
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004

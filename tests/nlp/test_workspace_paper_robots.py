@@ -15,31 +15,31 @@ from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
-from screwsynth.nlp.workspace.general.problem import build_problem
-from screwsynth.nlp.workspace.general.singularpose import SingularPose
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.paper import pieces
-from screwsynth.nlp.workspace.paper.anyrobot import motionclaim
-from screwsynth.nlp.workspace.paper.anyrobot.connected import Pieces, refuse_apart
-from screwsynth.nlp.workspace.paper.anyrobot.interval import balls, half_widths
-from screwsynth.nlp.workspace.paper.anyrobot.rankofrobot import rank_claim
-from screwsynth.nlp.workspace.paper.anyrobot.robotclaims import robot_claims
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import (
+from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.checker.workspace import pieces
+from screwsynth.nlp.proof.checker.workspace.anyrobot import motionclaim
+from screwsynth.nlp.proof.checker.workspace.anyrobot.connected import Pieces, refuse_apart
+from screwsynth.nlp.proof.checker.workspace.anyrobot.interval import balls, half_widths
+from screwsynth.nlp.proof.checker.workspace.anyrobot.rankofrobot import rank_claim
+from screwsynth.nlp.proof.checker.workspace.anyrobot.robotclaims import robot_claims
+from screwsynth.nlp.proof.checker.workspace.check import check_paper
+from screwsynth.nlp.proof.checker.workspace.document import (
     PaperClaim,
     PaperProof,
     Unproved,
     read_paper,
     workspace_numbers,
 )
-from screwsynth.nlp.workspace.paper.pieces import show
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.tree import PoseNode, read_leaves, split_bytes
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.proof.checker.workspace.pieces import show
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.tree import PoseNode, read_leaves, split_bytes
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 
 CASES = Path(__file__).parents[2] / "cases"
 OTHERS = [f"stewart_{k} =" for k in range(2, 7)]
