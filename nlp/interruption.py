@@ -59,6 +59,14 @@ _requested = Event()
 _call: ContextVar[Event | None] = ContextVar("call", default=None)
 
 
+class _StoppedError(Exception):
+    """End of a search in the middle of its set-up."""
+
+
+#: Whether the work is that of a search, which answers a stop.
+_in_search: ContextVar[bool] = ContextVar("in_search", default=False)
+
+
 class _End(NamedTuple):
     """When the work of a block ends, by the clock, and the part of the time left that one search of it may take."""
 
@@ -175,9 +183,10 @@ def one_call() -> Iterator[None]:
 def reason_of(search: Callable[[], str]) -> str:
     """Run a search; return its reason for stopping before its end, or that Python interrupted it.
 
-    Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
+    Its set-up may stop it too, with :func:`stop_if_requested`. Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
     step too: a step changes what is claimed by one assignment, its last.
     """
+    token = _in_search.set(True)
     try:
         return search()
     except KeyboardInterrupt:
@@ -185,6 +194,16 @@ def reason_of(search: Callable[[], str]) -> str:
         if call is not None:
             call.set()
         return STOPPED
+    except _StoppedError:
+        return why_stopped()
+    finally:
+        _in_search.reset(token)
+
+
+def stop_if_requested() -> None:
+    """End the search around this call, in the middle of its set-up, where it is to stop; do nothing in other work."""
+    if _in_search.get() and is_requested():
+        raise _StoppedError
 
 
 def reason_to_stop(seconds: float, boxes: int = 0, most_boxes: int | None = None) -> str:

@@ -11,7 +11,7 @@ from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
-from ..interruption import is_requested, one_call, seconds_left, within
+from ..interruption import is_requested, one_call, reason_of, seconds_left, within
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
 from ..proof.boxes.proof_writer import ProofWriter
@@ -158,7 +158,7 @@ def _certify(
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # An operation without a rule is refused before a solve.
-        search_tape(standard_form(replace(nlps[0], in_home_mode=with_mode)))
+        reason_of(lambda: str(search_tape(standard_form(replace(nlps[0], in_home_mode=with_mode))) and ""))
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None, programs: int = 1) -> Certificate:

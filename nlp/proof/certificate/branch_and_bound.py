@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from ....models import FloatArray, frozen_array
@@ -87,49 +88,34 @@ def certify_program(
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
     with one_search(time_limit):
-        return _certified(nlp, x, claimed, gap, above, jobs, engine, progress, recorder)
+        began = time.perf_counter()
+        if nlp.n == 0:
+            return _certify_point(nlp, above, time.perf_counter() - began)
+        form = standard_form(nlp)
+        incumbent = Incumbent(form)
+        method = _method(form, incumbent, engine, jobs, recorder)
+        search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
+        try:
+            search.incumbent.start(x, claimed)
+        except IncumbentError as error:
+            return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
+        search.first_value = incumbent.value
 
-
-def _certified(
-    nlp: Nlp,
-    x: FloatArray | None,
-    claimed: float | None,
-    gap: float,
-    above: float | None,
-    jobs: int | None,
-    engine: str | None,
-    progress: CertifyProgress | None,
-    recorder: ProofWriter | None,
-) -> Certificate:
-    """Return the certificate that is reached within the time left; the arguments are those of `certify_program`."""
-    began = time.perf_counter()
-    if nlp.n == 0:
-        return _certify_point(nlp, above, time.perf_counter() - began)
-    form = standard_form(nlp)
-    incumbent = Incumbent(form)
-    method = _method(form, incumbent, engine, jobs, recorder)
-    search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
-    try:
-        search.incumbent.start(x, claimed)
-    except IncumbentError as error:
-        return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    search.first_value = incumbent.value
-
-    def run() -> str:
-        reason = search.run(progress)
-        while not reason and search.is_short():
-            search.method.close()
-            if recorder is not None:
-                recorder.clear()
-            search.restart(_method(form, incumbent, engine, jobs, recorder))
+        def run() -> str:
             reason = search.run(progress)
-        return reason
+            while not reason and search.is_short():
+                search.method.close()
+                if recorder is not None:
+                    recorder.clear()
+                search.restart(_method(form, incumbent, engine, jobs, recorder))
+                reason = search.run(progress)
+            return reason
 
-    try:
-        reason = reason_of(run)
-    finally:
-        search.method.close()
-    return search.certificate(reason)
+        try:
+            reason = reason_of(run)
+        finally:
+            search.method.close()
+        return search.certificate(reason)
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -162,7 +148,8 @@ def _method(
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return BoxSearch(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
+        build = partial(engine_for, form, engine, jobs, tangents=recorder is None)
+        return BoxSearch(form, build, incumbent, recorder)
     return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
 
 
