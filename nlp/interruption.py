@@ -183,8 +183,9 @@ def one_call() -> Iterator[None]:
 def reason_of(search: Callable[[], str]) -> str:
     """Run a search; return its reason for stopping before its end, or that Python interrupted it.
 
-    Its set-up may stop it too, with :func:`stop_if_requested`. Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
-    step too: a step changes what is claimed by one assignment, its last.
+    Its set-up may stop it too, with :func:`stop_if_requested`. Only a search that has returned an empty text is
+    complete. What it claims otherwise must hold in the middle of a step too: a step changes what is claimed by one
+    assignment, its last.
     """
     token = _in_search.set(True)
     try:

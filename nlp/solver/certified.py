@@ -158,7 +158,8 @@ def _certify(
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # An operation without a rule is refused before a solve.
-        reason_of(lambda: str(search_tape(standard_form(replace(nlps[0], in_home_mode=with_mode))) and ""))
+        form = standard_form(replace(nlps[0], in_home_mode=with_mode))
+        reason_of(lambda: "" if search_tape(form, is_short=False).op.size else "empty")
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None, programs: int = 1) -> Certificate:

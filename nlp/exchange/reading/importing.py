@@ -157,7 +157,7 @@ def _not_closed(given: Description, loops: Description, reduced: Reduced, reques
     others = _other_keyframes(given, request.keyframe)
     words = f"{_open_loop(given, reduced)} after Newton's method, which came no closer from other starts"
     if apart:
-        each = [f"{name} by {value:.2g}" for name, value in list(apart.items())[:_MOST_NAMES]]
+        each = [f"{name} by {value:.3g}" for name, value in list(apart.items())[:_MOST_NAMES]]
         words += f"; even by itself, with every joint free, a loop stays open by parts of the size: {', '.join(each)}"
         return f"{words}; correct the frames of these loops or the joints between them in the file{others}"
     return f"{words}; each loop closes by itself, but not with the others: correct the lengths in the file{others}"

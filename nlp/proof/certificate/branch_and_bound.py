@@ -91,6 +91,9 @@ def certify_program(
         began = time.perf_counter()
         if nlp.n == 0:
             return _certify_point(nlp, above, time.perf_counter() - began)
+        reason = reason_to_stop(0.0)
+        if reason:
+            return _nothing(nlp, above, reason)
         form = standard_form(nlp)
         incumbent = Incumbent(form)
         method = _method(form, incumbent, engine, jobs, recorder)
@@ -116,6 +119,12 @@ def certify_program(
         finally:
             search.method.close()
         return search.certificate(reason)
+
+
+def _nothing(nlp: Nlp, above: float | None, reason: str) -> Certificate:
+    """Return the certificate of a search that was stopped before its set-up."""
+    status, bound = CertificateStatus.INCOMPLETE, nlp.sign * -math.inf
+    return Certificate(status, nlp, None, math.nan, bound, 0.0, False, above, False, "none", 0, 1, 0.0, reason, ())
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
