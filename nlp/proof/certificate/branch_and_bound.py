@@ -91,27 +91,26 @@ def certify_program(
         began = time.perf_counter()
         if nlp.n == 0:
             return _certify_point(nlp, above, time.perf_counter() - began)
-        reason = reason_to_stop(0.0)
-        if reason:
-            return _nothing(nlp, above, reason)
         form = standard_form(nlp)
         incumbent = Incumbent(form)
-        method = _method(form, incumbent, engine, jobs, recorder)
-        search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
+        # The method in use takes the place of this one: what it sets up can be stopped.
+        whole = BoxSearch(form, partial(engine_for, form, engine, jobs), incumbent)
+        search = _Search(form, incumbent, whole, engine_name(engine), gap, above, began)
         try:
             search.incumbent.start(x, claimed)
         except IncumbentError as error:
             return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-        search.first_value = incumbent.value
 
         def run() -> str:
-            reason = search.run(progress)
-            while not reason and search.is_short():
+            reason = reason_to_stop(time.perf_counter() - began)
+            while not reason:
+                search.restart(_method(form, incumbent, engine, jobs, recorder))
+                reason = search.run(progress)
+                if reason or not search.is_short():
+                    break
                 search.method.close()
                 if recorder is not None:
                     recorder.clear()
-                search.restart(_method(form, incumbent, engine, jobs, recorder))
-                reason = search.run(progress)
             return reason
 
         try:
@@ -119,12 +118,6 @@ def certify_program(
         finally:
             search.method.close()
         return search.certificate(reason)
-
-
-def _nothing(nlp: Nlp, above: float | None, reason: str) -> Certificate:
-    """Return the certificate of a search that was stopped before its set-up."""
-    status, bound = CertificateStatus.INCOMPLETE, nlp.sign * -math.inf
-    return Certificate(status, nlp, None, math.nan, bound, 0.0, False, above, False, "none", 0, 1, 0.0, reason, ())
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
