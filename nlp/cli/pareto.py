@@ -35,7 +35,7 @@ def pareto(
         typer.Option(metavar="GOAL", help="Twice or more: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
     ],
     points: Annotated[
-        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front; 16.")
+        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front.")
     ] = 16,
     settings: SettingTexts = None,
     starts: Starts = None,

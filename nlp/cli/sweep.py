@@ -13,13 +13,12 @@ from .numbers import WholeNumber
 from .options import (
     CLEAR_LINE,
     CaseName,
-    Jobs,
     JsonFile,
     Seed,
     SettingTexts,
-    Time,
     check_picture,
     read_settings,
+    time_option,
     write_json,
 )
 
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 def sweep(
     case: CaseName,
     out: Annotated[
-        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a killed run is resumed.")
+        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a stopped run goes on.")
     ],
     over: Annotated[
         list[str] | None,
@@ -44,10 +43,17 @@ def sweep(
     settings: SettingTexts = None,
     starts: Annotated[
         int | None,
-        typer.Option(parser=WholeNumber("--starts", 1, 100_000), metavar="N", help="Starting points at each point; 8."),
+        typer.Option(
+            parser=WholeNumber("--starts", 1, 100_000),
+            metavar="N",
+            help="Starting points at each point; 8 if left out.",
+        ),
     ] = None,
     seed: Seed = None,
-    jobs: Jobs = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads, or processes of Ipopt."),
+    ] = None,
     engine: Annotated[
         str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
     ] = None,
@@ -56,7 +62,9 @@ def sweep(
         typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
     ] = None,
     certified: Annotated[bool, typer.Option("--certify", help="Prove the optimum at each point too.")] = False,
-    _time: Time = None,
+    _time: Annotated[
+        float | None, time_option("Seconds for the whole command; the same one then goes on where it was.")
+    ] = None,
     json_file: JsonFile = None,
     html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
     plot: Annotated[
