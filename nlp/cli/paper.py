@@ -10,8 +10,8 @@ import typer
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.pose import Value
+    from ..proof.checker.proof_file import Unproved, WorkspaceProof
     from ..proof.checker.workspace.check import CheckedClaim
-    from ..proof.checker.workspace.document import PaperProof, Unproved
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.proof_record import PaperRecord
 
@@ -64,7 +64,7 @@ def write_paper(
     _echo_unproved(proof.unproved, err=True)
 
 
-def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
+def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
     """Check the proof of a workspace and say what it proves.
 
     Raises:
@@ -72,12 +72,12 @@ def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
     """
     from ..errors import one_line
     from ..proof.checker.premises import exact
-    from ..proof.checker.proof import ProofError
-    from ..proof.checker.workspace.check import check_paper
+    from ..proof.checker.proof_file import ProofError
+    from ..proof.checker.workspace.check import check_workspace_proof
     from ..proof.checker.workspace.expected import ERRORS
 
     try:
-        checked = check_paper(proof, case, leg_error=leg_error)
+        checked = check_workspace_proof(proof, case, leg_error=leg_error)
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None

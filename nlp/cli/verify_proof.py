@@ -11,7 +11,7 @@ from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_set
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..proof.checker.proof import Proof
+    from ..proof.checker.proof_file import Proof
 
 
 def verify_proof(
@@ -37,14 +37,12 @@ def verify_proof(
     from .. import __version__
     from ..errors import InputError
     from ..output.files import read_text
-    from ..proof.checker.proof import Proof, read_proof
-    from ..proof.checker.workspace.document import is_paper, read_paper
+    from ..proof.checker.proof_file import Proof, read_proof
     from .dimensions import read_machine
     from .paper import verify_paper
 
-    text = read_text(proof)
     options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
-    given = read_paper(text, proof) if is_paper(text) else read_proof(text, proof)
+    given = read_proof(read_text(proof), proof)
     foreign = ("--leg-error",) if isinstance(given, Proof) else ("--above", "--all-assemblies")
     for name in foreign:
         if options[name]:
@@ -71,7 +69,7 @@ def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bo
     """
     from ..errors import one_line
     from ..proof.checker.premises import claim_words, hold_statement, program_of
-    from ..proof.checker.proof import ProofError
+    from ..proof.checker.proof_file import ProofError
     from ..proof.checker.proofcheck import check_proof
 
     try:

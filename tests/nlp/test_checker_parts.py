@@ -9,10 +9,11 @@ from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.proof.checker.limbs.limbpart import LimbPartChecker
+from screwsynth.nlp.proof.checker.parts import Claim
 from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
-from screwsynth.nlp.proof.checker.proof import Node, ProofError
-from screwsynth.nlp.proof.checker.prooftree import Claim
+from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.anyrobot.assembly import Assembly
 from screwsynth.nlp.proof.checker.workspace.anyrobot.motionclaim import MotionClaim
 from screwsynth.nlp.proof.checker.workspace.anyrobot.motions import Motions

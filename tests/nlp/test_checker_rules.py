@@ -10,7 +10,7 @@ from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
 from screwsynth.nlp.proof.checker.optimum import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
-from screwsynth.nlp.proof.checker.proof import Node
+from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.ballrows import Joints, ball_rows
 from screwsynth.nlp.proof.checker.workspace.built.changes import change_of_jacobian, change_of_rows
 from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root

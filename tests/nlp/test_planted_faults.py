@@ -22,7 +22,7 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Free
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.fractions import exact_rows
-from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.workspace.ballrows import Joints
 from screwsynth.nlp.proof.checker.workspace.pieces import show
 from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root

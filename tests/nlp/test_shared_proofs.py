@@ -19,11 +19,13 @@ from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
 from screwsynth.nlp.proof.checker.limbs.sharedtree import Leaf, leaf_bytes, read_shared
 from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
 from screwsynth.nlp.proof.checker.limbs.tilts import sum_of_tilts, tilts_over
-from screwsynth.nlp.proof.checker.proof import Node, Proof, ProofError, Statement, fingerprint
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 

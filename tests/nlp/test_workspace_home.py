@@ -19,11 +19,10 @@ from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.checker.proof import ProofError
+from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace.anyrobot.looppoints import start_of
 from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import posed_robot
-from screwsynth.nlp.proof.checker.workspace.check import check_paper
-from screwsynth.nlp.proof.checker.workspace.document import PaperProof, read_paper
+from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
@@ -128,10 +127,10 @@ def verdicts(judged: Judgement) -> list[tuple[str, str, Outcome]]:
     return [*ranks, *((each.name, each.sense.value, each.outcome) for each in judged.extremes)]
 
 
-def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, PaperProof]:
+def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, WorkspaceProof]:
     record = PaperRecord()
     judged = judge_workspace(case, with_limits=with_limits, with_objective=False, jobs=1, paper=record)
-    return judged, read_paper(paper_of(judged, record, "").as_text(), "again")
+    return judged, read_proof(paper_of(judged, record, "").as_text(), "again")
 
 
 def check_agreement(name: str, part: float, degrees: float, limit: float) -> int:
@@ -178,7 +177,7 @@ def test_limits_that_only_another_assembly_passes_are_proved_and_not_refuted() -
     # A bound over all assemblies is not within the limit, and so no proof claims it.
     reasons = {each.reason for each in proof.unproved if each.name.startswith("actuator_angle")}
     assert reasons == {"it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"}
-    assert len(check_paper(proof, case).claims) == 5
+    assert len(check_workspace_proof(proof, case).claims) == 5
 
 
 def planar(part: float, degrees: float, seed: int) -> Case:
@@ -235,7 +234,7 @@ def test_proofs_about_robots_that_do_not_turn_are_accepted(name: str, away: tupl
     case = case_over(name, position, spread=0.03, seed=seed)
     judged, proof = judged_on_paper(case, with_limits=False)
     assert judged.is_regular
-    assert [each.name for each in check_paper(proof, case).claims] == ["regular", "constraints regular"]
+    assert [each.name for each in check_workspace_proof(proof, case).claims] == ["regular", "constraints regular"]
 
 
 def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
@@ -245,7 +244,7 @@ def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
     case = case_over("3-rps", position, turns((0.05, 0.0502), (-1.15, -1.1498), (0.3, 0.3002)), spread=0.03)
     judged, proof = judged_on_paper(case, with_limits=False)
     assert judged.is_regular
-    assert len(check_paper(proof, case).claims) == 2
+    assert len(check_workspace_proof(proof, case).claims) == 2
 
 
 def test_the_check_begins_in_the_working_mode_of_home() -> None:

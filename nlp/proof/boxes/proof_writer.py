@@ -1,4 +1,4 @@
-"""Record of a search as the tree of a proof: see :mod:`screwsynth.nlp.proof.checker.proof` for the nodes."""
+"""Record of a search as the tree of a proof: see :mod:`screwsynth.nlp.proof.checker.tree` for the nodes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..checker.proof import Node, ProofError
+from ..checker.proof_file import ProofError
+from ..checker.tree import Node, node_bytes
 from .examination import COLLAPSED, Examination, Verdict
 from .open_boxes import Boxes
 
@@ -132,33 +133,29 @@ class ProofWriter:
         if verdict == Verdict.BOUNDED:
             return bytes([Node.BOUNDED])
         if verdict == Verdict.INFEASIBLE:
-            return bytes([Node.INFEASIBLE, reason])
+            return node_bytes(Node.INFEASIBLE, reason)
         if verdict == Verdict.MONOTONE:
-            return bytes([Node.MONOTONE, reason])
+            return node_bytes(Node.MONOTONE, reason)
         only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
         parts = [part for i in only for part in self._contraction_bytes(found, k, i, float(upper[i]))]
         if is_cut:
-            parts.append(bytes([Node.HALF, int(found.split[k])]))
+            parts.append(node_bytes(Node.HALF, int(found.split[k])))
         return b"".join(parts)
 
     def _contraction_bytes(self, found: Examination, k: int, i: int, upper: float) -> list[bytes]:
         """Return the nodes of the contraction of box number ``k`` along variable ``i``."""
         below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
         if COLLAPSED in (below, above):
-            return [bytes([Node.FACE_UPPER if below == COLLAPSED else Node.FACE_LOWER, i])]
+            return [node_bytes(Node.FACE_UPPER if below == COLLAPSED else Node.FACE_LOWER, i)]
         parts = []
         if below >= 0:
-            parts.append(
-                bytes([Node.BELOW, i]) + struct.pack("<d", float(found.lower[i, k])) + self._reason_bytes(below)
-            )
+            parts.append(node_bytes(Node.BELOW, i, value=float(found.lower[i, k])) + self._reason_bytes(below))
             if found.lower[i, k] > upper:
                 return parts
         if above >= 0:
-            parts.append(
-                bytes([Node.ABOVE, i]) + struct.pack("<d", float(found.upper[i, k])) + self._reason_bytes(above)
-            )
+            parts.append(node_bytes(Node.ABOVE, i, value=float(found.upper[i, k])) + self._reason_bytes(above))
         return parts
 
     def _reason_bytes(self, why: int) -> bytes:
         """Return the reason for cutting a part off, from the number of the expression that excludes it."""
-        return bytes([Node.BOUNDED]) if why < self._functions else bytes([Node.INFEASIBLE, why])
+        return bytes([Node.BOUNDED]) if why < self._functions else node_bytes(Node.INFEASIBLE, why)

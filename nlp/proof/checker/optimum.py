@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from ..statement.standard_form import StandardForm
+from .bisection import Shown
 from .polymodels import Forms, forms_of, polynomial_sum, reaching_part
 from .polynomialrules import PolynomialArithmetic
 from .polynomials import places
-from .proof import Node
 from .slopeweights import weights_of
+from .tree import Node
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,32 +28,6 @@ _FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
 def boxes_at_once(n: int) -> int:
     """Return the number of boxes of n variables that are best evaluated at once."""
     return min(max(_COEFFICIENTS // places(n).total, _FEWEST), _MOST)
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What is shown of a claim on N boxes.
-
-    Attributes:
-        holds: (N,) whether the claim is shown.
-        change: (n, N) how much the claim can gain from halving each variable.
-        lower, upper: (n, N) ends of the part of each box that is left to be shown; crossed where nothing is.
-    """
-
-    holds: NDArray[np.bool_]
-    change: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-    def keep(self, which: NDArray[np.intp], holds: NDArray[np.bool_], change: FloatArray) -> None:
-        """Add what is shown of some boxes."""
-        self.holds[which] |= holds
-        self.change[:, which] = np.fmax(self.change[:, which], change)
-
-    def cut(self, which: NDArray[np.intp], ends: tuple[FloatArray, FloatArray]) -> None:
-        """Leave only a part of some boxes."""
-        self.lower[:, which] = np.fmax(self.lower[:, which], ends[0])
-        self.upper[:, which] = np.fmin(self.upper[:, which], ends[1])
 
 
 class BoundClaim:

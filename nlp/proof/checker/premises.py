@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...program.epigraph import formulate_worst
 from ...program.formulation import formulate, formulate_weighted, scaled_weights
 from ...program.nlp import Nlp
-from .proof import ProofError, Statement
+from .proof_file import ProofError, Statement
 
 #: Significant digits of bounds in claims.
 _DIGITS = 10

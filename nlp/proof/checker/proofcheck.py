@@ -19,19 +19,20 @@ from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..statement.piecewise_derivatives import refuse_jumps
 from ..statement.standard_form import StandardForm, standard_form
+from .bisection import Shown, show
+from .fingerprint import fingerprint, is_same_program
 from .limbs.limbpart import ClaimChecker, LimbPartChecker, is_one_square
 from .limbs.sharedcheck import check_shared
-from .optimum import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown, boxes_at_once
-from .proof import Node, Proof, ProofError, fingerprint, is_same_program
-from .prooftree import Claim, read_parts
+from .optimum import BoundClaim, InfeasibleClaim, MonotoneClaim, boxes_at_once
+from .parts import Claim, read_parts
+from .proof_file import Proof, ProofError
+from .tree import FACES, Node
 from .wrongclaims import Centres
 
 #: Number of claims whose boxes wait at a time.
 _CLAIMS = 4096
-#: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
-_MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
-#: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
-_WIDEST = 5
+#: Largest number of pieces of a claim's box.
+_MOST_PIECES = 5_000
 #: Callback with the number of claims checked, and of those to be checked.
 CheckProgress = Callable[[int, int], None]
 
@@ -98,7 +99,7 @@ class _Checker:
 
     def __init__(self, form: StandardForm, bound: float) -> None:
         self._form, self._bound = form, bound
-        self._block = boxes_at_once(form.n)
+        self.width, self.block, self.most_pieces = form.upper - form.lower, boxes_at_once(form.n), _MOST_PIECES
         refuse_jumps(form.expressions, form.x)
 
     def _claim(self, kind: Node, index: int) -> BoundClaim | InfeasibleClaim | MonotoneClaim:
@@ -115,43 +116,28 @@ class _Checker:
         Raises:
             ProofError: a claim could not be shown.
         """
-        if kind in (Node.FACE_UPPER, Node.FACE_LOWER):
+        if kind in FACES:
             self._check_faces(kind, index, claims)
         lower = np.stack([claim.lower for claim in claims], axis=1)
         upper = np.stack([claim.upper for claim in claims], axis=1)
-        owner = np.arange(len(claims))
-        depth = np.zeros(len(claims), dtype=int)
-        used = np.zeros(len(claims), dtype=int)
-        total = 0
-        claimed, centres = self._claim(kind, index), Centres(self._form, self._bound, kind, index)
-        while owner.size:
-            size = min(self._block, owner.size)
-            part = slice(owner.size - size, owner.size)
-            a, b, of, deep = lower[:, part], upper[:, part], owner[part], depth[part]
-            np.add.at(used, of, 1)
-            total += size
-            with np.errstate(all="ignore"):
-                shown = claimed.show(a, b)
-            left = np.flatnonzero(~(shown.holds | (shown.lower > shown.upper).any(axis=0)))
-            along = self._variables_to_bisect(shown, a, b, deep)[left]
-            a, b, of, deep = shown.lower[:, left], shown.upper[:, left], of[left], deep[left] + 1
-            failed = (used[of] > _MOST_PIECES) | (deep > _MOST_BISECTIONS) | centres.are_wrong(a, b)
-            if failed.any():
-                claim = claims[int(of[failed.argmax()])]
-                ends = ", ".join(
-                    f"{name} in [{x:.6g}, {y:.6g}]"
-                    for name, x, y in zip(self._form.names, claim.lower, claim.upper, strict=True)
-                )
-                raise ProofError(f"the reason '{kind.name.lower()} {index}' could not be shown for the box {ends}")
-            columns = np.arange(of.size)
-            middle = 0.5 * a[along, columns] + 0.5 * b[along, columns]
-            low, high = b.copy(), a.copy()
-            low[along, columns] = high[along, columns] = middle
-            lower = np.concatenate([lower[:, : part.start], a, high], axis=1)
-            upper = np.concatenate([upper[:, : part.start], low, b], axis=1)
-            owner = np.concatenate([owner[: part.start], of, of])
-            depth = np.concatenate([depth[: part.start], deep, deep])
-        return total
+        self._claims, self._claimed = claims, self._claim(kind, index)
+        self._centres = Centres(self._form, self._bound, kind, index)
+        return show(self, lower, upper)
+
+    def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N)."""
+        shown = self._claimed.show(lower, upper)
+        shown.is_wrong = self._centres.are_wrong(shown.lower, shown.upper)
+        return shown
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        given = self._claims[claim]
+        ends = ", ".join(
+            f"{name} in [{x:.6g}, {y:.6g}]"
+            for name, x, y in zip(self._form.names, given.lower, given.upper, strict=True)
+        )
+        return f"the reason '{given.kind.name.lower()} {given.index}' could not be shown for the box {ends}"
 
     def _check_faces(self, kind: Node, i: int, claims: list[Claim]) -> None:
         """Check that boxes collapse on faces of the root only.
@@ -163,15 +149,3 @@ class _Checker:
             end, whole = (claim.upper, self._form.upper) if kind == Node.FACE_UPPER else (claim.lower, self._form.lower)
             if end[i] != whole[i]:
                 raise ProofError(f"a box is collapsed on a face of {self._form.names[i]} that is not the case's")
-
-    def _variables_to_bisect(
-        self, shown: Shown, lower: FloatArray, upper: FloatArray, depth: NDArray[np.intp]
-    ) -> NDArray[np.intp]:
-        """Return the variable (N,) along which to bisect what is left of each box with ends (n, N) and a depth (N,)."""
-        with np.errstate(all="ignore"):
-            radius = 0.5 * (shown.upper - shown.lower)
-            score = shown.change * (radius / np.where(upper > lower, 0.5 * (upper - lower), 1.0))
-            relative = radius / (self._form.upper - self._form.lower)[:, None]
-            known = np.isfinite(score).all(axis=0) & (score > 0).any(axis=0)
-            score = np.where(known & (depth % _WIDEST != _WIDEST - 1), score, relative)
-        return np.asarray(score.argmax(axis=0))

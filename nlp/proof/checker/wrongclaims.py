@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ..statement.standard_form import StandardForm
-from .proof import Node
+from .tree import Node
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..boxes.proof_writer import ProofWriter
 from ..certificate.certificate import CertificateStatus
-from ..checker.proof import Node
-from ..checker.workspace.tree import PoseNode, split_bytes
+from ..checker.tree import Node, node_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,7 +91,7 @@ class TreeRecord:
         for k, one, other, i, value in zip(
             rows.tolist(), _keys(part_low, below), _keys(above, part_high), along.tolist(), middle.tolist(), strict=True
         ):
-            self._cuts[keys[k]] = split_bytes(i, value), one, other
+            self._cuts[keys[k]] = node_bytes(Node.CUT, i, value=value), one, other
 
     def tree(self) -> bytes:
         """Return the tree: every box that was not cut is claimed to be closed."""
@@ -106,7 +105,7 @@ class TreeRecord:
                 parts.append(cut[0])
                 waiting += [cut[2], cut[1]]
             else:
-                parts.append(bytes([PoseNode.OUTSIDE if key in self._outside else PoseNode.CLOSED]))
+                parts.append(bytes([Node.OUTSIDE if key in self._outside else Node.BOUNDED]))
         return b"".join(parts)
 
 

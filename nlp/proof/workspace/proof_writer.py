@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ..checker.proof import fingerprint
+from ..checker.fingerprint import fingerprint
+from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.workspace.anyrobot.robotclaims import RobotClaims, robot_claims
-from ..checker.workspace.document import PaperClaim, PaperProof, Unproved, workspace_numbers
 from ..checker.workspace.expected import ERRORS, ExpectedClaim, expected_claims
 from ..statement.claims import REACH, asked_name, exact_length_name, one_machine_name
 from ..statement.machine import Legs, legs_of
@@ -38,7 +38,7 @@ _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 def paper_of(
     judged: Judgement, record: PaperRecord, text: str, *, quantities: Sequence[str] = (), leg_error: float = 0.0
-) -> PaperProof:
+) -> WorkspaceProof:
     """Return the proof of what is proved, or refuted by two poses, and the claims that have none.
 
     Args:
@@ -54,7 +54,7 @@ def paper_of(
     keys = [_key(judged, each) for each in judged.extremes]
     last = dict(zip(keys, judged.extremes, strict=True))
     first = dict(zip(reversed(keys), reversed(judged.extremes), strict=True))
-    proved: dict[tuple[str, str], PaperClaim] = {}
+    proved: dict[tuple[str, str], ProofClaim] = {}
     unproved = []
     expected = expected_claims(judged.case, robot.layout, legs, quantities, leg_error, robot.more)
     for each in expected:
@@ -69,7 +69,7 @@ def paper_of(
         found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
         if each.kind == "error" and not _has_lengths(judged, record, proved):
             found = _NO_LENGTHS
-        if isinstance(found, PaperClaim):
+        if isinstance(found, ProofClaim):
             proved[each.key] = found
         else:
             unproved.append(Unproved(each.name, each.sense, found))
@@ -81,7 +81,7 @@ def paper_of(
         (other,) = [each for each in ERRORS if each not in missing]
         del proved[other, "max"]
         unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
-    return PaperProof(
+    return WorkspaceProof(
         case=text,
         name=judged.case.name,
         workspace=workspace_numbers(judged.workspace),
@@ -106,7 +106,7 @@ def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
     return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
 
 
-def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]) -> Iterator[PaperClaim]:
+def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
     """Yield the claims that those about every machine rest on."""
     keys = [(exact_length_name(leg.name), "min") for leg in judged.case.model.legs]
     machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]
@@ -114,10 +114,10 @@ def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str]
     for key in keys:
         program = record.programs.get(key)
         if program is not None and program.tree is not None:
-            yield PaperClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
+            yield ProofClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
 
 
-def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], PaperClaim]) -> bool:
+def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> bool:
     """Return whether the shortest lengths of the exact machine's legs have proofs."""
     names = [leg.name for leg in judged.case.model.legs]
     if judged.case.joint_centre_tolerance:
@@ -141,34 +141,34 @@ def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
 
 
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> PaperClaim | str:
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> ProofClaim | str:
     """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
     found = judged.regularity if each.kind == "regular" else judged.constraints
     if found is None:
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
         if legs_of(judged.case) is not None:
-            return PaperClaim(each.name, "", "regular", tree=record.rank.tree())
+            return ProofClaim(each.name, "", "regular", tree=record.rank.tree())
         own = record.own(each.name)
-        return _BEYOND if own.lacks_boxes else PaperClaim(each.name, "", "regular", tree=own.tree())
+        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree())
     if found.outcome is Outcome.REFUTED:
         return _refuted(each, found, judged, model)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
 
 
-def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> PaperClaim | str:
+def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> ProofClaim | str:
     """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
     if found.sides is not None:
-        return PaperClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+        return ProofClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
     legs = legs_of(judged.case)
     if found.errors is not None and found.y is not None and legs is not None:
         machine = found.errors.applied(legs)
-        return PaperClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
+        return ProofClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
     why = "a computed pose has no proof"
     if each.kind == "regular" and found.y is not None and legs is None:
         sides = singular_sides(judged.case, model, judged.workspace, found.y)
         if not isinstance(sides, str):
-            return PaperClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
+            return ProofClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
         why = sides
     return f"{found.outcome.value}: {found.reason}; {why}"
 
@@ -177,8 +177,8 @@ def _number(
     each: ExpectedClaim,
     extremes: dict[tuple[str, str], Extreme],
     record: PaperRecord,
-    proved: dict[tuple[str, str], PaperClaim],
-) -> PaperClaim | str:
+    proved: dict[tuple[str, str], ProofClaim],
+) -> ProofClaim | str:
     """Return the claim about a number with its proof, or why there is none."""
     found = extremes.get(each.key)
     if found is None:
@@ -191,24 +191,24 @@ def _number(
         directions = record.directions.get(one_machine_name(each.name))
         if directions is not None:
             sides = tuple(tuple(each.tolist()) for each in directions)
-            return PaperClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
+            return ProofClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
         leg = each.name.partition(" ")[2].removeprefix("limb ")
         missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
-        return _NO_LENGTHS if missing else PaperClaim(each.name, each.sense, "lengths", found.bound)
+        return _NO_LENGTHS if missing else ProofClaim(each.name, each.sense, "lengths", found.bound)
     return _boxes(each, found.bound, record)
 
 
-def _program(each: ExpectedClaim, record: PaperRecord) -> PaperClaim | str:
+def _program(each: ExpectedClaim, record: PaperRecord) -> ProofClaim | str:
     """Return a claim with a tree of the search of ``certify``, or why there is none."""
     program = record.programs.get(each.key)
     if each.key in record.elsewhere:
         return _ONE_ASSEMBLY
     if program is None or program.tree is None:
         return _NO_BOUND
-    return PaperClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
+    return ProofClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
 
 
-def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> PaperClaim | str:
+def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> ProofClaim | str:
     """Return a claim with a tree of a search of its own, or why there is none."""
     if each.name not in record.boxes:
         return "its search was not recorded"
@@ -221,4 +221,4 @@ def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> PaperCla
         bound = sign * max(sign * limit, sign * reached)
         if not math.isfinite(bound) or (each.limit is None and not bound > 0):
             return _NO_BOUND
-    return PaperClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())
+    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())

@@ -7,7 +7,7 @@ import numpy as np
 from ....models import FloatArray, Model
 from ...case.case import Case
 from ...case.workspace import Workspace
-from ..checker.proof import ProofError
+from ..checker.proof_file import ProofError
 from ..checker.workspace.anyrobot.rankofrobot import rank_claim
 from ..checker.workspace.anyrobot.signchange import show_sign_change
 from ..checker.workspace.poseroot import pose_root

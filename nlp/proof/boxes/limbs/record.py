@@ -1,4 +1,4 @@
-"""Record of a search by limbs with shared variables as a proof's tree: see ``paper/limbs/sharedtree`` for its nodes."""
+"""Record of a search by limbs with shared variables as a proof's tree: see :mod:`...checker.limbs.sharedtree`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checker.limbs.sharedtree import halves, leaf_bytes
-from ...checker.proof import Node, ProofError
+from ...checker.limbs.sharedtree import leaf_bytes
+from ...checker.proof_file import ProofError
+from ...checker.tree import Node, halves
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

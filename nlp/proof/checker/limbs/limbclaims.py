@@ -15,12 +15,12 @@ variables must not collapse, since the other limbs depend on them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...statement.standard_form import StandardForm
-from ..proof import ProofError
+from ..bisection import Shown, show
 from ..slopecut import cut_off
 from .tilted import TiltedForm, TiltedSlopes
 from .tilts import Tilts
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 #: Number of boxes that are evaluated at once.
 _BLOCK = 512
-#: Largest number of pieces of a claim's box, and of bisections on the way to one of them.
-_MOST_PIECES, _MOST_BISECTIONS = 2_000, 60
+#: Largest number of pieces of a claim's box.
+_MOST_PIECES = 2_000
 #: Error of a difference of two rounded numbers, in parts of their sizes.
 _SUMS = 1e-13
 #: Part of the sizes of its terms by which a value in doubles must exceed a bound to show that this is wrong.
@@ -58,19 +58,6 @@ class LimbClaims:
     bounds: FloatArray
 
 
-class _Pieces(NamedTuple):
-    """Boxes, ends (n, N), the claim that each belongs to, and the number of bisections made."""
-
-    lower: FloatArray
-    upper: FloatArray
-    of: NDArray[np.intp]
-    depth: NDArray[np.intp]
-
-    def part(self, which: slice | NDArray[np.bool_]) -> _Pieces:
-        """Return some pieces."""
-        return _Pieces(self.lower[:, which], self.upper[:, which], self.of[which], self.depth[which])
-
-
 class LimbChecker:
     """A check of claims about one limb, or about the part with shared variables alone.
 
@@ -81,6 +68,8 @@ class LimbChecker:
 
     def __init__(self, form: StandardForm, shared: int) -> None:
         self._form, self._m = form, shared
+        self._lower, self._upper = np.array(form.lower), np.array(form.upper)
+        self.width, self.block, self.most_pieces = self._upper - self._lower, _BLOCK, _MOST_PIECES
         self._tilted = TiltedForm(form)
         self._equation = [each.is_equation for each in form.conditions]
         self._depends = np.array(form.dependence, dtype=bool)[1:]
@@ -95,72 +84,29 @@ class LimbChecker:
         Raises:
             ProofError: a claim could not be shown.
         """
-        L, m = claims.bounds.size, self._m
-        own = [np.repeat(ends[m:, None], L, axis=1) for ends in (self._form.lower, self._form.upper)]
-        # The last pieces are taken first: one claim is finished before the next begins, as far as blocks allow.
-        left = _Pieces(
-            np.concatenate([claims.lower, own[0]]),
-            np.concatenate([claims.upper, own[1]]),
-            np.arange(L),
-            np.zeros(L, dtype=np.intp),
-        )
-        used, total, open_before = np.zeros(L, dtype=np.intp), 0, L
-        while left.of.size:
-            first = max(left.of.size - _BLOCK, 0)
-            some, left = left.part(slice(first, None)), left.part(slice(0, first))
-            np.add.at(used, some.of, 1)
-            total += some.of.size
-            halves = self._attempt(some, claims, used)
-            left = _Pieces(*(np.concatenate(pair, axis=-1) for pair in zip(left, halves, strict=True)))
-            open_now = np.unique(left.of).size
-            if done is not None:
-                done(open_before - open_now)
-            open_before = open_now
-        return total
+        own = [np.repeat(ends[self._m :, None], claims.bounds.size, axis=1) for ends in (self._lower, self._upper)]
+        self._claims = claims
+        return show(self, np.concatenate([claims.lower, own[0]]), np.concatenate([claims.upper, own[1]]), done)
 
-    def _attempt(self, some: _Pieces, claims: LimbClaims, used: NDArray[np.intp]) -> _Pieces:
-        """Return the halves of pieces that are left.
-
-        Raises:
-            ProofError: a claim is wrong at the centre of a piece, or has been bisected too often.
-        """
-        slopes, bound = self._tilted.slopes(some.lower, some.upper), claims.bounds[some.of]
-        tilts = claims.tilts.select(some.of)
-        with np.errstate(all="ignore"):
-            holds, low, high = self._feasible_part(slopes)
-            holds |= slopes.is_below(bound - tilts.total() * (1 + _SUMS))
-            change = np.zeros_like(low)
-            for model in [] if holds.all() else self._tilted.sums(slopes, tilts):
-                holds |= slopes.defined & (model.bound() <= bound)
-                change = np.fmax(change, model.change())
-                above = bound - model.total - _SUMS * (np.abs(bound) + np.abs(model.total))
-                usable = slopes.defined & np.isfinite(above)
-                ends = cut_off(above, -model.slope_high, -model.slope_low, some.lower, some.upper)
-                low = np.where(usable, np.fmax(low, ends[0]), low)
-                high = np.where(usable, np.fmin(high, ends[1]), high)
-            is_wrong = self._is_wrong(slopes, tilts, bound)
-            holds |= (low > high).any(axis=0)
-            low, high = self._collapsed(slopes, low, high)
-            width = np.where(some.upper > some.lower, some.upper - some.lower, 1.0)
-            score = change * (high - low) / width
-            whole = (self._form.upper - self._form.lower)[:, None]
-            relative = np.where(whole > 0, (high - low) / whole, 0.0)
-            score = np.where(np.isfinite(score).all(axis=0) & (score > 0).any(axis=0), score, relative)
-        failed = ~holds & (is_wrong | (used[some.of] > _MOST_PIECES) | (some.depth >= _MOST_BISECTIONS))
-        if failed.any():
-            raise ProofError(self._sentence(claims, int(some.of[failed.argmax()])))
-        keep = ~holds
-        low, high, along = low[:, keep], high[:, keep], score.argmax(axis=0)[keep]
-        of, depth, columns = some.of[keep], some.depth[keep] + 1, np.arange(int(keep.sum()))
-        middle = 0.5 * low[along, columns] + 0.5 * high[along, columns]
-        left, right = high.copy(), low.copy()
-        left[along, columns] = right[along, columns] = middle
-        return _Pieces(
-            np.concatenate([low, right], axis=1),
-            np.concatenate([left, high], axis=1),
-            np.tile(of, 2),
-            np.tile(depth, 2),
-        )
+    def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N) of the claims with these numbers (N,)."""
+        slopes, bound = self._tilted.slopes(lower, upper), self._claims.bounds[of]
+        tilts = self._claims.tilts.select(of)
+        holds, low, high = self._feasible_part(slopes)
+        holds |= slopes.is_below(bound - tilts.total() * (1 + _SUMS))
+        change = np.zeros_like(low)
+        for model in [] if holds.all() else self._tilted.sums(slopes, tilts):
+            holds |= slopes.defined & (model.bound() <= bound)
+            change = np.fmax(change, model.change())
+            above = bound - model.total - _SUMS * (np.abs(bound) + np.abs(model.total))
+            usable = slopes.defined & np.isfinite(above)
+            ends = cut_off(above, -model.slope_high, -model.slope_low, lower, upper)
+            low = np.where(usable, np.fmax(low, ends[0]), low)
+            high = np.where(usable, np.fmin(high, ends[1]), high)
+        is_wrong = self._is_wrong(slopes, tilts, bound)
+        holds |= (low > high).any(axis=0)
+        low, high = self._collapsed(slopes, low, high)
+        return Shown(holds, change, low, high, is_wrong)
 
     def _feasible_part(self, slopes: TiltedSlopes) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
         """Return whether a condition cannot hold (N,), and ends (n, N) of the part that no single one excludes."""
@@ -199,12 +145,12 @@ class LimbChecker:
         size = np.abs(value) + tilts.total() + np.where(np.isfinite(bound), np.abs(bound), 0.0)
         return is_feasible & (not any(self._equation)) & (value - tilt > bound + _WRONG * size)
 
-    def _sentence(self, claims: LimbClaims, which: int) -> str:
-        """Return the sentence that names a claim that could not be shown."""
-        names = self._form.names
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        names, claims = self._form.names, self._claims
         ends = ", ".join(
             f"{name} in [{low:.6g}, {high:.6g}]"
-            for name, low, high in zip(names, claims.lower[:, which], claims.upper[:, which], strict=False)
+            for name, low, high in zip(names, claims.lower[:, claim], claims.upper[:, claim], strict=False)
         )
         own = names[self._m :]
         of = f"the limb with {own[0]}" if own else "the sum of the limbs"

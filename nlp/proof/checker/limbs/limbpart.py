@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ...statement.standard_form import StandardForm
-from ..proof import Node, ProofError
+from ..proof_file import ProofError
+from ..tree import Node
 from .limbclaims import LimbChecker, LimbClaims
 from .squares import squares_of
 from .tilts import tilts_over
 
 if TYPE_CHECKING:
-    from ..prooftree import Claim
+    from ..parts import Claim
 
 
 def is_one_square(form: StandardForm) -> bool:

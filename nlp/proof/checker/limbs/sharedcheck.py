@@ -9,7 +9,7 @@ import numpy as np
 
 from ...statement.limb_separation import separate
 from ...statement.standard_form import StandardForm
-from ..proof import ProofError
+from ..proof_file import ProofError
 from .limbclaims import LimbChecker, LimbClaims
 from .sharedtree import Leaf, read_shared
 from .tilts import Tilts, sum_of_tilts, tilts_over

@@ -2,7 +2,7 @@
 
 The modules import each other in this order:
 
-* ``document`` (a proof as JSON), ``tree`` (boxes as bytes) and ``expected`` (claims that it must name);
+* ``tree`` (leaves of poses) and ``expected`` (claims that a proof must name);
 * about every machine within a tolerance: ``built``, whose ``statement`` both sides have;
 * the check: ``poseroot`` (the box of coordinates), ``ballslopes`` (arithmetic), ``ballrows``
   (rows of legs), ``pieces`` (bisection), ``positive`` (positive definite matrices), ``rankclaim`` and

@@ -21,7 +21,7 @@ from ....errors import ScrewsynthError
 from ....program.layout import Layout
 from ...statement.machine import check_leg_error, legs_of, workspace_of_case
 from ...statement.posed_layout import extreme_program
-from ..proof import Proof, ProofError, Statement
+from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
 from ..proofcheck import check_proof
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
@@ -30,11 +30,10 @@ from .ballrows import Joints
 from .built.built import Built
 from .clearanceclaim import ClearanceClaim
 from .comparing import hold_premises, keep_limit
-from .document import COORDINATES, PaperClaim, PaperProof, Unproved
 from .errorclaim import ErrorClaim, whole_errors
 from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
 from .pieces import BoxClaim, show
-from .poseroot import PoseRoot, pose_root
+from .poseroot import COORDINATES, PoseRoot, pose_root
 from .rankclaim import RankClaim
 from .singularclaim import SingularClaim
 from .tree import read_leaves
@@ -76,7 +75,7 @@ class CheckedClaim:
 
 
 @dataclass(frozen=True)
-class CheckedPaper:
+class VerifiedWorkspace:
     """A proof that holds.
 
     Attributes:
@@ -94,9 +93,9 @@ class CheckedPaper:
     pieces: int
 
 
-def check_paper(
-    proof: PaperProof, case: Case, progress: PaperProgress | None = None, *, leg_error: float = 0.0
-) -> CheckedPaper:
+def check_workspace_proof(
+    proof: WorkspaceProof, case: Case, progress: PaperProgress | None = None, *, leg_error: float = 0.0
+) -> VerifiedWorkspace:
     """Check a proof of a workspace, by showing each of its claims again.
 
     Args:
@@ -133,7 +132,7 @@ def check_paper(
             claims.append(checker.check(each, given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return CheckedPaper(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
+    return VerifiedWorkspace(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
 
 
 class _Checker:
@@ -148,7 +147,7 @@ class _Checker:
         ProofError: the proof is for another workspace, other joint centres or other errors.
     """
 
-    def __init__(self, proof: PaperProof, case: Case, leg_error: float) -> None:
+    def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
         workspace = workspace_of_case(case)
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         hold_premises(case, workspace, self._legs, leg_error, proof)
@@ -178,7 +177,7 @@ class _Checker:
         lemmas = {(each.name, each.sense): each for each in self._proof.lemmas}
         return Built(self._layout, self._root, self._legs, lemmas, self._bound_of)
 
-    def check(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check one claim.
 
         Raises:
@@ -233,7 +232,7 @@ class _Checker:
         self.leaves += len(leaves.lower)
         self.pieces += show(claim, self._root, leaves)
 
-    def _check_rank(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J does not."""
         if given.reason == "singular":
             return self._check_sides(each, given)
@@ -247,7 +246,7 @@ class _Checker:
             self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
         return CheckedClaim(each.name, each.sense)
 
-    def _check_sides(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_sides(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that two poses of the workspace have determinants of opposite signs."""
         sides = [np.array(side, dtype=float) for side in given.sides]
         if len(sides) != 2 or any(side.shape != (COORDINATES,) or not np.isfinite(side).all() for side in sides):
@@ -263,14 +262,14 @@ class _Checker:
             raise ProofError("the determinant has not opposite signs at the two poses")
         return CheckedClaim(each.name, each.sense, is_refuted=True)
 
-    def _check_machine(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_machine(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that a machine within the tolerance is singular at a pose of the workspace."""
         if self._built is None:
             raise ProofError("the claim is about the exact machine")
         self._built.refuse_unless_singular(self._root, given.sides)
         return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
 
-    def _bound_of(self, expression: SX, sense: Sense, given: PaperClaim, layout: Layout | None = None) -> float:
+    def _bound_of(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout | None = None) -> float:
         """Return the bound of an expression that a tree of ``certify`` proves, in a layout or that of the case."""
         if given.reason != "program" or given.bound is None or not math.isfinite(given.bound):
             raise ProofError("the claim has no bound")
@@ -280,7 +279,7 @@ class _Checker:
         self.pieces += checked.pieces
         return -nlp.sign * checked.bound
 
-    def _check_program(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_program(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check a tree of ``certify`` for a number."""
         claim = each.claim
         if claim is None:
@@ -311,7 +310,7 @@ class _Checker:
         outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
-    def _check_stroke(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_stroke(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check a limit on a telescoping leg from the lengths of the leg."""
         leg, is_stroke = each.legs[0], each.kind == "stroke"
         if given.reason == "one machine":
@@ -327,7 +326,7 @@ class _Checker:
         keep_limit(each, bound)
         return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
 
-    def _check_error(self, each: ExpectedClaim, given: PaperClaim) -> CheckedClaim:
+    def _check_error(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
         firsts = {one.name: one.bound for one in self._proof.claims if one.name in ERRORS}
         position, rotation = (firsts.get(name) for name in ERRORS)

@@ -9,8 +9,7 @@ from ....case.task import Sense
 from ....case.workspace import Workspace
 from ...statement.machine import Legs
 from ..premises import exact
-from ..proof import ProofError
-from .document import PaperProof, workspace_numbers
+from ..proof_file import ProofError, WorkspaceProof, workspace_numbers
 from .expected import ExpectedClaim
 
 #: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
@@ -19,7 +18,7 @@ _ON_LIMIT = 1e-9
 _SAME = 1e-9
 
 
-def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: PaperProof) -> None:
+def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: WorkspaceProof) -> None:
     """Refuse a proof whose file names other premises than those of the case; the check does without the file's.
 
     Args:
@@ -42,7 +41,7 @@ def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error
         raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
 
 
-def _compare_legs(legs: Legs | None, proof: PaperProof) -> None:
+def _compare_legs(legs: Legs | None, proof: WorkspaceProof) -> None:
     """Refuse a proof for other joint centres.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Claims about boxes, shown on pieces of them: a box on which a claim is not shown at once is bisected."""
+"""Claims about boxes of poses, shown on pieces of them inside the workspace."""
 
 from __future__ import annotations
 
@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from .....models import FloatArray
-from ..proof import ProofError
+from ..bisection import Shown
+from ..bisection import show as show_claims
+from ..proof_file import ProofError
 from .poseroot import PoseRoot
 from .tree import Leaves
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-#: Number of boxes that are examined at once.
-_BLOCK = 256
-#: Largest number of pieces of a box, and of bisections on the way to one of them.
-_MOST_PIECES, _MOST_BISECTIONS = 5_000, 60
 
 #: Number of points of a block that are looked at for one that shows a claim to be wrong.
 _LOOKED_AT = 4
@@ -60,53 +57,52 @@ def show(claim: BoxClaim, root: PoseRoot, leaves: Leaves) -> int:
     if wrong.any():
         at = int(wrong.argmax())
         raise ProofError(f"the box {_words(leaves.lower[at], leaves.upper[at])} is not outside of the workspace")
-    inside = ~leaves.outside
-    lower, upper = leaves.lower[inside], leaves.upper[inside]
-    first_lower, first_upper = lower, upper
-    owner, depth = np.arange(len(lower)), np.zeros(len(lower), dtype=int)
-    used, total = np.zeros(len(lower), dtype=int), 0
-    while owner.size:
-        part = slice(max(0, owner.size - _BLOCK), owner.size)
-        low, high, of, deep = lower[part], upper[part], owner[part], depth[part]
-        lower, upper, owner, depth = lower[: part.start], upper[: part.start], owner[: part.start], depth[: part.start]
-        kept = ~np.asarray(root.is_outside(low, high), dtype=bool)
-        low, high = root.contracted(low[kept], high[kept])
-        of, deep = of[kept], deep[kept]
-        if not of.size:
-            continue
-        np.add.at(used, of, 1)
-        total += of.size
-        holds, shares, is_wrong = claim.attempt(low, high)
-        if is_wrong is not None:
-            _refuse_wrong(root, 0.5 * low[is_wrong] + 0.5 * high[is_wrong])
-        left = np.flatnonzero(~np.asarray(holds, dtype=bool))
-        failed = (used[of[left]] > _MOST_PIECES) | (deep[left] >= _MOST_BISECTIONS)
-        if failed.any():
-            k = int(of[left[failed.argmax()]])
-            raise ProofError(f"the claim could not be shown for the box {_words(first_lower[k], first_upper[k])}")
-        low, high, of, deep = low[left], high[left], of[left], deep[left] + 1
-        wide = high - low
-        relative = wide / np.where(root.upper > root.lower, root.upper - root.lower, np.inf)
-        known = np.isfinite(shares[left]).all(axis=1, keepdims=True) & (shares[left] > 0).any(axis=1, keepdims=True)
-        along = np.where(wide > 0, np.where(known, shares[left], relative), -1.0).argmax(axis=1)
-        every = np.arange(len(left))
-        middle = 0.5 * low[every, along] + 0.5 * high[every, along]
-        below, above = high.copy(), low.copy()
-        below[every, along] = above[every, along] = middle
-        lower, upper = np.concatenate([lower, low, above]), np.concatenate([upper, below, high])
-        owner, depth = np.concatenate([owner, of, of]), np.concatenate([depth, deep, deep])
-    return total
+    rule = _PoseRule(claim, root, leaves)
+    return show_claims(rule, rule.lower.T, rule.upper.T)
 
 
-def _refuse_wrong(root: PoseRoot, points: FloatArray) -> None:
-    """Refuse a claim that is wrong at points (K, 6), of which the first ones are looked at.
+class _PoseRule:
+    """The rule of a claim about boxes of poses, of which those outside of the workspace need nothing."""
 
-    Raises:
-        ProofError: one of them is a pose of the workspace.
-    """
-    for y in points[:_LOOKED_AT]:
-        if root.holds(y):
-            raise ProofError(f"the claim is wrong at the pose with the coordinates {', '.join(f'{v:.6g}' for v in y)}")
+    block, most_pieces = 256, 5_000
+
+    def __init__(self, claim: BoxClaim, root: PoseRoot, leaves: Leaves) -> None:
+        self._claim, self._root = claim, root
+        self.width, inside = root.upper - root.lower, ~leaves.outside
+        self.lower, self.upper = leaves.lower[inside], leaves.upper[inside]
+
+    def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (6, N).
+
+        Raises:
+            ProofError: the claim is wrong at a pose.
+        """
+        low, high = lower.T, upper.T
+        kept = ~np.asarray(self._root.is_outside(low, high), dtype=bool)
+        low, high = self._root.contracted(low, high)
+        holds, shares = ~kept, np.zeros(low.shape)
+        if kept.any():
+            found = self._claim.attempt(low[kept], high[kept])
+            holds[kept], shares[kept] = found.holds, found.shares
+            if found.is_wrong is not None:
+                at = np.flatnonzero(kept)[found.is_wrong]
+                self._refuse_wrong(0.5 * low[at] + 0.5 * high[at])
+        return Shown(holds, shares.T, low.T, high.T)
+
+    def _refuse_wrong(self, points: FloatArray) -> None:
+        """Refuse a claim that is wrong at points (K, 6), of which the first ones are looked at.
+
+        Raises:
+            ProofError: one of them is a pose of the workspace.
+        """
+        for y in points[:_LOOKED_AT]:
+            if self._root.holds(y):
+                at = ", ".join(f"{value:.6g}" for value in y)
+                raise ProofError(f"the claim is wrong at the pose with the coordinates {at}")
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        return f"the claim could not be shown for the box {_words(self.lower[claim], self.upper[claim])}"
 
 
 def _words(lower: FloatArray, upper: FloatArray) -> str:

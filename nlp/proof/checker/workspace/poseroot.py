@@ -17,6 +17,8 @@ from ..fractions import tangent_ends
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: Number of coordinates of a pose.
+COORDINATES = 6
 #: Part of itself by which tangents move outwards where they multiply an axis: its doubles are of length 1 to rounding.
 #: A fixed angle's coordinate is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)

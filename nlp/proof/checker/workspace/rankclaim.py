@@ -16,7 +16,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ..fractions import determinant_sign
-from ..proof import ProofError
+from ..proof_file import ProofError
 from .ballrows import Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
 from .built.changes import change_of_rows

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ......models import FloatArray
-from ...proof import ProofError
+from ...proof_file import ProofError
 from .assembly import Assembly
 
 if TYPE_CHECKING:

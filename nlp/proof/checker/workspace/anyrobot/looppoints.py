@@ -10,7 +10,7 @@ from casadi import SX
 
 from ......models import FloatArray
 from ......models.rows import independent_rows
-from ...proof import ProofError
+from ...proof_file import ProofError
 from ..positive import inverses
 from .posedrobot import PosedRobot
 

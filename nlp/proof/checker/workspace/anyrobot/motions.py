@@ -26,7 +26,7 @@ from casadi import SX
 from ......models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind, rate_relations
 from ......models.member import scaled_twists
 from ......models.rows import independent_rows
-from ...proof import ProofError
+from ...proof_file import ProofError
 from .posedrobot import PosedRobot
 
 #: Singular values below this part of the largest are zero at the middle of the workspace.

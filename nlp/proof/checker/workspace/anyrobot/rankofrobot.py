@@ -8,7 +8,7 @@ from ......models import Model
 from .....case.case import Case
 from .....errors import UncoveredError
 from ....statement.claims import CONSTRAINTS
-from ...proof import ProofError
+from ...proof_file import ProofError
 from ..poseroot import PoseRoot
 from .assembly import Assembly
 from .looppoints import needed_equations, start_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ......models import FloatArray
-from ...proof import ProofError
+from ...proof_file import ProofError
 from ..poseroot import PoseRoot
 from .motionclaim import MotionClaim
 

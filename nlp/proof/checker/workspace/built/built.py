@@ -17,10 +17,9 @@ from .....program.layout import Layout
 from ....statement.claims import Claim, exact_length_name, one_machine_name
 from ....statement.machine import LEGS, Legs
 from ...fractions import determinant_sign
-from ...proof import ProofError
+from ...proof_file import ProofClaim, ProofError
 from ..ballrows import Joints
-from ..document import COORDINATES, PaperClaim
-from ..poseroot import PoseRoot
+from ..poseroot import COORDINATES, PoseRoot
 from .changes import change_of_jacobian
 from .rules import Machines, length_beside
 from .statement import BuiltNumber, BuiltNumbers
@@ -28,7 +27,7 @@ from .statement import BuiltNumber, BuiltNumbers
 #: Part of itself by which a computed number is moved outwards: more than the rounding of a root and a few sums.
 _ROUNDING = 1e-14
 #: Checks a tree of ``certify`` for an expression, and returns its proven bound.
-BoundOf = Callable[[SX, Sense, PaperClaim], float]
+BoundOf = Callable[[SX, Sense, ProofClaim], float]
 
 
 class Shown(NamedTuple):
@@ -57,7 +56,7 @@ class Built:
         layout: Layout,
         root: PoseRoot,
         legs: Legs,
-        lemmas: Mapping[tuple[str, str], PaperClaim],
+        lemmas: Mapping[tuple[str, str], ProofClaim],
         bound_of: BoundOf,
     ) -> None:
         self._layout, self._legs, self._lemmas, self._bound_of = layout, legs, lemmas, bound_of
@@ -103,7 +102,7 @@ class Built:
         """Return by how much a singular value of J changes at most, moments divided by a length."""
         return change_of_jacobian(joints, self.tolerance, length, self.shortest)
 
-    def stroke(self, name: str, leg: int, sense: str, weights: tuple[float, float], given: PaperClaim) -> float:
+    def stroke(self, name: str, leg: int, sense: str, weights: tuple[float, float], given: ProofClaim) -> float:
         """Return the bound of a number made from the lengths of a leg at two poses, whose errors are the same.
 
         Args:

@@ -23,7 +23,7 @@ from .....case.limits.relation import Relations
 from .....case.task import Sense
 from .....program.layout import Layout
 from ....statement.claims import Claim, claims_of_items, with_limits
-from ...proof import ProofError
+from ...proof_file import ProofError
 from .rules import Machines, TaskRates, angle, minus_cosine, radius_ratio, task_rates
 
 #: Limits on numbers that change with the pose: where those of two legs are the same number of the exact machine, they
