@@ -97,8 +97,8 @@ def compare(
         scale: whether robots are scaled at all; typical lengths are otherwise lengths in the case's unit.
         part: of a typical dimension by which a design may differ from it; 0 holds typical dimensions fixed.
         certified: whether each optimum is proved too.
-        time_limit: seconds for the whole call, of whose rest each robot takes an equal part at most. Searches for a
-            certificate end after 60 s in any case, those over the workspace too.
+        time_limit: seconds for the whole call, of whose rest each robot takes an equal part at most. Without it
+            the certificate of a robot ends after 60 s, and its judgement over the workspace too.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
         jobs: number of threads; the result does not depend on it.
@@ -219,13 +219,18 @@ def _measures(contender: Contender) -> tuple[str, ...]:
     return tuple(each.name for each in contender.model.quantities if each.name in _MEASURES)
 
 
+def _proof_seconds() -> float | None:
+    """Return the seconds for one proof: no limit but the time left where there is one."""
+    return TIME_LIMIT if math.isinf(seconds_left()) else None
+
+
 def _with_certificate(entry: Entry, jobs: int | None) -> Entry:
     """Return a robot with the certificate of its answer, or the reason why it has none."""
     if entry.solution is None or not entry.has_answer:
         return entry
     began = time.perf_counter()
     try:
-        found = certify(entry.solution, time_limit=TIME_LIMIT, jobs=jobs)
+        found = certify(entry.solution, time_limit=_proof_seconds(), jobs=jobs)
     except (UncoveredError, InputError) as error:
         return replace(entry, certificate_fault=str(error))
     if found.certificate is not None and found.certificate.was_beaten:
@@ -249,7 +254,7 @@ def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
         return replace(entry, judgement=proof.judgement, outcome=verdict, strokes=strokes)
     try:
         design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
-        judged = judge_workspace(design, quantities=asked, jobs=jobs, with_objective=False)
+        judged = judge_workspace(design, quantities=asked, time_limit=_proof_seconds(), jobs=jobs, with_objective=False)
     except ScrewsynthError as error:
         return replace(entry, workspace_fault=str(error))
     strokes = proven_strokes(judged, names)
