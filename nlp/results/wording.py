@@ -92,7 +92,7 @@ def headline(result: SolveResult, case: Case) -> Line:
             if result.reached is None or result.reached.F is None
             else f": best F so far = {number(result.reached.F)}{unit}"
         )
-        return Line(f"interrupted{best}", tone=Tone.NO_ANSWER)
+        return Line(f"stopped before the end{best}", tone=Tone.NO_ANSWER)
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several

@@ -11,6 +11,7 @@ from ....models import FloatArray
 from ...errors import InputError
 from ...evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ...evidence.state import loops_are_closed
+from ...interruption import is_requested
 from ...program.sampling import starting_points
 from ..statement.standard_form import StandardForm
 
@@ -95,6 +96,8 @@ class Incumbent:
         form, nlp = self._form, self._form.nlp
         if x is None:
             for point in starting_points(nlp, _POINTS, seed=0):
+                if is_requested():
+                    return
                 self.improve_near(form.point_of(point))
             return
         point = form.point_of(x)

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from .....models import FloatArray
-from ....interruption import reason_of, reason_to_stop
+from ....interruption import one_search, reason_of, reason_to_stop
 from ..robot.pose_box import PoseBox
 
 if TYPE_CHECKING:
@@ -78,7 +77,6 @@ def prove_minimum(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     recorder: TreeRecord | None = None,
 ) -> Minimum:
     """Prove the smallest value of a function over a box of poses.
@@ -91,7 +89,6 @@ def prove_minimum(
             while no value below it is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
     began = time.perf_counter()
@@ -103,13 +100,15 @@ def prove_minimum(
     def run() -> str:
         nonlocal state
         while len(state.bounds.lower) and state.least < _target(state.value, gap, limit, slack):
-            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
+            reason = reason_to_stop(time.perf_counter() - began)
             if reason:
                 return reason
             state = _after_step(state, oracle, box, gap, limit, slack, recorder)
         return ""
 
-    reason, count = reason_of(run), len(state.bounds.lower)
+    with one_search(time_limit):
+        reason = reason_of(run)
+    count = len(state.bounds.lower)
     least = min(state.least, state.value)
     return Minimum(least, state.value, state.y, state.boxes, count, time.perf_counter() - began, reason)
 

@@ -44,7 +44,6 @@ def prove_ranks(
     homes: Homes,
     *,
     engine: str | None = None,
-    time_limit: float | None = None,
     progress: RankProgress | None = None,
     paper: PaperRecord | None = None,
 ) -> Ranks:
@@ -54,14 +53,13 @@ def prove_ranks(
         model: the robot, without unknowns that follow in closed form.
         homes: the case, its poses and the machines that are meant.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
-        time_limit: seconds for each of the two searches.
         progress: called during them.
         paper: records the searches for a proof.
     """
     box, family = homes.box, None if homes.machines is None else homes.machines.family
     try:
         problem = build_problem(homes.case, model, box) if family is None else family.problem
-        prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
+        prove = partial(prove_rank, problem, family=family, engine=engine, progress=progress)
         shown = partial(_is_shown, problem, family, homes)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):

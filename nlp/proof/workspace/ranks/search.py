@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from ....interruption import Milestone, reached, reason_of, reason_to_stop
+from ....interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ..regular.search import REPORT_EVERY, RankProgress
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
@@ -69,8 +69,9 @@ def prove_rank(
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    search = _Search(problem, matrix, family, engine, recorder, is_shown)
-    return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
+    with one_search(time_limit):
+        search = _Search(problem, matrix, family, engine, recorder, is_shown)
+        return search.verdict(reason_of(lambda: search.run(most_boxes, progress)))
 
 
 class _State(NamedTuple):
@@ -120,14 +121,14 @@ class _Search:
         self._due = _FIRST
         self._singular: FloatArray | None = None
 
-    def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
+    def run(self, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
         while self._state.stack:
             (*stack, cells), small, boxes = self._state
             seconds = time.perf_counter() - self._began
-            reason = reason_to_stop(seconds, time_limit, boxes=boxes, most_boxes=most_boxes)
+            reason = reason_to_stop(seconds, boxes, most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from ....interruption import Milestone, reached, reason_of, reason_to_stop
+from ....interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ...statement.machine import Legs
 from ..robot.pose_box import PoseBox
 from ..tolerance.legs.rank import SingularMachine, singular_machine
@@ -68,8 +68,9 @@ def prove_regular(
     Raises:
         ValueError: there is no engine of that name here.
     """
-    search = _Search(legs, box, rank_engine(legs, box, engine), recorder)
-    return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
+    with one_search(time_limit):
+        search = _Search(legs, box, rank_engine(legs, box, engine), recorder)
+        return search.verdict(reason_of(lambda: search.run(most_boxes, progress)))
 
 
 #: Lower and upper ends (B, 6) of boxes.
@@ -112,14 +113,14 @@ class _Search:
         self._sides: FloatArray | None = None
         self._built: SingularMachine | None = None
 
-    def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
+    def run(self, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
         while self._state.stack:
             (*stack, (lower, upper)), small, boxes = self._state
             seconds = time.perf_counter() - self._began
-            reason = reason_to_stop(seconds, time_limit, boxes=boxes, most_boxes=most_boxes)
+            reason = reason_to_stop(seconds, boxes, most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:
