@@ -15,7 +15,7 @@ from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
 from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.certificate.limbs import sharedsearch
-from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb, first_largest
+from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb, first_largest_of_lists
 from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
 from screwsynth.nlp.certificate.paper.limbs.sharedtree import Leaf, leaf_bytes, read_shared
 from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
@@ -169,7 +169,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)
         best = np.maximum.reduceat(bounds, own.starts)
-        return replace(found, bounds=bounds, best=best, top=first_largest(bounds, own))
+        return replace(found, bounds=bounds, best=best, top=first_largest_of_lists(bounds, own))
 
     monkeypatch.setattr(sharedsearch, "bound_limb", careless)
     wrong = proof_of(best.nlp, GAP, best.x)

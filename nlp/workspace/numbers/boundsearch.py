@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ....models import FloatArray
+from ....models.arrays import first_largest
 from ...interruption import reason_of, reason_to_stop
 from ..posebox import PoseBox
 
@@ -145,7 +146,7 @@ def _after_step(
     order = np.argpartition(bound, min(_BLOCK, len(bound)) - 1)
     now, later = order[:_BLOCK], order[_BLOCK:]
     part_lower, part_upper, parents = lower[now], upper[now], bound[now]
-    split = np.argmax(np.where(part_upper > part_lower, shares[now], -1.0), axis=1)
+    split = first_largest(np.where(part_upper > part_lower, shares[now], -1.0))
     every = np.arange(len(now))
     middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
     left, right = part_upper.copy(), part_lower.copy()
