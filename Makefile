@@ -53,4 +53,4 @@ bench: $(VENV)/ready ## compare with other methods and write docs/benchmarks.md;
 	$(BIN)/python bench/benchmark.py $(BENCH)
 
 clean: ## remove the environment and all build results
-	rm -rf $(VENV) build dist *.egg-info nlp/certificate/_bounds*.so nlp/workspace/_workspace*.so nlp/screening/_screen*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) build dist *.egg-info nlp/proof/enclosure/_bounds*.so nlp/proof/workspace/_workspace*.so nlp/screening/_screen*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

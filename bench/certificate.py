@@ -12,11 +12,11 @@ from collections.abc import Iterable
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solve
-from screwsynth.nlp.certificate.boxes.engines import kernel
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import Certificate
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.paper.statement import program_of
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import Certificate
+from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.solver.certified import certify, proof_of
 
 LIMIT = 60.0

@@ -17,7 +17,7 @@ import numpy as np
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate
 from screwsynth.nlp.case.case import Search
-from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.solver.multistart import solve_program
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from screwsynth.models import Dimension, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Rotation, Task, solve
-from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 
 TWIST = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
 #: Part by which lengths are free at home; parts of the size and radians by which the pose is.

@@ -14,11 +14,12 @@ from pathlib import Path
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, load_case, solve
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "models")]
 from limb_cases import poses  # noqa: E402 - the tests' cases
@@ -66,10 +67,10 @@ def measure(name: str, case: Case, gap: float, limit: float = 120.0) -> None:
 
 def several_poses(gap: float) -> None:
     """Print rows for robots at several poses, searched by limbs although they have few variables."""
-    usual, branchandbound._WHOLE_BOX = branchandbound._WHOLE_BOX, 0
+    usual, branch_and_bound._WHOLE_BOX = branch_and_bound._WHOLE_BOX, 0
     for seed in range(12):
         measure(f"poses {seed}", poses(seed), gap, 20.0)
-    branchandbound._WHOLE_BOX = usual
+    branch_and_bound._WHOLE_BOX = usual
 
 
 def main() -> None:

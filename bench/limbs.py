@@ -19,9 +19,9 @@ import casadi as ca
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, Solution, load_case, solve
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
 from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 ANGLE = math.radians(10)
 

@@ -22,8 +22,8 @@ from limbs import ANGLE, machine
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, formulate, load_case, solve
 from screwsynth.nlp.case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from screwsynth.nlp.certificate.branchandbound import certify_program
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 
 #: Length by which moments are divided.
 LENGTH = 10.0

@@ -18,9 +18,9 @@ from certificate import case_with
 from limbs import machine
 
 from screwsynth.nlp import Case, Solution, load_case, solve
-from screwsynth.nlp.certificate.boxes.threads import Threads
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import Certificate
+from screwsynth.nlp.proof.boxes.threads import Threads
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import Certificate
 
 #: Cases by name, and gaps for which the search takes a second or more.
 CASES: dict[str, tuple[Callable[[], Case], float]] = {

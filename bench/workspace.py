@@ -12,13 +12,13 @@ from tempfile import TemporaryDirectory
 
 from screwsynth.nlp import Case, Free, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.machine import Legs, legs_of
-from screwsynth.nlp.workspace.numbers.extremes import prove_extreme
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.posed import posed_layout
-from screwsynth.nlp.workspace.regular.engines import kernel
-from screwsynth.nlp.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.statement.claims import claims_of
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.posed_layout import posed_layout
+from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
+from screwsynth.nlp.proof.workspace.regular.engines import kernel
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 
 # The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """

@@ -13,12 +13,11 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import read_paper
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.written import paper_of
+from screwsynth.nlp.proof.checker.proof_file import ProofError, read_proof
+from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 
 _PART, _DEGREES = 0.02, 5.0
 
@@ -35,10 +34,10 @@ def measure(name: str) -> str:
     began, record = time.process_time(), PaperRecord()
     judged = judge_workspace(case, with_limits=False, paper=record)
     searched = time.process_time()
-    proof = read_paper(paper_of(judged, record, "").as_text(), name)
+    proof = read_proof(paper_of(judged, record, "").as_text(), name)
     begin = time.process_time()
     try:
-        checked = check_paper(proof, case)
+        checked = check_workspace_proof(proof, case)
     except ProofError as error:
         return f"| `{name}` | rejected: {error} | | | | |"
     names = ", ".join(each.name for each in checked.claims)

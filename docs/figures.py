@@ -20,7 +20,7 @@ from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.output.pictures.workspaceslices import slices_picture
-from screwsynth.nlp.workspace.slices.slices import slices_of
+from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 
 FOLDER = Path(__file__).parent / "figures"
 #: Columns of the gallery's sheet, and width and height of a robot on it, inches.

@@ -41,9 +41,6 @@ from .case.task import Task as Task
 from .case.workspace import TurnKind as TurnKind
 from .case.workspace import Turns as Turns
 from .case.workspace import Workspace as Workspace
-from .certificate.branchandbound import certify_program as certify_program
-from .certificate.certificate import Certificate as Certificate
-from .certificate.certificate import CertificateStatus as CertificateStatus
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result
@@ -89,6 +86,16 @@ from .output.sweepfunction import sweep as sweep
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
+from .proof.certificate.branch_and_bound import certify_program as certify_program
+from .proof.certificate.certificate import Certificate as Certificate
+from .proof.certificate.certificate import CertificateStatus as CertificateStatus
+from .proof.workspace.judge import Judgement as Judgement
+from .proof.workspace.judge import judge_workspace as judge_workspace
+from .proof.workspace.numbers.extremes import Extreme as Extreme
+from .proof.workspace.scale import Scale as Scale
+from .proof.workspace.scale import largest_scale as largest_scale
+from .proof.workspace.verdict import Outcome as Outcome
+from .proof.workspace.verdict import Regularity as Regularity
 from .results.jsondata import json_data as json_data
 from .results.reading import load_result as load_result
 from .results.regression import CaseCheck as CaseCheck
@@ -116,10 +123,3 @@ from .solver.tradeoff import tradeoff as tradeoff
 from .sweeps.columns import SweepColumns as SweepColumns
 from .sweeps.data import sweep_result as sweep_result
 from .units import Units as Units
-from .workspace.judge import Judgement as Judgement
-from .workspace.judge import judge_workspace as judge_workspace
-from .workspace.numbers.extremes import Extreme as Extreme
-from .workspace.scale import Scale as Scale
-from .workspace.scale import largest_scale as largest_scale
-from .workspace.verdict import Outcome as Outcome
-from .workspace.verdict import Regularity as Regularity

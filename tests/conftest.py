@@ -11,8 +11,9 @@ import pytest
 
 #: Modules of searches with a limit on their time; each looks at the clock once a step.
 SEARCHES = (
-    *("certificate.branchandbound", "workspace.regular.search", "workspace.general.search", "workspace.looplimits"),
-    *("workspace.general.machinenumber", "workspace.numbers.boundsearch", "workspace.numbers.extremes"),
+    *("certificate.branch_and_bound", "workspace.regular.search", "workspace.ranks.search"),
+    *("workspace.numbers.loop_limits", "workspace.tolerance.machine_number"),
+    *("workspace.numbers.bound_search", "workspace.numbers.extremes"),
 )
 #: Seconds from one look at the clock to the next: about those of a step on a quiet machine.
 STEP = 0.01
@@ -43,6 +44,6 @@ def clock_of_steps() -> None:
     """Let a search of so many seconds take a number of steps: no test depends on how fast or busy the machine is."""
     looks = itertools.count()
     for name in SEARCHES:
-        module = import_module(f"screwsynth.nlp.{name}")
+        module = import_module(f"screwsynth.nlp.proof.{name}")
         assert module.time.perf_counter
         module.time = SimpleNamespace(perf_counter=lambda: STEP * next(looks))  # type: ignore[attr-defined]

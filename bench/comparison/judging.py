@@ -8,9 +8,9 @@ import numpy as np
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Nlp
-from screwsynth.nlp.certificate.standardform import is_in_home_mode
 from screwsynth.nlp.evidence.kkt import linearise
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode
 
 #: Largest violation of a feasible answer, in half ranges: ten times what this program demands of its own.
 FEASIBLE = 1e-8

@@ -10,10 +10,10 @@ import typer
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.pose import Value
-    from ..workspace.judge import Judgement
-    from ..workspace.paper.check import CheckedClaim
-    from ..workspace.paper.document import PaperProof, Unproved
-    from ..workspace.paper.record import PaperRecord
+    from ..proof.checker.proof_file import Unproved, WorkspaceProof
+    from ..proof.checker.workspace.check import CheckedClaim
+    from ..proof.workspace.judge import Judgement
+    from ..proof.workspace.proof_record import PaperRecord
 
 
 def paper_record(target: str | None, json_file: str | None) -> PaperRecord | None:
@@ -27,7 +27,7 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
         InputError: both are standard output.
     """
     from ..errors import InputError
-    from ..workspace.paper.record import PaperRecord
+    from ..proof.workspace.proof_record import PaperRecord
 
     if target is None:
         return None
@@ -51,7 +51,7 @@ def write_paper(
     """
     from ..errors import one_line
     from ..output.files import write_text
-    from ..workspace.paper.written import paper_of
+    from ..proof.workspace.proof_writer import paper_of
 
     if record is None:
         return
@@ -64,20 +64,20 @@ def write_paper(
     _echo_unproved(proof.unproved, err=True)
 
 
-def verify_paper(proof: PaperProof, case: Case, leg_error: float) -> None:
+def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
     """Check the proof of a workspace and say what it proves.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..certificate.paper.proof import ProofError
-    from ..certificate.paper.statement import exact
     from ..errors import one_line
-    from ..workspace.paper.check import check_paper
-    from ..workspace.paper.expected import ERRORS
+    from ..proof.checker.premises import exact
+    from ..proof.checker.proof_file import ProofError
+    from ..proof.checker.workspace.check import check_workspace_proof
+    from ..proof.checker.workspace.expected import ERRORS
 
     try:
-        checked = check_paper(proof, case, leg_error=leg_error)
+        checked = check_workspace_proof(proof, case, leg_error=leg_error)
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
@@ -103,7 +103,7 @@ def _premises(case: Case, numbers_at: str) -> Iterator[str]:
     """Yield the poses, the tasks and the assemblies that claims are about."""
     from ...models import Dimension
     from ..case.pose import Free
-    from ..certificate.paper.statement import exact
+    from ..proof.checker.premises import exact
 
     def span(value: Value, dimension: Dimension) -> str:
         ends = (value.lower, value.upper) if isinstance(value, Free) else (value,)
@@ -128,8 +128,8 @@ def _premises(case: Case, numbers_at: str) -> Iterator[str]:
 
 def _words(claim: CheckedClaim, case: Case) -> str:
     """Return what is shown of a claim."""
-    from ..certificate.paper.statement import outward
-    from ..workspace.claims import CONSTRAINTS
+    from ..proof.checker.premises import outward
+    from ..proof.statement.claims import CONSTRAINTS
 
     if claim.by_machine:
         return "refuted, at the pose given J is singular for a machine within the tolerance"

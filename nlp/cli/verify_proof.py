@@ -11,7 +11,7 @@ from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_set
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..certificate.paper.proof import Proof
+    from ..proof.checker.proof_file import Proof
 
 
 def verify_proof(
@@ -35,16 +35,14 @@ def verify_proof(
     What it is about comes from the case and from the options, which are those of the command that wrote it.
     """
     from .. import __version__
-    from ..certificate.paper.proof import Proof, read_proof
     from ..errors import InputError
     from ..output.files import read_text
-    from ..workspace.paper.document import is_paper, read_paper
+    from ..proof.checker.proof_file import Proof, read_proof
     from .dimensions import read_machine
     from .paper import verify_paper
 
-    text = read_text(proof)
     options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
-    given = read_paper(text, proof) if is_paper(text) else read_proof(text, proof)
+    given = read_proof(read_text(proof), proof)
     foreign = ("--leg-error",) if isinstance(given, Proof) else ("--above", "--all-assemblies")
     for name in foreign:
         if options[name]:
@@ -69,10 +67,10 @@ def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bo
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..certificate.paper.proof import ProofError
-    from ..certificate.paper.proofcheck import check_proof
-    from ..certificate.paper.statement import claim_words, hold_statement, program_of
     from ..errors import one_line
+    from ..proof.checker.premises import claim_words, hold_statement, program_of
+    from ..proof.checker.proof_file import ProofError
+    from ..proof.checker.proofcheck import check_proof
 
     try:
         hold_statement(case, proof.statement, above=above, all_assemblies=all_assemblies)

@@ -12,9 +12,9 @@ from .workspacefiles import WorkspaceFiles
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..proof.workspace.judge import Judgement
+    from ..proof.workspace.proof_record import PaperRecord
     from ..results.workspace import WorkspacePose
-    from ..workspace.judge import Judgement
-    from ..workspace.paper.record import PaperRecord
 
 
 def workspace(
@@ -52,9 +52,9 @@ def workspace(
     """Prove regular poses and limits over a whole workspace."""
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
+    from ..proof.statement.machine import workspace_of_case
     from ..results.workspace import workspace_of
     from ..results.workspaceposes import evaluate_command
-    from ..workspace.machine import workspace_of_case
     from .dimensions import read_machine
     from .paper import paper_record, write_paper
 
@@ -72,8 +72,8 @@ def workspace(
     judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
     largest = None
     if scale:
+        from ..proof.workspace.scale import largest_scale
         from ..results.workspacescale import scale_data
-        from ..workspace.scale import largest_scale
 
         largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
     result = workspace_of(judged, largest)
@@ -105,7 +105,7 @@ def _judge_with_progress(
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
     import sys
 
-    from ..workspace.judge import judge_workspace
+    from ..proof.workspace.judge import judge_workspace
 
     if not sys.stderr.isatty():
         return judge_workspace(

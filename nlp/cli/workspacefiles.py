@@ -10,8 +10,8 @@ from .options import check_picture, write_json
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..proof.workspace.slices.slices import Slice
     from ..results.workspace import WorkspacePose, WorkspaceResult
-    from ..workspace.slices.slices import Slice
 
 
 class WorkspaceFiles(NamedTuple):
@@ -72,7 +72,7 @@ class WorkspaceFiles(NamedTuple):
             CaseError: a picture of slices is asked for, of a robot that has none.
         """
         from ..errors import CaseError
-        from ..workspace.slices.slices import slices_of
+        from ..proof.workspace.slices.slices import slices_of
 
         if self.plot is None and self.page is None:
             return ()

@@ -15,11 +15,11 @@ from ..case.task import Sense
 from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, listing
 from ..evidence.singularities import clause_of
 from ..interruption import Milestone, is_requested, one_call, reached
+from ..proof.workspace.judge import judge_workspace
+from ..proof.workspace.verdict import Outcome
 from ..solver.certified import certify
 from ..solver.exchange import design_of
 from ..solver.solve import solve
-from ..workspace.judge import judge_workspace
-from ..workspace.verdict import Outcome
 from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, strokes_over_poses, task_fit
 from .placed import placed
 from .robots import Contender, read_robots

@@ -12,13 +12,13 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.task import Sense
-from ..certificate.certificate import Certificate
 from ..evidence.mobility import Mobility, mobility_of
 from ..evidence.state import evaluate
+from ..proof.certificate.certificate import Certificate
+from ..proof.workspace.judge import Judgement
+from ..proof.workspace.verdict import Outcome
 from ..solver.certified import Certified
 from ..solver.solution import Solution, TaskOutcome
-from ..workspace.judge import Judgement
-from ..workspace.verdict import Outcome
 from .placed import Placed
 from .robots import Contender
 

@@ -20,7 +20,7 @@ from ..case.pose import Free, Pose, Value
 from ..case.settings import Expectation
 from ..case.task import Task
 from ..errors import CaseError
-from ..workspace.machine import LEGS
+from ..proof.statement.machine import LEGS
 from .robots import Contender
 
 

@@ -13,11 +13,11 @@ from ...models import FloatArray, frozen_vector
 from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
-from ..certificate.standardform import is_in_home_mode
 from ..errors import CaseError
 from ..program.formulation import formulate, formulate_weighted, scaled_weights
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
+from ..proof.statement.standard_form import is_in_home_mode
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status

@@ -23,10 +23,10 @@ import numpy as np
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
-from ..certificate.branchandbound import certify_program
-from ..certificate.certificate import Certificate
 from ..errors import EvaluationError
 from ..interruption import Milestone, is_requested, one_call, reached
+from ..proof.certificate.branch_and_bound import certify_program
+from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
 from .goals import Goal

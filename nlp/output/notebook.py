@@ -14,11 +14,11 @@ from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
 from ..case.limits.limits import Limits
 from ..case.pose import HERE, Free, Value
-from ..certificate.certificate import Certificate
 from ..errors import CaseError, EvaluationError, InputError
 from ..evidence.state import evaluate
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
+from ..proof.certificate.certificate import Certificate
 from ..results.evidence import certificate_data
 from ..results.point import task_data
 from ..results.result import result_of

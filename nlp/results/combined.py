@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..certificate.certificate import Certificate
+from ..proof.certificate.certificate import Certificate
 from ..solver.solution import Combination, Solution, TaskOutcome
 from .data import CombinedData, CombinedPointData, CombinedResult, OutcomeData
 from .design import limits_data, margins_data

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from ..case.task import Sense
+from ..proof.workspace.verdict import Outcome
 from ..solver.status import Status
 from ..system.strictjson import Size
-from ..workspace.verdict import Outcome
 from .data import CertificateData
 from .jsondata import Absent, JsonObject
 from .parts import UnitsData, VersionsData

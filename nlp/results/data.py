@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Annotated, TypeAlias
 
 from ..case.task import Method, Sense
-from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import PointKind
+from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..system.strictjson import Size
 from .jsondata import Absent, Inline, JsonObject, Vector

@@ -8,9 +8,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ...models.arrays import first_largest
-from ..certificate.certificate import Certificate
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
+from ..proof.certificate.certificate import Certificate
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
 from .jsondata import finite_or_none, vector

@@ -6,7 +6,7 @@ from collections import Counter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..certificate.certificate import Certificate
+from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
 from ..solver.optima import Optimum
 from ..solver.starts import StartStatus

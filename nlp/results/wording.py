@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
 from ..case.task import Sense
-from ..certificate.certificate import CertificateStatus
 from ..evidence.optimality import CURVED, PointKind
+from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
 from .jointwording import convention_lines, joint_lines

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.task import Sense
+from ..proof.workspace.verdict import Outcome
 from ..units import Units
-from ..workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
 if TYPE_CHECKING:
+    from ..proof.statement.machine import CentreErrors, JointErrors
+    from ..proof.workspace.judge import Judgement
+    from ..proof.workspace.numbers.extremes import Extreme
+    from ..proof.workspace.robot.pose_box import PoseNumbers
+    from ..proof.workspace.verdict import Regularity
     from ..solver.exchange import WorkspaceProof
-    from ..workspace.judge import Judgement
-    from ..workspace.machine import CentreErrors, JointErrors
-    from ..workspace.numbers.extremes import Extreme
-    from ..workspace.posebox import PoseNumbers
-    from ..workspace.verdict import Regularity
 
 
 class WorkspacePose(JsonObject):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..case.case import Case
 from ..case.task import Sense
-from ..workspace.verdict import Outcome
+from ..proof.workspace.verdict import Outcome
 from .rounding import number, ordered
 from .text import Line, TextTable, Tone
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.task import Sense
-from ..workspace.verdict import Outcome
+from ..proof.workspace.verdict import Outcome
 from .rounding import number, ordered
 from .text import Line
 

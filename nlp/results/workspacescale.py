@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from .workspace import ScaleData, pose_data
 
 if TYPE_CHECKING:
+    from ..proof.workspace.scale import Scale
     from ..units import Units
-    from ..workspace.scale import Scale
 
 
 def scale_data(found: Scale, units: Units) -> ScaleData:

@@ -9,7 +9,7 @@ from ...models import Dimension
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.task import Sense
-from ..workspace.verdict import Outcome
+from ..proof.workspace.verdict import Outcome
 from .motionwording import triple
 from .rounding import TURNED, number
 from .text import Line, TextTable, Tone

@@ -28,11 +28,11 @@ from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.limit import PosedRobot
 from ..program.nlp import Nlp
 from ..program.places import Scalar
-from ..workspace.general.assembled import Loops
-from ..workspace.general.posed_model import rotation_of
-from ..workspace.general.problem import NotJudgedError, Problem, build_problem
-from ..workspace.machine import workspace_of_case
-from ..workspace.posebox import PoseNumbers, pose_box
+from ..proof.statement.machine import workspace_of_case
+from ..proof.workspace.robot.closed_loops import Loops
+from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box
+from ..proof.workspace.robot.posed_model import rotation_of
+from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
 from .tighter import TIGHTER, tightened
 
 #: Smallest squared sine or cosine of a limb's reach: of a number between 0 and 1 the limit 0 is tighter by as much.

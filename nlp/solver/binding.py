@@ -8,8 +8,8 @@ import numpy as np
 
 from ...models import FloatArray
 from ..program.nlp import Nlp
-from ..workspace.machine import JointErrors
-from ..workspace.posebox import PoseNumbers
+from ..proof.statement.machine import JointErrors
+from ..proof.workspace.robot.pose_box import PoseNumbers
 
 #: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
 #: ranges, at which they are compared.

@@ -9,17 +9,18 @@ from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
-from ..certificate.boxes.proofwriter import ProofWriter
-from ..certificate.boxes.tapes import search_tape
-from ..certificate.branchandbound import GAP, CertifyProgress, certify_program
-from ..certificate.certificate import Certificate, CertificateStatus
-from ..certificate.paper.proof import Proof, Statement, fingerprint
-from ..certificate.paper.statement import check_minimum, has_both_senses, has_modes, program_of
-from ..certificate.standardform import is_in_home_mode, standard_form
 from ..errors import InputError
 from ..interruption import is_requested, one_call
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
+from ..proof.boxes.proof_writer import ProofWriter
+from ..proof.boxes.tapes import search_tape
+from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
+from ..proof.certificate.certificate import Certificate, CertificateStatus
+from ..proof.checker.fingerprint import fingerprint
+from ..proof.checker.premises import check_minimum, has_both_senses, has_modes, program_of
+from ..proof.checker.proof_file import Proof, Statement
+from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .answer import Answer
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program

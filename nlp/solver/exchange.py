@@ -1,7 +1,7 @@
 """A design that is regular and keeps its limits over a continuous workspace, by exchange of poses.
 
 A limit over a workspace is one constraint for each of its poses. A program with a few of them is solved, its design is
-judged over the whole workspace (:mod:`screwsynth.nlp.workspace`), and the poses that refute a claim become
+judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`), and the poses that refute a claim become
 constraints, each of the one claim that it refutes, until the proof holds.
 
 In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
@@ -33,10 +33,10 @@ from ..errors import CaseError
 from ..interruption import is_requested, one_call
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from ..workspace.judge import Judgement, judge_workspace
-from ..workspace.machine import has_straight_legs
-from ..workspace.posebox import PoseNumbers, pose_box
-from ..workspace.verdict import Outcome
+from ..proof.statement.machine import has_straight_legs
+from ..proof.workspace.judge import Judgement, judge_workspace
+from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box
+from ..proof.workspace.verdict import Outcome
 from .binding import BindingPose, Distinct, points_around
 from .machines import machine_of, on_plates, with_spans_of
 from .multistart import ProgramSolution

@@ -15,7 +15,7 @@ from ...models.wrench import force_along
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint
 from ..case.limits.limit import Design, Limit, Plate, PlateJoint
-from ..workspace.machine import JointErrors
+from ..proof.statement.machine import JointErrors
 
 
 def machine_of(robot: RobotInstance, case: Case, errors: JointErrors) -> RobotInstance:

@@ -12,13 +12,13 @@ from ...models.joints.closedform import closed_form
 from ..case.case import Case
 from ..interruption import is_requested
 from ..program.nlp import Nlp
-from ..workspace.anyrobot import not_judged
-from ..workspace.closedlayout import reach_claims
-from ..workspace.judge import Judgement, judge_workspace
-from ..workspace.machine import workspace_of_case
-from ..workspace.numbers.extremes import prove_extreme
-from ..workspace.posebox import pose_box
-from ..workspace.verdict import Outcome
+from ..proof.statement.closed_layout import reach_claims
+from ..proof.statement.machine import workspace_of_case
+from ..proof.workspace.judge import Judgement, judge_workspace
+from ..proof.workspace.numbers.extremes import prove_extreme
+from ..proof.workspace.ranks.ranks import not_judged
+from ..proof.workspace.robot.pose_box import pose_box
+from ..proof.workspace.verdict import Outcome
 from .anybinding import AnyBinder, BoundPose
 from .binding import BindingPose, Distinct, points_around
 

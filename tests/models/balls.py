@@ -3,8 +3,8 @@
 import flint
 import numpy as np
 
-from screwsynth.nlp.certificate.enclosing.enclosure import Enclosures
-from screwsynth.nlp.certificate.enclosing.tape import Op, Tape
+from screwsynth.nlp.proof.enclosure.first_order import Enclosures
+from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 BINARY = (Op.ADD, Op.SUB, Op.MUL, Op.DIV)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, case_from_tables, formulate, load_case
-from screwsynth.nlp.certificate.separation import Separation, separate
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+from screwsynth.nlp.proof.statement.limb_separation import Separation, separate
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 
 def machine(width: float, pose_is_free: bool = False) -> Case:

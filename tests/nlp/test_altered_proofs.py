@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import InputError, case_from_tables
-from screwsynth.nlp.certificate.paper import proof as proof_file
-from screwsynth.nlp.certificate.paper.proof import Statement, fingerprint
-from screwsynth.nlp.certificate.paper.statement import program_of
 from screwsynth.nlp.program.formulation import formulate_each
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof
+from screwsynth.nlp.proof.checker import proof_file
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Statement, WorkspaceProof
 
 Run = Callable[..., tuple[int, str, str]]
 Place = tuple[str | int, ...]
@@ -355,7 +355,7 @@ def test_an_altered_field_is_rejected_or_changes_nothing_but_a_true_bound(cli: R
 def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None:
     content = written(cli, folder, "machines")
     for other in (-0.019999999999, 0.0, 0.0099999999, 0.02):
-        code, out, err = checked(cli, folder, "machines", {**content, "leg_error": other})
+        code, out, err = checked(cli, folder, "machines", with_value(content, ("premises", "leg_error"), other))
         assert (code, out) == (1, "")
         assert "see --leg-error" in err
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
@@ -384,14 +384,15 @@ def test_a_proof_is_no_proof_of_another_case(cli: Run, folder: Path, proof: str)
             continue
         own = checked(cli, folder, case, written(cli, folder, case))[1]
         other = case_from_tables(tomllib.loads(KINDS[case].case), name="other", source="other")
-        statement = Statement(**{**content["statement"], "best": tuple(content["statement"]["best"])})
-        graphs = [content["graph"]]
+        statement = Statement(**{**content["premises"], "best": tuple(content["premises"]["best"])})
+        own_graph = content["claims"][0]["graph"]
+        graphs = [own_graph]
         with contextlib.suppress(InputError):
             graphs.append(fingerprint(program_of(other, statement)))
         for graph in graphs:
-            code, out, err = checked(cli, folder, case, {**content, "graph": graph})
+            code, out, err = checked(cli, folder, case, with_value(content, ("claims", 0, "graph"), graph))
             assert (code == 0) == (err == "")
-            assert code or (graph != content["graph"] and is_true(own, out, reached_values(folder, case)))
+            assert code or (graph != own_graph and is_true(own, out, reached_values(folder, case)))
 
 
 def test_nothing_rests_on_the_fingerprint(cli: Run, folder: Path) -> None:
@@ -403,8 +404,9 @@ def test_nothing_rests_on_the_fingerprint(cli: Run, folder: Path) -> None:
     assert "other expressions" in cli("verify-proof", str(proof), str(folder / "other.toml"))[2]
     nlp = program_of(case_from_tables(tomllib.loads(other), name="other", source="other"), Statement())
     best = max(nlp.evaluate(x).F for x in np.random.default_rng(0).uniform(nlp.lower, nlp.upper, (50, nlp.n)))
-    for bound, status in ((content["bound"], 1), (0.99 * best, 1), (2 * best, 0)):
-        proof.write_text(json.dumps({**content, "graph": fingerprint(nlp), "bound": bound}), encoding="utf-8")
+    for bound, status in ((content["claims"][0]["bound"], 1), (0.99 * best, 1), (2 * best, 0)):
+        claim = {**content["claims"][0], "graph": fingerprint(nlp), "bound": bound}
+        proof.write_text(json.dumps({**content, "claims": [claim]}), encoding="utf-8")
         assert bound < best or status == 0
         assert cli("verify-proof", str(proof), str(folder / "other.toml"))[0] == status
 
@@ -426,9 +428,9 @@ EDITS = [
     ("bound", "NaN"),
     ("bound", '"1"'),
     ("bound", "true"),
-    ("statement", '{"kind": 3}'),
-    ("statement", '{"best": ["a", "b"]}'),
-    ("statement", "[]"),
+    ("premises", '{"kind": 3}'),
+    ("premises", '{"best": ["a", "b"]}'),
+    ("premises", "[]"),
     ("version", "2"),
     ("version", "1" * 5000),
     ("name", '"\\ud800"'),
@@ -443,8 +445,15 @@ def test_a_malformed_proof_is_refused_in_a_sentence(
 ) -> None:
     file = tmp_path / "proof.json"
     if isinstance(text, tuple):
-        content = {key: json.dumps(value) for key, value in written(cli, folder, "task").items()} | dict([text])
-        text = "{" + ", ".join(f'"{key}": {value}' for key, value in content.items()) + "}"
+        content = written(cli, folder, "task")
+        (claim,) = content["claims"]
+        content["claims"] = ["CLAIM"]
+        whole, one = (
+            {key: json.dumps(value) for key, value in table.items()} | {k: v for k, v in [text] if k in table}
+            for table in (content, claim)
+        )
+        words = ["{" + ", ".join(f'"{key}": {value}' for key, value in each.items()) + "}" for each in (whole, one)]
+        text = words[0].replace('"CLAIM"', words[1])
     file.write_text(text, encoding="utf-8")
     code, out, err = cli("verify-proof", str(file))
     assert (code, out, len(err.splitlines())) == (2, "", 1)
@@ -454,7 +463,7 @@ def test_a_malformed_proof_is_refused_in_a_sentence(
 def test_a_tree_that_unpacks_to_too_much_is_refused(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     content = written(cli, folder, "task")
     monkeypatch.setattr(proof_file, "_LARGEST_TREE", 1000)
-    content["tree"] = base64.b64encode(zlib.compress(bytes(10**6))).decode()
+    content["claims"][0]["tree"] = base64.b64encode(zlib.compress(bytes(10**6))).decode()
     code, out, err = checked(cli, folder, "task", content)
     assert (code, out) == (2, "")
     assert "incomplete, or larger" in err
@@ -506,8 +515,8 @@ def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_pa
 def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folder: Path, command: str) -> None:
     case, proof = folder / "legless.toml", folder / "legless.json"
     case.write_text(CRANKS, encoding="utf-8")
-    claim = PaperClaim("regular", "", "regular", tree=b"\x02")
-    proof.write_text(PaperProof("", "legless", (), (), (), 0.01, (claim,), ()).as_text(), encoding="utf-8")
+    claim = ProofClaim("regular", "", "regular", tree=b"\x02")
+    proof.write_text(WorkspaceProof("", "legless", (), (), (), 0.01, (claim,), ()).as_text(), encoding="utf-8")
     words = (str(proof), str(case)) if command == "verify-proof" else (str(case),)
     code, out, err = cli(command, *words, "--leg-error", "0.01")
     assert (code, out) == (2, "")

@@ -14,17 +14,18 @@ from hypothesis import strategies as st
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_tables, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.certificate.boxes import bounding, firstpass, tangents
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import engine_for, kernel
-from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
-from screwsynth.nlp.certificate.boxes.tapes import search_tape
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.enclosing import quadratic
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.proof.boxes import bounding, first_pass
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import engine_for
+from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
+from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.enclosure import quadratic_models, tangent_bounds
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.jsondata import json_data
 
@@ -356,17 +357,17 @@ def test_progress_and_history_shrink_to_the_gap() -> None:
 
 def test_rules_use_every_constant_of_the_kernel_alike() -> None:
     """The numbers that both engines must share are written in both."""
-    sources = sorted((find_case("paper-4.1-helical").parents[1] / "nlp" / "certificate" / "kernel").glob("*.h"))
+    sources = sorted((find_case("paper-4.1-helical").parents[1] / "nlp" / "proof" / "enclosure" / "kernel").glob("*.h"))
     if not sources:
         pytest.skip("an installed package has no source of the kernel")
     text = "".join(each.read_text(encoding="utf-8") for each in sources)
     numbers: dict[str, float] = {
         "WORTH": bounding._WORTH,
-        "LINEAR": firstpass.LINEAR,
-        "ROOT_SLACK": quadratic._ROOT_SLACK,
-        "MULTIPLIER_ROUNDS": quadratic._MULTIPLIER_ROUNDS,
-        "TANGENT_ROUNDS": quadratic._TANGENT_ROUNDS,
-        "SWEEPS": tangents._SWEEPS,
+        "LINEAR": first_pass.LINEAR,
+        "ROOT_SLACK": quadratic_models._ROOT_SLACK,
+        "MULTIPLIER_ROUNDS": quadratic_models._MULTIPLIER_ROUNDS,
+        "TANGENT_ROUNDS": quadratic_models._TANGENT_ROUNDS,
+        "SWEEPS": tangent_bounds._SWEEPS,
     }
     for name, value in numbers.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"#define {name} ")]
@@ -375,7 +376,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
 
 @pytest.mark.parametrize("engine", ["fortran", "c"])
 def test_an_engine_that_is_not_there_is_refused(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("screwsynth.nlp.certificate.boxes.engines.kernel", lambda: None)
+    monkeypatch.setattr("screwsynth.nlp.proof.boxes.engines.kernel", lambda: None)
     form = standard_form(formulate(load_case("paper-4.2-rotation")))
     with pytest.raises(ValueError, match="numpy"):
         engine_for(form, engine)
@@ -405,7 +406,7 @@ def test_the_kernel_is_built_without_what_would_break_it() -> None:
         assert not {"-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-ffinite-math-only"} & set(flags)
         assert extension["optional"] is True
     # A header that is not listed would be missing in a source distribution, and the kernel could not be built from it.
-    folder = path.parent / "nlp" / "certificate" / "kernel"
+    folder = path.parent / "nlp" / "proof" / "enclosure" / "kernel"
     (listed,) = [each["depends"] for each in extensions if each["name"].endswith("._bounds")]
     assert {path.parent / each for each in listed} == set(folder.glob("*.h"))
 

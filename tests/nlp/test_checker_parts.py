@@ -8,16 +8,17 @@ import pytest
 from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.paper.limbs.limbpart import LimbPartChecker
-from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
-from screwsynth.nlp.certificate.paper.proof import Node, ProofError
-from screwsynth.nlp.certificate.paper.prooftree import Claim
-from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
-from screwsynth.nlp.certificate.standardform import StandardForm
-from screwsynth.nlp.workspace.paper.anyrobot.assembly import Assembly
-from screwsynth.nlp.workspace.paper.anyrobot.motionclaim import MotionClaim
-from screwsynth.nlp.workspace.paper.anyrobot.motions import Motions
-from screwsynth.nlp.workspace.paper.anyrobot.posedrobot import PosedRobot
+from screwsynth.nlp.proof.checker.limbs.limbpart import LimbPartChecker
+from screwsynth.nlp.proof.checker.parts import Claim
+from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.proof.checker.proof_file import ProofError
+from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.checker.workspace.anyrobot.assembly import Assembly
+from screwsynth.nlp.proof.checker.workspace.anyrobot.motionclaim import MotionClaim
+from screwsynth.nlp.proof.checker.workspace.anyrobot.motions import Motions
+from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import PosedRobot
+from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 
 def test_small_coefficients_next_to_a_constant_are_not_lost() -> None:

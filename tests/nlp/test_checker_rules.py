@@ -8,14 +8,14 @@ from casadi import SX
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
-from screwsynth.nlp.certificate.paper.proof import Node
-from screwsynth.nlp.certificate.paper.showing import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
-from screwsynth.nlp.certificate.standardform import Condition, StandardForm
-from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
-from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
+from screwsynth.nlp.proof.checker.optimum import BoundClaim, InfeasibleClaim, MonotoneClaim, Shown
+from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.checker.workspace.ballrows import Joints, ball_rows
+from screwsynth.nlp.proof.checker.workspace.built.changes import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

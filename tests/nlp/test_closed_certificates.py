@@ -10,17 +10,17 @@ from screwsynth.models import Dimension, Model, hexapod, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
-from screwsynth.nlp.certificate import standardform
-from screwsynth.nlp.certificate.boxes.engines import engine_for
-from screwsynth.nlp.certificate.boxes.examination import Verdict
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.form import StandardForm
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.standardform import is_in_home_mode, standard_form
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.proof.boxes.engines import engine_for
+from screwsynth.nlp.proof.boxes.examination import Verdict
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.statement import standard_form as statement
+from screwsynth.nlp.proof.statement.form import StandardForm
+from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
 
 TWIST = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
@@ -73,7 +73,7 @@ def test_bounds_are_those_of_the_search_with_unknowns(monkeypatch: pytest.Monkey
     solution = solve(at_home(robot_function("6-rus")()), starts=2)
     nlp = replace(solution.nlp, in_home_mode=True)
     own = certify_program(nlp, solution.x, claimed=solution.F)
-    monkeypatch.setattr(standardform, "without_unknowns", with_unknowns)
+    monkeypatch.setattr(statement, "without_unknowns", with_unknowns)
     every = certify_program(nlp, solution.x, claimed=solution.F)
     assert own.status is every.status is CertificateStatus.PROVED
     assert solution.F <= own.bound <= 1.00011 * solution.F

@@ -8,15 +8,16 @@ from hypothesis import strategies as st
 from random_graphs import N, random_boxes, random_function
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.tapes import search_tape
-from screwsynth.nlp.certificate.enclosing import enclosure, intervals, univariate
-from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.tape import Op, Tape
-from screwsynth.nlp.certificate.kinks import without_ties
-from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.enclosure import first_order as enclosure
+from screwsynth.nlp.proof.enclosure import intervals, univariate
+from screwsynth.nlp.proof.enclosure.first_order import enclose, midpoints
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.tape import Op, Tape
+from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 
 balls = pytest.importorskip("balls")
 

@@ -16,10 +16,10 @@ from screwsynth.nlp.case.workspace import Workspace
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.summary import case_summary
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.verdict import Outcome
 
 Array = NDArray[np.float64]
 ALONG_X = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)

@@ -26,42 +26,43 @@ from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.boxsearch import BoxSearch
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.interruption import STOPPED, is_requested
 from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.proof.boxes.search import BoxSearch
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.workspace import scale
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.regular import search as regular
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family
+from screwsynth.nlp.proof.workspace.scale import largest_scale
+from screwsynth.nlp.proof.workspace.tolerance.machine_number import smallest_of_machines
+from screwsynth.nlp.proof.workspace.tolerance.machines import machines_of
+from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
 from screwsynth.nlp.solver.certified import certify
-from screwsynth.nlp.workspace import scale
-from screwsynth.nlp.workspace.anybuilt.machines import machines_of
-from screwsynth.nlp.workspace.general.family import Family
-from screwsynth.nlp.workspace.general.machinenumber import smallest_of_machines
-from screwsynth.nlp.workspace.general.problem import Problem, build_problem
-from screwsynth.nlp.workspace.general.search import prove_rank
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.looplimits import loop_extremes
-from screwsynth.nlp.workspace.machine import Legs, workspace_of_case
-from screwsynth.nlp.workspace.numbers.boundsearch import Bounds, prove_minimum
-from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
-from screwsynth.nlp.workspace.regular import search as regular
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.scale import largest_scale
-from screwsynth.nlp.workspace.verdict import Outcome, Regularity
 
 ROOT = Path(screwsynth.nlp.__file__).parent
 #: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
-WATCHED = tuple(str(ROOT / name) for name in ("workspace", "certificate", "interruption.py"))
+WATCHED = tuple(str(ROOT / name) for name in ("proof", "interruption.py"))
 LOOPS = (
     str(ROOT / "interruption.py"),
-    *(str(ROOT / "certificate" / name) for name in ("branchandbound.py", "incumbent.py")),
-    *(str(ROOT / "certificate" / "boxes" / name) for name in ("boxsearch.py", "openboxes.py")),
-    *(str(ROOT / "certificate" / "limbs" / name) for name in ("limbsearch.py", "sharedsearch.py")),
-    *(str(ROOT / "workspace" / name) for name in ("judge.py", "looplimits.py", "scale.py")),
-    *(str(ROOT / "workspace" / name / "search.py") for name in ("regular", "general")),
-    str(ROOT / "workspace" / "general" / "machinenumber.py"),
-    str(ROOT / "workspace" / "numbers" / "boundsearch.py"),
+    str(ROOT / "proof" / "certificate" / "branch_and_bound.py"),
+    *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "open_boxes.py")),
+    *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
+    *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
+    *(str(ROOT / "proof" / "workspace" / name / "search.py") for name in ("regular", "ranks")),
+    *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("loop_limits.py", "bound_search.py")),
+    str(ROOT / "proof" / "workspace" / "tolerance" / "machine_number.py"),
 )
+assert all(Path(each).exists() for each in (*WATCHED, *LOOPS))
 
 
 class Claim(NamedTuple):
@@ -242,7 +243,7 @@ def limbs() -> Claim:
 def shared() -> Claim:
     """The limbs of a program that is small enough for a search of the whole box."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(branchandbound, "_WHOLE_BOX", 0)
+        patch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
         return certified("poses")
 
 
@@ -418,9 +419,9 @@ SCRIPT = """
 import os, signal, sys, threading
 sys.path[:0] = {path!r}
 import test_interrupted_searches as own
-from screwsynth.nlp.workspace import scale
-from screwsynth.nlp.workspace.scale import largest_scale
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.workspace import scale
+from screwsynth.nlp.proof.workspace.scale import largest_scale
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 problem = own.any_robot()
 for k in range(12):
     timer = threading.Timer(0.004 * (k + 1), os.kill, (os.getpid(), signal.SIGINT))

@@ -9,21 +9,23 @@ import pytest
 from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import Case, formulate, load_case, solve
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.engines import kernel, limb_engine_for
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.incumbent import Incumbent
-from screwsynth.nlp.certificate.limbs import sharedsearch
-from screwsynth.nlp.certificate.limbs.limbmodels import LimbEngine, LimbModels
-from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb
-from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
-from screwsynth.nlp.certificate.limbs.sharedcuts import LeftOwn
-from screwsynth.nlp.certificate.paper.proof import Proof, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+from screwsynth.nlp.proof.boxes.engines import limb_engine_for
+from screwsynth.nlp.proof.boxes.incumbent import Incumbent
+from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
+from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
+from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
+from screwsynth.nlp.proof.boxes.limbs.models import LimbEngine, LimbModels
+from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.statement.limb_separation import separate
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
@@ -186,7 +188,7 @@ def both_searches(seed: int) -> tuple[float, float]:
 
 
 def test_no_start_beats_a_bound_by_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     for seed in range(6):
         bound, best = both_searches(seed)
         assert bound >= best - 1e-9 * abs(best)
@@ -208,7 +210,7 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
         del sums
         return whole(engine, good, found, part, own, part.best, threshold)
 
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     monkeypatch.setattr(sharedsearch, "cut_own", careless)
     # No better incumbent is found, so a bound that is too low cannot hide behind it.
     monkeypatch.setattr(sharedsearch.SharedSearch, "_improve", lambda *_: None)

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.nlp import Case, Solution, Status, case_from_tables, certify, formulate, json_data, result_of, solve
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.evidence.kkt import linearise
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.program import limits as program_limits
 from screwsynth.nlp.program.pairs import with_all_pairs, with_pairs_at
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.phase import Phase
 
 Array = NDArray[np.float64]

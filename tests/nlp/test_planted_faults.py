@@ -21,19 +21,19 @@ import pytest
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Free
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.machine import Legs
-from screwsynth.nlp.workspace.paper.ballrows import Joints
-from screwsynth.nlp.workspace.paper.exactly import exact_rows
-from screwsynth.nlp.workspace.paper.pieces import show
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
-from screwsynth.nlp.workspace.paper.tree import Leaves
-from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
-from screwsynth.nlp.workspace.regular.engines import KernelRankEngine
-from screwsynth.nlp.workspace.regular.regularity import Rank
+from screwsynth.nlp.proof.checker.fractions import exact_rows
+from screwsynth.nlp.proof.checker.proof_file import ProofError
+from screwsynth.nlp.proof.checker.workspace.ballrows import Joints
+from screwsynth.nlp.proof.checker.workspace.pieces import show
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
+from screwsynth.nlp.proof.checker.workspace.tree import Leaves
+from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.workspace.regular.engines import KernelRankEngine
+from screwsynth.nlp.proof.workspace.regular.regularity import Rank
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 
-SOURCE = Path(__file__).parents[2] / "nlp" / "workspace" / "_workspace.c"
+SOURCE = Path(__file__).parents[2] / "nlp" / "proof" / "workspace" / "_workspace.c"
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 #: Compiling a copy takes a second.
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler")]

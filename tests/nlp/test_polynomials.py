@@ -10,15 +10,15 @@ from random_graphs import N, random_function
 
 from screwsynth.models import robot_function
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate, load_case
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.paper.polymodels import forms_of, polynomial_sum, reaching_part
-from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
-from screwsynth.nlp.certificate.paper.polynomials import Polynomial, middles, places
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.paper.statement import program_of
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.proof.checker.polymodels import forms_of, polynomial_sum, reaching_part
+from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.proof.checker.polynomials import Polynomial, middles, places
+from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.proof_file import ProofError
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
 
 flint = pytest.importorskip("flint")

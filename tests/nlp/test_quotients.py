@@ -8,15 +8,16 @@ import pytest
 from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import kernel, limb_engine_for
-from screwsynth.nlp.certificate.boxes.tapes import search_tape
-from screwsynth.nlp.certificate.enclosing import quotients
-from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
-from screwsynth.nlp.certificate.enclosing.quadratic import GradientModel
-from screwsynth.nlp.certificate.enclosing.quotients import search_rows
-from screwsynth.nlp.certificate.separation import terms_of
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import limb_engine_for
+from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.enclosure import squared_quotients as quotients
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.first_order import midpoints
+from screwsynth.nlp.proof.enclosure.quadratic_models import GradientModel
+from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows
+from screwsynth.nlp.proof.statement.limb_separation import terms_of
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")

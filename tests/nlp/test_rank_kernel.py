@@ -23,18 +23,18 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.boxes.engines import kernel
-from screwsynth.nlp.workspace.general.cells import Cells, Examiner
-from screwsynth.nlp.workspace.general.matrices import RankMatrix
-from screwsynth.nlp.workspace.general.problem import Problem, build_problem
-from screwsynth.nlp.workspace.general.rank import RankTest
-from screwsynth.nlp.workspace.general.search import prove_rank
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.robot.motion_matrix import RankMatrix
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 pytestmark = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
 
-FOLDER = Path(__file__).parents[2] / "nlp" / "certificate"
+FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 ALL_AXES, TURNS = TurnKind.ANY_AXIS, TurnKind.ROLL_PITCH_YAW
 

@@ -16,20 +16,20 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.boxes.engines import kernel
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.workspace.general import rank
-from screwsynth.nlp.workspace.general.cells import Cells, Examiner
-from screwsynth.nlp.workspace.general.enclosing import Encloser, Forms
-from screwsynth.nlp.workspace.general.matrices import RankMatrix
-from screwsynth.nlp.workspace.general.problem import Problem, build_problem
-from screwsynth.nlp.workspace.general.search import BY_NEWTON, prove_rank
-from screwsynth.nlp.workspace.general.spectrum import Spectrum
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.machine import legs_of
-from screwsynth.nlp.workspace.numbers.boundsearch import prove_minimum
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms
+from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.spectrum import Spectrum
+from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.workspace.ranks.search import BY_NEWTON, prove_rank
+from screwsynth.nlp.proof.workspace.robot.motion_matrix import RankMatrix
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 balls = pytest.importorskip("balls")
 

@@ -9,20 +9,21 @@ import pytest
 from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import Engine, KernelEngine, kernel, limb_engine_for
-from screwsynth.nlp.certificate.boxes.examination import Verdict
-from screwsynth.nlp.certificate.enclosing.enclosure import enclose, midpoints
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.secondorder import enclose_second, monomials
-from screwsynth.nlp.certificate.enclosing.tape import Tape
-from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
-from screwsynth.nlp.certificate.paper.limbs.tilts import tilts_over
-from screwsynth.nlp.certificate.paper.polynomialrules import PolynomialArithmetic
-from screwsynth.nlp.certificate.paper.polynomials import middles, places
-from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
-from screwsynth.nlp.certificate.standardform import StandardForm
-from screwsynth.nlp.workspace.general.enclosing import Encloser
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import Engine, KernelEngine, limb_engine_for
+from screwsynth.nlp.proof.boxes.examination import Verdict
+from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
+from screwsynth.nlp.proof.checker.limbs.tilts import tilts_over
+from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.proof.checker.polynomials import middles, places
+from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.first_order import enclose, midpoints
+from screwsynth.nlp.proof.enclosure.forms import Encloser
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.second_order import enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.tape import Tape
+from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")

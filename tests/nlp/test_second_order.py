@@ -6,17 +6,18 @@ import pytest
 import random_graphs
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
-from screwsynth.nlp.certificate.boxes.examination import Examination, Verdict
-from screwsynth.nlp.certificate.boxes.firstpass import value_tape
-from screwsynth.nlp.certificate.enclosing import secondorder
-from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
-from screwsynth.nlp.certificate.enclosing.tape import Tape
-from screwsynth.nlp.certificate.standardform import Condition, StandardForm, standard_form
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import KernelEngine
+from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
+from screwsynth.nlp.proof.boxes.first_pass import value_tape
+from screwsynth.nlp.proof.enclosure import second_order
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.first_order import midpoints
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.second_order import Forms, enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.tape import Tape
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
 
@@ -94,16 +95,16 @@ def test_models_stay_inside_their_forms_of_second_order(name: str) -> None:
 @pytest.mark.parametrize("fault", ["rounding", "cubic"])
 def test_a_form_without_its_rounding_or_its_third_order_is_caught(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if fault == "rounding":
-        settled = secondorder._Interpreter._settled
+        settled = second_order._Interpreter._settled
 
-        def without(self: secondorder._Interpreter, v: Forms) -> secondorder._Register:
+        def without(self: second_order._Interpreter, v: Forms) -> second_order._Register:
             self.slack = 0.0
             return settled(self, Forms(**{**vars(v), "s": 0 * v.s}))
 
-        monkeypatch.setattr(secondorder._Interpreter, "_settled", without)
+        monkeypatch.setattr(second_order._Interpreter, "_settled", without)
     else:
         monkeypatch.setattr(
-            secondorder._Interpreter, "_cubic_sizes", lambda self, a, *_: np.zeros(self.boxes) + 0 * a[0]
+            second_order._Interpreter, "_cubic_sizes", lambda self, a, *_: np.zeros(self.boxes) + 0 * a[0]
         )
     found = 0
     for seed in range(12):

@@ -10,21 +10,23 @@ from limb_cases import machine, poses, separated
 
 from screwsynth.nlp import Case, Free, Rotation
 from screwsynth.nlp.case.settings import Search
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.limbs import sharedsearch
-from screwsynth.nlp.certificate.limbs.limbsums import LimbBound, bound_limb, first_largest_of_lists
-from screwsynth.nlp.certificate.limbs.ownboxes import OwnBoxes
-from screwsynth.nlp.certificate.paper.limbs.sharedtree import Leaf, leaf_bytes, read_shared
-from screwsynth.nlp.certificate.paper.limbs.tilted import TiltedForm
-from screwsynth.nlp.certificate.paper.limbs.tilts import sum_of_tilts, tilts_over
-from screwsynth.nlp.certificate.paper.proof import Node, Proof, ProofError, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.standardform import standard_form
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
+from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
+from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest_of_lists
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.limbs.sharedtree import Leaf, leaf_bytes, read_shared
+from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
+from screwsynth.nlp.proof.checker.limbs.tilts import sum_of_tilts, tilts_over
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
 GAP = 1e-2
@@ -136,7 +138,7 @@ def test_what_was_tampered_with_is_rejected(proof: Proof, nlp: Nlp) -> None:
 
 def test_proofs_of_several_poses_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     """Limbs with conditions of their own, maximum and minimum, with limits and without."""
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     for seed in (0, 7):
         nlp = formulate(poses(seed))
         proof = proof_of(nlp, 1e-2)
@@ -145,7 +147,7 @@ def test_proofs_of_several_poses_hold(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_limb_without_a_feasible_point_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", 0)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     nlp = formulate(poses(2))
     places = [i for i, name in enumerate(standard_form(nlp).names) if i in separated(nlp.case)[1].limbs[0].own]
     # Legs of at most 34 mm do not reach so far.

@@ -12,21 +12,23 @@ from screwsynth.models import Dimension, hexapod
 from screwsynth.nlp import Case, Free, Nlp, Sense, load_case
 from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.boxes.proofwriter import ProofWriter
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.kinks import without_ties
-from screwsynth.nlp.certificate.paper.proof import Node, Proof, Statement, fingerprint
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.program.assembly import assemble
 from screwsynth.nlp.program.layout import lay_out
-from screwsynth.nlp.workspace.machine import Legs
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.regular import search
-from screwsynth.nlp.workspace.regular.regularity import NumpyRankEngine
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
+from screwsynth.nlp.proof.workspace.regular import search
+from screwsynth.nlp.proof.workspace.regular.regularity import NumpyRankEngine
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 NUMBER = Reading(Dimension.NUMBER)
 

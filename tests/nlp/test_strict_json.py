@@ -11,12 +11,11 @@ from typing import Any, Literal
 import pytest
 
 from screwsynth.nlp import InputError, case_from_tables, certify, load_result
-from screwsynth.nlp.certificate.paper.proof import read_proof
 from screwsynth.nlp.embedding.folder import read_manifest
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
 
 Run = Callable[..., tuple[int, str, str]]
 #: What is put into files byte by byte.
@@ -168,10 +167,10 @@ def readers(folder: Path, cli: Run) -> dict[str, tuple[bytes, Callable[[bytes], 
         (folder / "n.c").write_text("int x;", encoding="utf-8")
     case = case_from_tables(copy.deepcopy(PLATFORM), name="case", source="case")
     proof = proof_of(certify(case, gap=1e-2, with_proof=True), "text").as_text().encode()
-    claim = PaperClaim("F", "max", "program", 2.5, "graph", b"\x06", ((0.0, 1.0),))
+    claim = ProofClaim("F", "max", "program", 2.5, "graph", b"\x06", ((0.0, 1.0),))
     poses = (((0.0, 1.0),) * 3, "axis", ((0.0, 1.0),), (0.0, 0.0, 1.0))
     unproved = (Unproved("G", "min", "open"),)
-    paper = PaperProof("text", "name", poses, ((0.0,) * 3,), ("q",), 0.1, (claim,), unproved, 0.2, (claim,))
+    paper = WorkspaceProof("text", "name", poses, ((0.0,) * 3,), ("q",), 0.1, (claim,), unproved, 0.2, (claim,))
 
     def read_file(content: bytes) -> object:
         file.write_bytes(content)
@@ -183,7 +182,7 @@ def readers(folder: Path, cli: Run) -> dict[str, tuple[bytes, Callable[[bytes], 
 
     return {
         "proof": (proof, lambda content: read_proof(content.decode(), "file")),
-        "workspace": (paper.as_text().encode(), lambda content: read_paper(content.decode(), "file")),
+        "workspace": (paper.as_text().encode(), lambda content: read_proof(content.decode(), "file")),
         "result": (result.read_bytes(), read_file),
         "row": (line_of(Row(0, "optimal", 1.5, (1.0,), ("p_z max",), (0.1,), "strict", 1e-9)).encode(), row_of),
         "manifest": (json.dumps(MANIFEST).encode(), read_folder),

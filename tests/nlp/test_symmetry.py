@@ -11,12 +11,12 @@ from casadi import SX
 from limb_cases import machine
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.separation import separate
-from screwsynth.nlp.certificate.standardform import Condition, StandardForm, standard_form
-from screwsynth.nlp.certificate.symmetry import grouped, halved, mirrors
+from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.statement.limb_separation import separate
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 
 @cache
@@ -130,7 +130,7 @@ def test_symmetries_leave_the_bound_of_the_paper(monkeypatch: pytest.MonkeyPatch
     assert form.value_at(flipped) == pytest.approx(form.value_at(found.x), abs=1e-12)
     again = certify_program(nlp, flipped, gap=1e-4)
     assert again.status is CertificateStatus.PROVED
-    monkeypatch.setattr(branchandbound, "halved", lambda form: form)
+    monkeypatch.setattr(branch_and_bound, "halved", lambda form: form)
     whole = certify_program(nlp, gap=1e-2)
     assert abs(whole.bound - found.bound) < 1e-6
     assert whole.boxes > 3 * found.boxes

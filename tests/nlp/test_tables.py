@@ -21,8 +21,6 @@ from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.case.starter import starter_case
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.report import report_of
@@ -30,6 +28,8 @@ from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.output.terminal import show
 from screwsynth.nlp.program.epigraph import with_exact_level
 from screwsynth.nlp.program.formulation import formulate, formulate_each
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.results.data import SolveResult
 from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
 from screwsynth.nlp.results.evidence import certificate_data

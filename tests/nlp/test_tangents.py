@@ -8,18 +8,19 @@ import pytest
 from limb_cases import poses
 
 from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
-from screwsynth.nlp.certificate.boxes import tangents
-from screwsynth.nlp.certificate.boxes.bounding import NumpyEngine
-from screwsynth.nlp.certificate.boxes.engines import KernelEngine, kernel
-from screwsynth.nlp.certificate.boxes.examination import Verdict
-from screwsynth.nlp.certificate.boxes.firstpass import value_tape
-from screwsynth.nlp.certificate.boxes.tangents import tangent_forms, tangent_rows
-from screwsynth.nlp.certificate.branchandbound import certify_program
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.enclosing.enclosure import midpoints
-from screwsynth.nlp.certificate.enclosing.instructions import compile_tape
-from screwsynth.nlp.certificate.enclosing.secondorder import Forms, enclose_second, monomials
-from screwsynth.nlp.certificate.standardform import StandardForm, standard_form
+from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
+from screwsynth.nlp.proof.boxes.engines import KernelEngine
+from screwsynth.nlp.proof.boxes.examination import Verdict
+from screwsynth.nlp.proof.boxes.first_pass import value_tape
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.enclosure import tangent_bounds
+from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.first_order import midpoints
+from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.second_order import Forms, enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.tangent_bounds import tangent_forms, tangent_rows
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
 
@@ -89,12 +90,12 @@ def test_no_function_is_above_its_form_with_tangents(name: str) -> None:
 
 def test_a_tangent_that_is_a_secant_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the test above: ``rho^2 D`` a hundredth too small."""
-    whole = tangents._sum
+    whole = tangent_bounds._sum
 
     def careless(rows: Forms, weights: np.ndarray) -> Forms:
         return whole(rows, np.where(weights > 0, weights * 0.99, weights))
 
-    monkeypatch.setattr(tangents, "_sum", careless)
+    monkeypatch.setattr(tangent_bounds, "_sum", careless)
     assert violations(minimum("paper-4.3"), 60)[0] > 0
 
 

@@ -5,10 +5,10 @@ import pytest
 from limb_cases import poses
 
 from screwsynth.nlp import Case, formulate, load_case
-from screwsynth.nlp.certificate import branchandbound
-from screwsynth.nlp.certificate.boxes.engines import kernel
-from screwsynth.nlp.certificate.boxes.threads import Threads, pieces
-from screwsynth.nlp.certificate.branchandbound import certify_program
+from screwsynth.nlp.proof.boxes.threads import Threads, pieces
+from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.enclosure.engine import kernel
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
@@ -49,7 +49,7 @@ def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
 def test_boxes_and_bounds_do_not_depend_on_the_number_of_threads(
     case: Case, gap: float, whole: int, least: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(branchandbound, "_WHOLE_BOX", whole)
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", whole)
     nlp = formulate(case)
     found = [certify_program(nlp, gap=gap, jobs=jobs) for jobs in (1, 2, 3)]
     for each in found[1:]:

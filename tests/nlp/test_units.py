@@ -18,12 +18,12 @@ from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.results.evaluation import evaluation_of
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
-from screwsynth.nlp.workspace.judge import judge_workspace
 
 Tables = dict[str, Any]
 Make = Callable[[Case], tuple[object, Iterable[Line | TextTable]]]

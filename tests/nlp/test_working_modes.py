@@ -13,13 +13,13 @@ import pytest
 from screwsynth.models import robot, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, case_from_tables, certify, formulate, solve
-from screwsynth.nlp.certificate.certificate import CertificateStatus
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.certificate.paper.proofcheck import check_proof
-from screwsynth.nlp.certificate.standardform import is_in_home_mode, standard_form
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.proof_file import ProofError
+from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
 
 Run = Callable[..., tuple[int, str, str]]

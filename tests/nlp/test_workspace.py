@@ -18,24 +18,24 @@ from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data,
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle, prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
+from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.regular import rows
+from screwsynth.nlp.proof.workspace.regular.engines import kernel, rank_engine
+from screwsynth.nlp.proof.workspace.regular.regularity import Rank
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
+from screwsynth.nlp.proof.workspace.scale import largest_scale
+from screwsynth.nlp.proof.workspace.slices.regions import Region
+from screwsynth.nlp.proof.workspace.slices.slices import slices_of
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of
-from screwsynth.nlp.workspace.numbers.boundsearch import Oracle, prove_minimum
-from screwsynth.nlp.workspace.numbers.clearance import Clearance
-from screwsynth.nlp.workspace.numbers.poseerror import WorstError
-from screwsynth.nlp.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.workspace.posebox import PoseBox, pose_box, scaled
-from screwsynth.nlp.workspace.regular import rows
-from screwsynth.nlp.workspace.regular.engines import kernel, rank_engine
-from screwsynth.nlp.workspace.regular.regularity import Rank
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.scale import largest_scale
-from screwsynth.nlp.workspace.slices.regions import Region
-from screwsynth.nlp.workspace.slices.slices import slices_of
-from screwsynth.nlp.workspace.verdict import Outcome
 
 needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
 
@@ -638,7 +638,7 @@ def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str
 
 def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = iter([False] * 6)
-    monkeypatch.setattr("screwsynth.nlp.workspace.judge.is_requested", lambda: next(calls, True))
+    monkeypatch.setattr("screwsynth.nlp.proof.workspace.judge.is_requested", lambda: next(calls, True))
     judged = judge_workspace(case, gap=0.05)
     assert judged.regularity is not None
     assert judged.regularity.outcome is Outcome.PROVED

@@ -23,19 +23,20 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
+from screwsynth.nlp.proof.workspace.tolerance import machine_number
+from screwsynth.nlp.proof.workspace.tolerance.machines import Effort, Machines, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import workspace_of
-from screwsynth.nlp.workspace.anybuilt import firstorder
-from screwsynth.nlp.workspace.anybuilt.machines import Effort, Machines, machine_extremes, machines_of
-from screwsynth.nlp.workspace.general import machinenumber, rank
-from screwsynth.nlp.workspace.general.cells import Cells, Examiner
-from screwsynth.nlp.workspace.general.singularpose import SingularPose
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.machine import workspace_of_case
-from screwsynth.nlp.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
-from screwsynth.nlp.workspace.verdict import Outcome
 
 TWIST_AXIS, TWIST_POINT, PITCH = np.array([1.0, 2.0, 6.0]), np.array([0.3, 0.1, 1.2]), 0.1
 HEAD = """
@@ -294,9 +295,9 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    spread = machinenumber.by_centres
+    spread = machine_number.by_centres
     monkeypatch.setattr(firstorder, "_OUTWARDS", 0.8)
-    monkeypatch.setattr(machinenumber, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
 

@@ -21,23 +21,23 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.proof.statement.claims import claims_of
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.proof.statement.posed_layout import posed_layout
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.regular import rows
+from screwsynth.nlp.proof.workspace.regular.engines import kernel, rank_engine
+from screwsynth.nlp.proof.workspace.regular.regularity import Rank
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.tolerance.legs.claims import built_claims
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
-from screwsynth.nlp.workspace.built.builtclaims import built_claims
-from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
-from screwsynth.nlp.workspace.numbers.boundsearch import prove_minimum
-from screwsynth.nlp.workspace.numbers.clearance import Clearance
-from screwsynth.nlp.workspace.numbers.extremes import Extreme, prove_extreme
-from screwsynth.nlp.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.workspace.posebox import PoseBox, pose_box
-from screwsynth.nlp.workspace.posed import posed_layout
-from screwsynth.nlp.workspace.regular import rows
-from screwsynth.nlp.workspace.regular.engines import kernel, rank_engine
-from screwsynth.nlp.workspace.regular.regularity import Rank
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.verdict import Outcome
 
 #: The machine of LinuxCNC's hexapod kinematics, joints apart, with every limit that errors of joint centres change. The
 #: limits are wide: the numbers that are proved are compared.

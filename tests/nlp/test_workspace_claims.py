@@ -17,13 +17,13 @@ from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.proof.workspace import judge
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
 from screwsynth.nlp.results.workspacedigest import verdict_words
 from screwsynth.nlp.results.workspaceposes import refuted_claims, seeing_lines
-from screwsynth.nlp.workspace import judge
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.numbers.extremes import Extreme, prove_extreme
-from screwsynth.nlp.workspace.verdict import Outcome
 
 Value = TypeVar("Value")
 Run = Callable[..., tuple[int, str, str]]

@@ -13,27 +13,26 @@ from screwsynth.nlp import Case
 from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.certificate.paper.proof import ProofError
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.workspace.anyrobot import prove_ranks
-from screwsynth.nlp.workspace.general.problem import NotJudgedError, build_problem
-from screwsynth.nlp.workspace.general.search import prove_rank
-from screwsynth.nlp.workspace.homeposes import Homes
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.paper.anyrobot.looppoints import start_of
-from screwsynth.nlp.workspace.paper.anyrobot.posedrobot import posed_robot
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import PaperProof, read_paper
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import PoseNumbers, pose_box
-from screwsynth.nlp.workspace.posed import at_one_pose
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.workspace.anyrobot.looppoints import start_of
+from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import posed_robot
+from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
+from screwsynth.nlp.proof.workspace.home_poses import Homes
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_ranks
+from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 #: Robots whose platform does not turn.
 TRANSLATIONS = ("3-puu", "3-upu", "delta", "delta-parallelogram", "orthoglide", "tripteron")
@@ -127,10 +126,10 @@ def verdicts(judged: Judgement) -> list[tuple[str, str, Outcome]]:
     return [*ranks, *((each.name, each.sense.value, each.outcome) for each in judged.extremes)]
 
 
-def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, PaperProof]:
+def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, WorkspaceProof]:
     record = PaperRecord()
     judged = judge_workspace(case, with_limits=with_limits, with_objective=False, jobs=1, paper=record)
-    return judged, read_paper(paper_of(judged, record, "").as_text(), "again")
+    return judged, read_proof(paper_of(judged, record, "").as_text(), "again")
 
 
 def check_agreement(name: str, part: float, degrees: float, limit: float) -> int:
@@ -177,7 +176,7 @@ def test_limits_that_only_another_assembly_passes_are_proved_and_not_refuted() -
     # A bound over all assemblies is not within the limit, and so no proof claims it.
     reasons = {each.reason for each in proof.unproved if each.name.startswith("actuator_angle")}
     assert reasons == {"it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"}
-    assert len(check_paper(proof, case).claims) == 5
+    assert len(check_workspace_proof(proof, case).claims) == 5
 
 
 def planar(part: float, degrees: float, seed: int) -> Case:
@@ -233,7 +232,7 @@ def test_proofs_about_robots_that_do_not_turn_are_accepted(name: str, away: tupl
     case = case_over(name, position, spread=0.03, seed=seed)
     judged, proof = judged_on_paper(case, with_limits=False)
     assert judged.is_regular
-    assert [each.name for each in check_paper(proof, case).claims] == ["regular", "constraints regular"]
+    assert [each.name for each in check_workspace_proof(proof, case).claims] == ["regular", "constraints regular"]
 
 
 def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
@@ -243,7 +242,7 @@ def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
     case = case_over("3-rps", position, turns((0.05, 0.0502), (-1.15, -1.1498), (0.3, 0.3002)), spread=0.03)
     judged, proof = judged_on_paper(case, with_limits=False)
     assert judged.is_regular
-    assert len(check_paper(proof, case).claims) == 2
+    assert len(check_workspace_proof(proof, case).claims) == 2
 
 
 def test_the_check_begins_in_the_working_mode_of_home() -> None:

@@ -21,13 +21,13 @@ from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.output.pictures.workspaceslices import slices_legend
+from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.slices.limitcells import LimitCells, LimitState
+from screwsynth.nlp.proof.workspace.slices.regions import UNDECIDED
+from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.results.workspace import WorkspaceResult
 from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
-from screwsynth.nlp.workspace.machine import legs_of
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.slices.limitcells import LimitCells, LimitState
-from screwsynth.nlp.workspace.slices.regions import UNDECIDED
-from screwsynth.nlp.workspace.slices.slices import slices_of
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -21,31 +21,31 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of
-from screwsynth.nlp.workspace.numbers.boundsearch import Oracle
-from screwsynth.nlp.workspace.numbers.clearance import Clearance
-from screwsynth.nlp.workspace.numbers.poseerror import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.workspace.paper import ballrows, check
-from screwsynth.nlp.workspace.paper.ballslopes import BallSlopes, coordinates
-from screwsynth.nlp.workspace.paper.clearanceclaim import ClearanceClaim
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
-from screwsynth.nlp.workspace.paper.errorclaim import ErrorClaim, whole_errors
-from screwsynth.nlp.workspace.paper.exactly import determinant_sign, tangent_ends
-from screwsynth.nlp.workspace.paper.inverserows import inverse_rows
-from screwsynth.nlp.workspace.paper.pieces import BoxClaim, show
-from screwsynth.nlp.workspace.paper.poseroot import PoseRoot, pose_root
-from screwsynth.nlp.workspace.paper.positive import are_positive, contraction
-from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
-from screwsynth.nlp.workspace.paper.record import PaperRecord, TreeRecord
-from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
-from screwsynth.nlp.workspace.paper.tree import Leaves, PoseNode, read_leaves, split_bytes
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.regular.search import prove_regular
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.fractions import determinant_sign, tangent_ends
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.tree import Node, node_bytes
+from screwsynth.nlp.proof.checker.workspace import ballrows, check
+from screwsynth.nlp.proof.checker.workspace.ballslopes import BallSlopes, coordinates
+from screwsynth.nlp.proof.checker.workspace.clearanceclaim import ClearanceClaim
+from screwsynth.nlp.proof.checker.workspace.errorclaim import ErrorClaim, whole_errors
+from screwsynth.nlp.proof.checker.workspace.inverserows import inverse_rows
+from screwsynth.nlp.proof.checker.workspace.pieces import BoxClaim, show
+from screwsynth.nlp.proof.checker.workspace.poseroot import PoseRoot, pose_root
+from screwsynth.nlp.proof.checker.workspace.positive import are_positive, contraction
+from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
+from screwsynth.nlp.proof.checker.workspace.singularclaim import SingularClaim
+from screwsynth.nlp.proof.checker.workspace.tree import Leaves, read_leaves
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
+from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
+from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord, TreeRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.regular.search import prove_regular
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 #: The machine of LinuxCNC's hexapod kinematics, with a limit of every kind.
@@ -91,7 +91,7 @@ def judged() -> tuple[Judgement, PaperRecord]:
 
 
 @pytest.fixture(scope="module")
-def proof(judged: tuple[Judgement, PaperRecord]) -> PaperProof:
+def proof(judged: tuple[Judgement, PaperRecord]) -> WorkspaceProof:
     return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
 
 
@@ -113,13 +113,13 @@ def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Genera
     return lower, upper
 
 
-def rejected(proof: PaperProof, case: Case | None = None) -> str:
+def rejected(proof: WorkspaceProof, case: Case | None = None) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_paper(proof, case_of() if case is None else case, leg_error=proof.leg_error)
+        check.check_workspace_proof(proof, case_of() if case is None else case, leg_error=proof.leg_error)
     return str(caught.value)
 
 
-def changed(proof: PaperProof, name: str, sense: str = "", **values: object) -> PaperProof:
+def changed(proof: WorkspaceProof, name: str, sense: str = "", **values: object) -> WorkspaceProof:
     """The proof with other values in one of its claims."""
     assert any((each.name, each.sense) == (name, sense) for each in proof.claims)
     claims = [
@@ -129,22 +129,22 @@ def changed(proof: PaperProof, name: str, sense: str = "", **values: object) -> 
     return replace(proof, claims=tuple(claims))
 
 
-def alone(proof: PaperProof, *names: str) -> PaperProof:
+def alone(proof: WorkspaceProof, *names: str) -> WorkspaceProof:
     """The proof with these claims alone; it says of the others that they have none."""
     kept = tuple(each for each in proof.claims if each.name in names)
     others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
     return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
 
 
-def claim(proof: PaperProof, name: str, sense: str = "") -> PaperClaim:
+def claim(proof: WorkspaceProof, name: str, sense: str = "") -> ProofClaim:
     return next(each for each in proof.claims if (each.name, each.sense) == (name, sense))
 
 
-def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple[Judgement, PaperRecord]) -> None:
+def test_a_proof_with_every_kind_of_claim_holds(proof: WorkspaceProof, judged: tuple[Judgement, PaperRecord]) -> None:
     assert not proof.unproved
-    again = read_paper(proof.as_text(), "again")
+    again = read_proof(proof.as_text(), "again")
     assert again == proof
-    checked = check.check_paper(again, case_of(), leg_error=LEG_ERROR)
+    checked = check.check_workspace_proof(again, case_of(), leg_error=LEG_ERROR)
     assert len(checked.claims) == len(proof.claims)
     assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}
     bounds = {(each.name, each.sense): each.bound for each in checked.claims}
@@ -171,14 +171,14 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: PaperProof, judged: tuple
         ("leg_clearance limbs 1- and 1+", "min", 9.0),
     ],
 )
-def test_another_bound_is_rejected(proof: PaperProof, name: str, sense: str, factor: float) -> None:
+def test_another_bound_is_rejected(proof: WorkspaceProof, name: str, sense: str, factor: float) -> None:
     bound = claim(proof, name, sense).bound
     assert bound is not None
     needed = (name, "rotation error") if name == "position error" else (name,)
     assert name in rejected(alone(changed(proof, name, sense, bound=bound * factor), *needed))
 
 
-def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: PaperProof) -> None:
+def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: WorkspaceProof) -> None:
     assert "does not keep" in rejected(changed(alone(proof, "condition_number"), "condition_number", "max", bound=9.0))
     tighter = case_of(TEXT.replace("max = 44", "max = 30"))
     proof = alone(proof, "leg_length limb 1-", "actuator.stroke_max limb 1-")
@@ -186,22 +186,22 @@ def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: PaperProof) -> 
     assert "does not keep" in rejected(proof, case_of(TEXT.replace("stroke_max = 30", "stroke_max = 2")))
 
 
-def test_other_trees_are_rejected(proof: PaperProof) -> None:
+def test_other_trees_are_rejected(proof: WorkspaceProof) -> None:
     proof = alone(proof, "regular", "position error", "rotation error")
     tree = claim(proof, "position error", "max").tree
-    assert tree[0] == PoseNode.SPLIT
+    assert tree[0] == Node.CUT
     assert "ends" in rejected(changed(proof, "position error", "max", tree=tree[:-1]))
     assert "goes on" in rejected(changed(proof, "position error", "max", tree=tree + tree[-1:]))
     assert "where a box must be" in rejected(changed(proof, "regular", tree=b"\x07"))
-    assert "cuts no coordinate" in rejected(changed(proof, "regular", tree=b"\x01\x06" + bytes(8)))
-    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([PoseNode.OUTSIDE])))
+    assert "names variable 6" in rejected(changed(proof, "regular", tree=bytes([Node.CUT, 6]) + bytes(8)))
+    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([Node.OUTSIDE])))
     (at,) = struct.unpack("<d", tree[2:10])
     width = float(np.ptp(proof.workspace[0][0])) if tree[1] == 0 else 9.0  # type: ignore[index]
-    shifted = split_bytes(tree[1], at + width) + tree[10:]
+    shifted = node_bytes(Node.CUT, tree[1], value=at + width) + tree[10:]
     assert "outside of it" in rejected(changed(proof, "position error", "max", tree=shifted))
 
 
-def test_a_proof_is_for_its_case_only(proof: PaperProof) -> None:
+def test_a_proof_is_for_its_case_only(proof: WorkspaceProof) -> None:
     assert "another workspace" in rejected(proof, case_of(TEXT.replace("max = 9 }", "max = 9.5 }")))
     assert "other joint centres" in rejected(proof, case_of(TEXT.replace("11.543", "11.544")))
     assert "other expressions" in rejected(
@@ -221,7 +221,7 @@ def test_a_proof_is_for_its_case_only(proof: PaperProof) -> None:
 def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
     """40 degrees about any axis: singular. So is every tree that claims otherwise."""
     root = pose_root(turned(TurnKind.ANY_AXIS, 40))
-    for tree in (bytes([PoseNode.CLOSED]), split_bytes(0, 0.5) + bytes([PoseNode.CLOSED] * 2)):
+    for tree in (bytes([Node.BOUNDED]), node_bytes(Node.CUT, 0, value=0.5) + bytes([Node.BOUNDED] * 2)):
         with pytest.raises(ProofError, match="opposite signs"):
             show(rank(root, robot), root, read_leaves(tree, root.lower, root.upper))
 
@@ -238,7 +238,7 @@ def test_a_refuted_workspace_carries_two_poses() -> None:
     text += "\nrotation = {angle={min=-40,max=40}}\n"
     record, case = PaperRecord(), case_of(text)
     given = paper_of(judge_workspace(case, with_limits=False, paper=record), record, text)
-    (found,) = check.check_paper(read_paper(given.as_text(), "again"), case).claims
+    (found,) = check.check_workspace_proof(read_proof(given.as_text(), "again"), case).claims
     assert found.is_refuted
     assert {each.reason for each in given.unproved} == {"it was not judged"}
     first, second = claim(given, "regular").sides
@@ -268,12 +268,12 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
     code, _, err = cli("verify-proof", str(target), str(file))
     assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
     content = json.loads(target.read_text(encoding="utf-8"))
-    content["claims"][0]["tree"] = base64.b64encode(zlib.compress(bytes([PoseNode.OUTSIDE]))).decode()
+    content["claims"][0]["tree"] = base64.b64encode(zlib.compress(bytes([Node.OUTSIDE]))).decode()
     target.write_text(json.dumps(content), encoding="utf-8")
     code, _, err = cli("verify-proof", str(target))
     assert code == 2
     assert "is damaged" in err
-    content["claims"][0]["digest"] = hashlib.sha256(bytes([PoseNode.OUTSIDE])).hexdigest()
+    content["claims"][0]["digest"] = hashlib.sha256(bytes([Node.OUTSIDE])).hexdigest()
     target.write_text(json.dumps(content), encoding="utf-8")
     code, _, err = cli("verify-proof", str(target))
     assert code == 1
@@ -492,15 +492,12 @@ def test_signs_of_determinants_are_those_of_rotation_matrices(robot: Legs) -> No
 
 
 def test_the_check_loads_nothing_of_the_search() -> None:
-    """Loaded in an interpreter of its own: what the check needs of the room, and no engine and no search."""
-    room = "screwsynth.nlp.workspace."
-    script = (
-        f"import sys, screwsynth.nlp.workspace.paper.check\nprint(*[m for m in sys.modules if m.startswith('{room}')])"
-    )
+    """Loaded in an interpreter of its own: the statement and the checker, and no engine and no search."""
+    room = "screwsynth.nlp.proof."
+    script = "import sys, screwsynth.nlp.proof.checker.workspace.check\nprint(*sys.modules)"
     run = subprocess.run([sys.executable, "-P", "-c", script], capture_output=True, text=True, check=True)
-    loaded = {name.removeprefix(room) for name in run.stdout.split()}
-    assert {name for name in loaded if not name.startswith("paper")} == {"claims", "closedlayout", "machine", "posed"}
-    assert not loaded & {"paper.record", "paper.written", "paper.anyrobot.singularsides"}
+    loaded = {name.removeprefix(room).split(".")[0] for name in run.stdout.split() if name.startswith(room)}
+    assert loaded == {"statement", "checker"}
 
 
 def test_leaves_that_are_no_boxes_of_the_workspace_count_for_nothing(robot: Legs) -> None:

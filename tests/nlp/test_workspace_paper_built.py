@@ -19,26 +19,25 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.workspace.built.builtclaims import built_claims
-from screwsynth.nlp.workspace.claims import claims_of
-from screwsynth.nlp.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.workspace.machine import Legs, legs_of, workspace_of_case
-from screwsynth.nlp.workspace.numbers.askedvalues import spectral_extremes
-from screwsynth.nlp.workspace.paper import check
-from screwsynth.nlp.workspace.paper.ballrows import Joints, ball_rows
-from screwsynth.nlp.workspace.paper.built import rules
-from screwsynth.nlp.workspace.paper.built.changes import change_of_jacobian, change_of_rows
-from screwsynth.nlp.workspace.paper.built.statement import BuiltNumbers, with_further
-from screwsynth.nlp.workspace.paper.document import PaperClaim, PaperProof, Unproved, read_paper
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.rankclaim import RankClaim
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.singularclaim import SingularClaim
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
-from screwsynth.nlp.workspace.posed import extreme_program, posed_layout
-from screwsynth.nlp.workspace.verdict import Outcome
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.workspace import check
+from screwsynth.nlp.proof.checker.workspace.ballrows import Joints, ball_rows
+from screwsynth.nlp.proof.checker.workspace.built import rules
+from screwsynth.nlp.proof.checker.workspace.built.changes import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.checker.workspace.built.statement import BuiltNumbers, with_further
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
+from screwsynth.nlp.proof.checker.workspace.singularclaim import SingularClaim
+from screwsynth.nlp.proof.statement.claims import claims_of
+from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.proof.statement.posed_layout import extreme_program, posed_layout
+from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.asked_values import spectral_extremes
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.tolerance.legs.claims import built_claims
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
@@ -84,7 +83,7 @@ def case_of(text: str = TEXT) -> Case:
     return case_from_tables(tomllib.loads(text), name="machine", source="machine.toml")
 
 
-def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, PaperProof]:  # noqa: ANN401
+def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, WorkspaceProof]:  # noqa: ANN401
     record = PaperRecord()
     judged = judge_workspace(case_of(text), quantities=quantities, gap=0.02, jobs=1, paper=record, **options)
     leg_error = options.get("leg_error", 0.0)
@@ -92,26 +91,26 @@ def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: An
 
 
 @pytest.fixture(scope="module")
-def both() -> tuple[Judgement, PaperProof]:
+def both() -> tuple[Judgement, WorkspaceProof]:
     return written(leg_error=LEG_ERROR)
 
 
 @pytest.fixture(scope="module")
-def proof(both: tuple[Judgement, PaperProof]) -> PaperProof:
+def proof(both: tuple[Judgement, WorkspaceProof]) -> WorkspaceProof:
     return both[1]
 
 
-def rejected(proof: PaperProof, text: str = TEXT) -> str:
+def rejected(proof: WorkspaceProof, text: str = TEXT) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_paper(proof, case_of(text), leg_error=proof.leg_error)
+        check.check_workspace_proof(proof, case_of(text), leg_error=proof.leg_error)
     return str(caught.value)
 
 
-def claim(proof: PaperProof, name: str, sense: str = "") -> PaperClaim:
+def claim(proof: WorkspaceProof, name: str, sense: str = "") -> ProofClaim:
     return next(each for each in (*proof.claims, *proof.lemmas) if (each.name, each.sense) == (name, sense))
 
 
-def changed(proof: PaperProof, name: str, sense: str, **values: Any) -> PaperProof:  # noqa: ANN401
+def changed(proof: WorkspaceProof, name: str, sense: str, **values: Any) -> WorkspaceProof:  # noqa: ANN401
     """The proof with other values in one of its claims, or lemmas."""
     old = claim(proof, name, sense)
     claims, lemmas = (
@@ -121,25 +120,25 @@ def changed(proof: PaperProof, name: str, sense: str, **values: Any) -> PaperPro
     return replace(proof, claims=claims, lemmas=lemmas)
 
 
-def alone(proof: PaperProof, *names: str) -> PaperProof:
+def alone(proof: WorkspaceProof, *names: str) -> WorkspaceProof:
     """The proof with these claims alone; it says of the others that they have none."""
     kept = tuple(each for each in proof.claims if each.name in names)
     others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
     return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
 
 
-def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, PaperProof]) -> None:
+def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, WorkspaceProof]) -> None:
     judged, proof = both
     assert judged.is_proved
     assert not proof.unproved
     assert proof.tolerance == TOLERANCE
-    assert read_paper(proof.as_text(), "again") == proof
+    assert read_proof(proof.as_text(), "again") == proof
     # Of one leg, or of one pair of legs, and one stroke that takes lengths of one machine.
     strokes = [each.name for each in proof.claims if each.reason == "one machine"]
     others = ("1+", "2-", "2+", "3-", "3+")
     kept = {each.name for each in proof.claims if not any(f" {leg}" in each.name for leg in others)}
     some = alone(proof, *kept, strokes[0], "leg_clearance limbs 1- and 2+", "joint_spacing base joints 1- and 1+")
-    checked = check.check_paper(some, case_of(), leg_error=some.leg_error)
+    checked = check.check_workspace_proof(some, case_of(), leg_error=some.leg_error)
     assert len(checked.claims) == len(some.claims)
     # No machine that the search found is beyond a bound that the check shows, and the bounds are those of the search.
     extremes = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
@@ -160,7 +159,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Pa
     assert kinds == {*angles, *rates, *plates, "actuator.stroke_max", "actuator.dead_length"}
 
 
-def rejections(proof: PaperProof, text: str = TEXT) -> Callable[..., str]:
+def rejections(proof: WorkspaceProof, text: str = TEXT) -> Callable[..., str]:
     """The check of one claim after the other, with other values in it: a function that returns why it is rejected."""
     checker = check._Checker(proof, case_of(text), proof.leg_error)
     expected = {each.key: each for each in checker.expected}
@@ -173,7 +172,7 @@ def rejections(proof: PaperProof, text: str = TEXT) -> Callable[..., str]:
     return reject
 
 
-def test_another_tolerance_is_rejected(proof: PaperProof) -> None:
+def test_another_tolerance_is_rejected(proof: WorkspaceProof) -> None:
     larger = TEXT.replace("joint_centre = 0.02", "joint_centre = 0.06")
     without = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "")
     for text in (larger, TEXT.replace("joint_centre = 0.02", "joint_centre = 0.01"), without):
@@ -205,7 +204,7 @@ def value_of(name: str, sense: str, number: float) -> float:
     return number if kind == "leg_clearance" else sign * number
 
 
-def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, PaperProof]) -> None:
+def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, WorkspaceProof]) -> None:
     """The search knows a machine within the tolerance that is beyond each of these bounds by a millionth."""
     judged, proof = both
     reject = rejections(proof)
@@ -223,7 +222,7 @@ def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, Pape
         assert "could not be shown" in fault or "is wrong" in fault, name
 
 
-def test_other_lemmas_and_directions_are_rejected(proof: PaperProof) -> None:
+def test_other_lemmas_and_directions_are_rejected(proof: WorkspaceProof) -> None:
     first, *others = proof.lemmas
     assert first.name.startswith("exact leg_length")
     assert first.bound is not None
@@ -240,7 +239,7 @@ def test_other_lemmas_and_directions_are_rejected(proof: PaperProof) -> None:
     assert "no length of legs" in reject(name, "max")
 
 
-def test_further_claims_are_those_of_the_search(both: tuple[Judgement, PaperProof]) -> None:
+def test_further_claims_are_those_of_the_search(both: tuple[Judgement, WorkspaceProof]) -> None:
     """Limits that are the same number of the exact machine are one claim about it, and several about others."""
     case = case_of()
     layout, workspace, robot = posed_layout(case, both[0].workspace), both[0].workspace, legs_of(case)
@@ -444,7 +443,9 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     text += "rotation = {angle={min=-30,max=30}}\n"
     judged, given = written(text, (), with_limits=False)
     assert judged.regularity.errors is not None
-    (found,) = check.check_paper(read_paper(given.as_text(), "again"), case_of(text), leg_error=given.leg_error).claims
+    (found,) = check.check_workspace_proof(
+        read_proof(given.as_text(), "again"), case_of(text), leg_error=given.leg_error
+    ).claims
     assert found.is_refuted
     assert found.by_machine
     pose, *machine = claim(given, "regular").sides
@@ -483,7 +484,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     judged, given = written(text, ASKED[1:], with_objective=False)
     reject = rejections(given, text)
     for name, sense, extreme in zip(ASKED[1:], ("min", "max"), judged.extremes[-2:], strict=True):
-        checked = check.check_paper(alone(given, name), case_of(text), leg_error=given.leg_error).claims[0]
+        checked = check.check_workspace_proof(alone(given, name), case_of(text), leg_error=given.leg_error).claims[0]
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
         assert "wrong" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))

@@ -15,31 +15,32 @@ from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.certificate.paper.proof import ProofError
-from screwsynth.nlp.certificate.paper.slopes import SlopeArithmetic
-from screwsynth.nlp.workspace.general.problem import build_problem
-from screwsynth.nlp.workspace.general.singularpose import SingularPose
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.paper import pieces
-from screwsynth.nlp.workspace.paper.anyrobot import motionclaim
-from screwsynth.nlp.workspace.paper.anyrobot.connected import Pieces, refuse_apart
-from screwsynth.nlp.workspace.paper.anyrobot.interval import balls, half_widths
-from screwsynth.nlp.workspace.paper.anyrobot.rankofrobot import rank_claim
-from screwsynth.nlp.workspace.paper.anyrobot.robotclaims import robot_claims
-from screwsynth.nlp.workspace.paper.check import check_paper
-from screwsynth.nlp.workspace.paper.document import (
-    PaperClaim,
-    PaperProof,
+from screwsynth.nlp.proof.checker.proof_file import (
+    ProofClaim,
+    ProofError,
     Unproved,
-    read_paper,
+    WorkspaceProof,
+    read_proof,
     workspace_numbers,
 )
-from screwsynth.nlp.workspace.paper.pieces import show
-from screwsynth.nlp.workspace.paper.poseroot import pose_root
-from screwsynth.nlp.workspace.paper.record import PaperRecord
-from screwsynth.nlp.workspace.paper.tree import PoseNode, read_leaves, split_bytes
-from screwsynth.nlp.workspace.paper.written import paper_of
-from screwsynth.nlp.workspace.posebox import pose_box
+from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.checker.tree import Node, node_bytes
+from screwsynth.nlp.proof.checker.workspace import pieces
+from screwsynth.nlp.proof.checker.workspace.anyrobot import motionclaim
+from screwsynth.nlp.proof.checker.workspace.anyrobot.connected import Pieces, refuse_apart
+from screwsynth.nlp.proof.checker.workspace.anyrobot.interval import balls, half_widths
+from screwsynth.nlp.proof.checker.workspace.anyrobot.rankofrobot import rank_claim
+from screwsynth.nlp.proof.checker.workspace.anyrobot.robotclaims import robot_claims
+from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
+from screwsynth.nlp.proof.checker.workspace.pieces import show
+from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.tree import read_leaves
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 
 CASES = Path(__file__).parents[2] / "cases"
 OTHERS = [f"stewart_{k} =" for k in range(2, 7)]
@@ -66,18 +67,18 @@ def gallery_case(name: str, part: float, degrees: float, seed: int | None = None
     return Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
 
 
-def proof_of(case: Case, text: str = "", *, with_objective: bool = False) -> PaperProof:
+def proof_of(case: Case, text: str = "", *, with_objective: bool = False) -> WorkspaceProof:
     """The proof, without F, which takes longest."""
     record = PaperRecord()
     judged = judge_workspace(case, gap=0.1, with_objective=with_objective, paper=record)
-    return read_paper(paper_of(judged, record, text).as_text(), "again")
+    return read_proof(paper_of(judged, record, text).as_text(), "again")
 
 
-def claim(proof: PaperProof, name: str) -> PaperClaim:
+def claim(proof: WorkspaceProof, name: str) -> ProofClaim:
     return next(each for each in proof.claims if each.name == name)
 
 
-def changed(proof: PaperProof, name: str, **values: object) -> PaperProof:
+def changed(proof: WorkspaceProof, name: str, **values: object) -> WorkspaceProof:
     """The proof of one claim alone, tampered with."""
     own = replace(claim(proof, name), **values)  # type: ignore[arg-type]
     others = tuple(
@@ -86,9 +87,9 @@ def changed(proof: PaperProof, name: str, **values: object) -> PaperProof:
     return replace(proof, claims=(own,), unproved=(*proof.unproved, *others))
 
 
-def rejected(proof: PaperProof, case: Case) -> str:
+def rejected(proof: WorkspaceProof, case: Case) -> str:
     with pytest.raises(ProofError) as caught:
-        check_paper(proof, case)
+        check_workspace_proof(proof, case)
     return str(caught.value)
 
 
@@ -102,15 +103,15 @@ def reachy_case(text: str) -> Case:
 
 
 @pytest.fixture(scope="module")
-def reachy() -> tuple[Case, PaperProof]:
+def reachy() -> tuple[Case, WorkspaceProof]:
     text = one_motor(reachy_text(0.45))
     return reachy_case(text), proof_of(reachy_case(text), text)
 
 
-def test_reachy_mini_is_on_paper(reachy: tuple[Case, PaperProof]) -> None:
+def test_reachy_mini_is_on_paper(reachy: tuple[Case, WorkspaceProof]) -> None:
     case, proof = reachy
     assert {(each.name, each.reason) for each in proof.unproved} == {("F", "it was not judged")}
-    checked = check_paper(proof, case)
+    checked = check_workspace_proof(proof, case)
     names = [each.name for each in checked.claims]
     assert names[0] == "regular"
     assert [name for name in names if name.startswith("reach limb")] == [f"reach limb stewart_{k}" for k in range(1, 7)]
@@ -118,12 +119,12 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, PaperProof]) -> None:
     assert all(each.limit is not None and each.bound is not None for each in checked.claims[1:])
 
 
-def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, PaperProof]) -> None:
+def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, WorkspaceProof]) -> None:
     case, proof = reachy
     tree = claim(proof, "regular").tree
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
-    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([PoseNode.OUTSIDE])), case)
-    moved = split_bytes(tree[1], 2.0) + tree[10:]
+    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
+    moved = node_bytes(Node.CUT, tree[1], value=2.0) + tree[10:]
     assert "outside of it" in rejected(changed(proof, "regular", tree=moved), case)
     assert "no two poses" in rejected(changed(proof, "regular", reason="singular"), case)
     bound = claim(proof, "reach limb stewart_1").bound
@@ -141,7 +142,7 @@ def test_reachy_mini_is_on_paper_for_most_of_its_documented_rotations() -> None:
     text = reachy_text(0.6)
     proof = proof_of(reachy_case(text), text, with_objective=True)
     assert not proof.unproved
-    assert len(check_paper(proof, reachy_case(text)).claims) == 21
+    assert len(check_workspace_proof(proof, reachy_case(text)).claims) == 21
 
 
 def boxes_about(y: FloatArray, half: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -221,11 +222,11 @@ def test_robots_with_loops_are_on_paper() -> None:
     case = gallery_case("tricept", 0.02, 5)
     record = PaperRecord()
     proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
-    checked = check_paper(read_paper(proof.as_text(), "again"), case)
+    checked = check_workspace_proof(read_proof(proof.as_text(), "again"), case)
     assert [each.name for each in checked.claims] == ["regular", "constraints regular"]
     tree = claim(proof, "regular").tree
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
-    assert "not outside" in rejected(changed(proof, "constraints regular", tree=bytes([PoseNode.OUTSIDE])), case)
+    assert "not outside" in rejected(changed(proof, "constraints regular", tree=bytes([Node.OUTSIDE])), case)
 
 
 def test_boxes_with_another_assembly_do_not_belong_together() -> None:
@@ -233,7 +234,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     assert case.workspace is not None
     root = pose_root(case.workspace)
     shown = rank_claim(case, closed_form(case.model).model, root, "regular")
-    tree = split_bytes(2, 0.5 * (root.lower[2] + root.upper[2])) + bytes([PoseNode.CLOSED] * 2)
+    tree = node_bytes(Node.CUT, 2, value=0.5 * (root.lower[2] + root.upper[2])) + bytes([Node.BOUNDED] * 2)
     show(shown, root, read_leaves(tree, root.lower, root.upper))
     shown.finish()
     (whole,) = shown._shown
@@ -246,12 +247,12 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
-    reachy: tuple[Case, PaperProof], monkeypatch: pytest.MonkeyPatch
+    reachy: tuple[Case, WorkspaceProof], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, proof = reachy
     case = reachy_case(one_motor(reachy_text(1.0)))
     assert case.workspace is not None
-    monkeypatch.setattr(pieces, "_MOST_PIECES", 100)
+    monkeypatch.setattr(pieces._PoseRule, "most_pieces", 100)
     other = replace(changed(proof, "regular"), workspace=workspace_numbers(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
@@ -281,7 +282,7 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     case = gallery_case("6-ups", 0.4, 70, 1)
     record = PaperRecord()
     proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
-    (found,) = check_paper(proof, case).claims
+    (found,) = check_workspace_proof(proof, case).claims
     assert found.is_refuted
     first, second = claim(proof, "regular").sides
     assert "opposite signs" in rejected(changed(proof, "regular", sides=(first, first)), case)

@@ -18,11 +18,11 @@ from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.front.data import front_result
 from screwsynth.nlp.output.fronttable import front_words
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.slices.regions import KEPT, UNDECIDED, Region
+from screwsynth.nlp.proof.workspace.slices.slices import Slice, slices_of
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.exchange import WorkspaceProof
-from screwsynth.nlp.workspace.judge import judge_workspace
-from screwsynth.nlp.workspace.slices.regions import KEPT, UNDECIDED, Region
-from screwsynth.nlp.workspace.slices.slices import Slice, slices_of
-from screwsynth.nlp.workspace.verdict import Outcome
 
 NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
 

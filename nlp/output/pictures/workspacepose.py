@@ -9,9 +9,9 @@ from ...errors import CaseError, EvaluationError
 from ...evidence.closing import closed_start
 from ...evidence.state import evaluate
 from ...program.formulation import formulate_each
+from ...proof.statement.posed_layout import at_one_pose
+from ...proof.workspace.verdict import Outcome
 from ...results.workspaceposes import PosedClaim
-from ...workspace.posed import at_one_pose
-from ...workspace.verdict import Outcome
 from .drawing import Drawing, drawing_of
 
 

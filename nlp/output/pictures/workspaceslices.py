@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
+from ...proof.workspace.slices.regions import KEPT, UNDECIDED, Region
+from ...proof.workspace.slices.slices import Slice
 from ...results.rounding import number
-from ...workspace.slices.regions import KEPT, UNDECIDED, Region
-from ...workspace.slices.slices import Slice
 from .canvas import INK, MUTED
 from .figures import picture_of
 from .fonts import legible

@@ -1,0 +1,154 @@
+"""The incumbent of a search of the whole box: the best feasible point known."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ....models import FloatArray
+from ...errors import InputError
+from ...evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
+from ...evidence.state import loops_are_closed
+from ...program.sampling import starting_points
+from ..statement.standard_form import StandardForm
+
+#: Difference allowed between a claimed value and the one computed there, in parts of the objective's scale.
+_SAME_VALUE = 1e-9
+#: Points that are tried when none is given.
+_POINTS = 8
+#: Improvement, in parts of the objective's scale, from which on a new point counts as better than the one given.
+_BETTER = 1e-9
+#: The same for points that a search finds by itself, of which the first one is kept: rounding of the objective.
+_TIE = 1e-13
+
+
+class IncumbentError(InputError):
+    """The point that was given is not feasible, or does not have the value claimed."""
+
+
+class PointKeeper(Protocol):
+    """The best point known to a search of boxes."""
+
+    @property
+    def value(self) -> float:
+        """Value of the form there; -inf without a point."""
+
+    def consider(self, point: FloatArray) -> None:
+        """Keep a point (n,) if it is feasible and better."""
+
+    def improve_near(self, point: FloatArray) -> None:
+        """Correct a point (n,) towards an optimum, and keep the result if it is better."""
+
+
+class _Point(NamedTuple):
+    """A point (n,) and its value; None and -inf without one."""
+
+    x: FloatArray | None
+    value: float
+
+
+class Incumbent:
+    """The best feasible point known, and its value in the standard form.
+
+    Args:
+        form: the form whose box is searched.
+
+    Attributes:
+        size: number n of the form's variables.
+    """
+
+    def __init__(self, form: StandardForm) -> None:
+        self._form = form
+        self._best = _Point(None, -math.inf)
+        self.size = form.n
+        self._given = math.nan
+
+    @property
+    def x(self) -> FloatArray | None:
+        """(n,) the point in the form's variables; None without one."""
+        return self._best.x
+
+    @property
+    def value(self) -> float:
+        """Value of the form there; -inf without a point."""
+        return self._best.value
+
+    @property
+    def was_beaten(self) -> bool:
+        """Whether the search has found a better point than the one given."""
+        return self.value > self._given + _BETTER * self._form.nlp.objective_size
+
+    def program_point(self) -> FloatArray:
+        """Return the point (n,) in the program's variables; zeros without one."""
+        return self._with_level(np.zeros(self._form.n) if self.x is None else self.x, self.value)
+
+    def start(self, x: FloatArray | None, claimed: float | None) -> None:
+        """Begin with a given point, or with the best of a few.
+
+        Args:
+            x: (n,) in the program's variables, or None.
+            claimed: the objective claimed there.
+
+        Raises:
+            IncumbentError: the point violates a limit, or has a worse value.
+        """
+        form, nlp = self._form, self._form.nlp
+        if x is None:
+            for point in starting_points(nlp, _POINTS, seed=0):
+                self.improve_near(form.point_of(point))
+            return
+        point = form.point_of(x)
+        value = form.value_at(point)
+        violation = self._violation(point, value)
+        if not violation <= FEASIBLE:
+            raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
+        if claimed is not None and form.sign * claimed > value + _SAME_VALUE * nlp.objective_size:
+            raise IncumbentError(f"the incumbent is said to have F = {claimed:.10g}, but has {form.sign * value:.10g}")
+        self._best, self._given = _Point(point, value), value
+
+    def consider(self, point: FloatArray) -> None:
+        """Keep a point (n,) if it is feasible and better; likewise the points that Newton's method reaches from it."""
+        self._keep_if_better(point)
+        self.improve_near(point)
+
+    def improve_near(self, point: FloatArray) -> None:
+        """Correct a point (n,) onto the limits and towards an optimum, and keep the result if it is better."""
+        nlp = self._form.nlp
+        value = self._form.value_at(point)
+        if not math.isfinite(value):
+            return
+        whole = close_equations(nlp, self._with_level(point, value))
+        at = linearise(nlp, whole)
+        if not math.isfinite(at.violation):
+            return
+        self._keep_if_better(self._form.point_of(whole))
+        corrected = correct_point(nlp, whole, at.active())
+        self._keep_if_better(self._form.point_of(np.clip(corrected.x, nlp.lower, nlp.upper)))
+
+    def _with_level(self, point: FloatArray, value: float) -> FloatArray:
+        """Return the point with the program's epigraph variable, where it has one."""
+        variables = self._form.program_variables(point)
+        if not self._form.has_epigraph:
+            return variables
+        nlp = self._form.nlp
+        return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
+
+    def _violation(self, point: FloatArray, value: float) -> float:
+        """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
+
+        The program has independent loop equations only, which other ways to assemble the joints fulfil too.
+        """
+        nlp, whole = self._form.nlp, self._with_level(point, value)
+        if not self._form.keeps_signs(whole):
+            return math.inf
+        violation = linearise(nlp, whole).violation
+        return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf
+
+    def _keep_if_better(self, point: FloatArray) -> None:
+        value = self._form.value_at(point)
+        # Rounding chooses none of several points with the same value.
+        better = value > self.value + _TIE * self._form.nlp.objective_size
+        if better and self._violation(point, value) <= FEASIBLE:
+            self._best = _Point(np.array(point), value)

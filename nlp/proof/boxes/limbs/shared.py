@@ -1,0 +1,276 @@
+"""Search of a form whose limbs share variables: bisection of shared boxes, and lists of own boxes for each limb.
+
+A box of the shared variables is handed down to its halves with its limbs' lists. An own box is dropped where its bound
+and the best of all others together do not exceed the threshold. What is wider decides on the next step: the lists of
+the limbs with the largest spread are refined, or the shared box is bisected. See
+:mod:`screwsynth.nlp.proof.boxes.limbs.sums` for the bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .....models.arrays import first_largest
+from ...enclosure.first_order import midpoints
+from ...enclosure.quadratic_models import GradientModel, ranges
+from ..bounding import NumpyEngine
+from ..engines import limb_engine_for
+from ..open_boxes import BoundedSearch
+from ..search import reason_without_bound
+from ..threads import Threads
+from .boxes import OwnBoxes, SharedBoxes
+from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
+from .models import LimbEngine, LimbModels
+from .record import SharedRecord
+from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .....models import FloatArray
+    from ...statement.limb_separation import Separation
+    from ...statement.standard_form import StandardForm
+    from ..incumbent import Incumbent
+    from ..proof_writer import ProofWriter
+
+#: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
+_BLOCK = 256
+#: Own boxes of one list above which the shared box is bisected instead.
+_LONGEST = 512
+#: Part of the widest limb's spread from which on a limb's list is refined too.
+_SPREAD = 0.25
+#: How many times more the limbs' lists must promise than bisections of the shared box to be refined.
+_PATIENCE = 1.0
+#: Widths, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
+_SINGULAR_WIDTH, _LEAST_WIDTH = 2.0**-16, 2.0**-40
+
+
+class _ExaminedLimb(NamedTuple):
+    """Models of a limb, and its bounds."""
+
+    models: LimbModels
+    bound: LimbBound
+
+
+class SharedSearch(BoundedSearch[SharedBoxes]):
+    """A search of limbs with shared variables.
+
+    Args:
+        form: the whole form.
+        separation: its limbs.
+        incumbent: the best point known, which the search improves.
+        engine: name of the engine.
+        jobs: threads, which share the limbs.
+        recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
+            dropped because of the other limbs: the search makes none then.
+    """
+
+    def __init__(
+        self,
+        form: StandardForm,
+        separation: Separation,
+        incumbent: Incumbent,
+        engine: str | None,
+        jobs: int | None,
+        recorder: ProofWriter | None = None,
+    ) -> None:
+        if separation.common is None:
+            raise ValueError("the limbs share no variable")
+        self._form, self._separation, self._incumbent = form, separation, incumbent
+        self._common_form = separation.common
+        self._common = NumpyEngine(separation.common)
+        m = self._m = len(separation.shared)
+        # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
+        self._threads = Threads(jobs)
+        # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
+        self._engine, self._engines, self._opposites = engine, list[LimbEngine](), list[LimbEngine]()
+        own = tuple(
+            OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64))
+            for limb in separation.limbs
+        )
+        good = tuple(0.5 * (each.lower + each.upper) for each in own)
+        root = SharedBoxes(
+            self._common_form.lower[:, None], self._common_form.upper[:, None], np.array([np.inf]), own, good
+        )
+        self._record: SharedRecord | None = None
+        if recorder is not None:
+            self._record = SharedRecord(self._common_form.lower, self._common_form.upper)
+            recorder.leave_to(self._record.tree)
+        super().__init__(root)
+
+    @property
+    def fault(self) -> str:
+        """Reason for stopping at boxes without a finite bound; empty without any."""
+        undefined = [each for each in self._undivided if not np.isfinite(each.bound).all()]
+        if undefined:
+            each = undefined[0]
+            return reason_without_bound(self._common_form, each.lower, each.upper, each.bound)
+        return ""
+
+    def close(self) -> None:
+        """Stop the threads."""
+        self._threads.close()
+
+    def _step(self, threshold: float) -> None:
+        """Examine a block of shared boxes, and close those whose bounds do not exceed a threshold.
+
+        The first steps prepare one limb each.
+        """
+        if len(self._engines) < len(self._separation.limbs):
+            form = self._separation.limbs[len(self._engines)].form
+            # Minus a limb's function, for lower models.
+            self._opposites.append(
+                limb_engine_for(replace(form, functions=(-form.functions[0],)), self._m, self._engine, 1)
+            )
+            self._engines.append(limb_engine_for(form, self._m, self._engine, 1))
+            return
+        current = self._opened.pop(_BLOCK if self._turn else 1)
+        self._turn += 1
+        before = self._incumbent.value
+        with np.errstate(all="ignore"):
+            sums = self._examine(current)
+            self._improve(current, sums)
+            self._branch(current, sums, threshold)
+        if self._incumbent.value > before:
+            # What was too small to bisect may be closed by the better point.
+            for boxes in self._undivided:
+                self._opened.push(boxes)
+            self._undivided.clear()
+
+    def _examine(self, boxes: SharedBoxes) -> SharedSums:
+        """Return bounds of shared boxes."""
+        found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
+        models, parts = [each.models for each in found], [each.bound for each in found]
+        self.boxes += sum(own.of.size + boxes.count for own in boxes.own)
+        radius = midpoints(boxes.lower, boxes.upper).radius
+        common = self._common.model(boxes.lower, boxes.upper, radius)
+        low, high = ranges(common)
+        impossible, binding = self._common.states(low, high)
+        tilted = common.b.copy()
+        for part in parts:
+            tilted[0] += part.tilt.g
+        weights = self._common.multipliers(GradientModel(**{**vars(common), "b": tilted}), high)
+        M = with_tilts(common.sum_model(weights), parts)
+        bound = M.bound()
+        known = np.isfinite(common.value.s[0]) & np.all([np.isfinite(part.best) for part in parts], axis=0)
+        sums = np.where(known & ~np.isnan(bound), bound, np.inf)
+        bound = np.fmin(sums, boxes.bound)
+        emptied = np.any([part.best == -np.inf for part in parts], axis=0)
+        return SharedSums(models, parts, common, M, sums, bound, ~(impossible.any(axis=0) | emptied), binding)
+
+    def _examine_limb(self, k: int, boxes: SharedBoxes) -> _ExaminedLimb:
+        """Return models and bounds of a limb over shared boxes and its own boxes."""
+        engine, opposite, own, good = self._engines[k], self._opposites[k], boxes.own[k], boxes.good[k]
+        # NumPy's warnings are switched off for each thread by itself.
+        with np.errstate(all="ignore"):
+            place = [np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)]
+            at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
+            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+            known = at_good.holds & at_good.defined
+            least = np.where(known, -engine.bound(fall), -np.inf)
+            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
+            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
+            models = engine.limb_models(lower, upper, least[own.of])
+            return _ExaminedLimb(models, bound_limb(engine, models, at_good, fall, own, self._m))
+
+    def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
+        """Return a limb's own boxes that are left."""
+        with np.errstate(all="ignore"):
+            parts = boxes.good[k], sums.models[k], sums.parts[k], boxes.own[k]
+            return cut_own(self._engines[k], *parts, sums.sums, threshold)
+
+    def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
+        """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
+        J = 1
+        error = sums.common.value.c + sums.common.value.s
+        values = np.where((error[J:] <= 0).all(axis=0), sums.common.value.c[0] - sums.common.value.s[0], -np.inf)
+        places = [first_largest_of_lists(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
+        for each, place in zip(sums.models, places, strict=True):
+            values = values + each.value[place]
+        values = np.where(np.isnan(values), -np.inf, values)
+        node = int(np.argmax(values))
+        if values[node] > self._incumbent.value:
+            self._incumbent.consider(self._point(boxes, node, [int(place[node]) for place in places]))
+        if self._turn & (self._turn - 1) == 0:
+            node = int(np.argmax(np.where(sums.is_possible & np.isfinite(sums.bound), sums.bound, -np.inf)))
+            self._incumbent.improve_near(self._point(boxes, node, [int(part.top[node]) for part in sums.parts]))
+
+    def _point(self, boxes: SharedBoxes, node: int, places: list[int]) -> FloatArray:
+        """Return the point at the centres of a shared box and of one own box of each limb."""
+        point = np.zeros(self._form.n)
+        point[list(self._separation.shared)] = 0.5 * boxes.lower[:, node] + 0.5 * boxes.upper[:, node]
+        for limb, own, place in zip(self._separation.limbs, boxes.own, places, strict=True):
+            point[list(limb.own)] = 0.5 * own.lower[:, place] + 0.5 * own.upper[:, place]
+        return point
+
+    def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> None:
+        """Drop and contract, and bisect shared boxes or own boxes."""
+        bounded = sums.bound <= threshold
+        if self._record is not None:
+            # An inherited bound says nothing of the numbers of this box, which the proof needs.
+            bounded = sums.sums <= self._record.closing(threshold, self._incumbent.value)
+        if (bounded & sums.is_possible).any():
+            self._closed_bound = max(self._closed_bound, float(sums.bound[bounded & sums.is_possible].max()))
+        limbs = range(len(self._engines))
+        if self._record is None:
+            left = contract_shared(self._common_form, boxes, sums, threshold)
+            lower, upper, alive = collapse_monotone(self._common_form, boxes, sums, left)
+            below = threshold
+        else:
+            lower, upper, alive = boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool)
+            below = -math.inf
+        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), limbs)
+        good = tuple(each.good for each in lists)
+        # What contraction or dropping of own boxes excluded may reach the threshold.
+        self._closed_bound = max(self._closed_bound, threshold)
+        sizes = np.array([np.bincount(each.own.of, minlength=boxes.count) for each in lists])
+        alive = alive & sums.is_possible & ~bounded & (sizes > 0).all(axis=0)
+        whole = (self._common_form.upper - self._common_form.lower)[:, None]
+        width = ((upper - lower) / whole).max(axis=0)
+        finite = np.isfinite(sums.bound)
+        can_cut = width > np.where(finite, _LEAST_WIDTH, _SINGULAR_WIDTH)
+        change = self._shared_change(boxes, sums, lower, upper)
+        spread = np.array([each.spread for each in lists])
+        wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
+        refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
+        cut = alive & ~refine & can_cut
+        rest = SharedBoxes(lower, upper, sums.bound, tuple(each.own for each in lists), good)
+        if self._record is not None:
+            emptied = sizes == 0
+            self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
+            self._record.bisect(boxes, np.where(cut, first_largest(change.T), -1))
+        if cut.any():
+            places = np.flatnonzero(cut)
+            self._opened.push(rest.select(places).bisect(first_largest(change.T)[places]))
+        if refine.any():
+            own = tuple(_refined(each, spread[k] >= _SPREAD * spread.max(axis=0)) for k, each in enumerate(lists))
+            refined = SharedBoxes(lower, upper, sums.bound, own, good)
+            self._opened.push(refined.select(np.flatnonzero(refine)))
+        done = alive & ~refine & ~cut
+        # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
+        moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
+        for before, each in zip(boxes.own, lists, strict=True):
+            moved |= each.own.width(boxes.count) < before.width(boxes.count)
+        for which, push in ((done & moved, self._opened.push), (done & ~moved, self._undivided.append)):
+            if which.any():
+                push(rest.select(np.flatnonzero(which)))
+
+    def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
+        m, M = self._m, sums.M
+        change = LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
+        for part in sums.parts:
+            change = change + part.L.w[:m, part.top] + np.abs(part.L.H[:m, :, part.top]).sum(axis=1)
+        width = boxes.upper - boxes.lower
+        change = change * (upper - lower) / np.where(width > 0, width, 1.0)
+        relative = (upper - lower) / (self._common_form.upper - self._common_form.lower)[:, None]
+        return np.where(np.isfinite(change).all(axis=0) & (change > 0).any(axis=0), change, relative)
+
+
+def _refined(each: LeftOwn, which: NDArray[np.bool_]) -> OwnBoxes:
+    """Return a limb's lists, those of some shared boxes (B,) with their best boxes bisected."""
+    return each.own.bisect(each.is_near & which[each.own.of], each.along)

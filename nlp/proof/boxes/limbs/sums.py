@@ -1,0 +1,149 @@
+"""Bounds of a sum of limbs over boxes of shared variables, from upper models of the limbs.
+
+The sum of the limbs' bests over a box of the shared variables ``s`` is more than the best of the sum: each limb would
+choose another ``s``. So every limb's function is taken without a quadratic function ``t_k`` of ``s``, its *tilt*, and
+the sum of the tilts is added to the part that depends on ``s`` alone:
+
+    phi(s, o) <= sum_k max over the boxes of limb k of (phi_k - t_k) + max_s (phi_0 + sum_k t_k).
+
+This holds for any tilts. Those used are gradient and curvature, along ``s``, of the model of the limb at a good point
+of its own variables, so that what is left of the limb hardly depends on ``s``. (This is the Lagrangian decomposition of
+the sum with copies of ``s``.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...enclosure.intervals import TINY, ULP
+from ...enclosure.quadratic_models import QuadraticModel
+from .models import LimbEngine, LimbModels
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .....models import FloatArray
+    from .boxes import OwnBoxes
+
+
+class Tilt(NamedTuple):
+    """A function ``g.e + 1/2 e'Q e`` of the shared variables over B boxes, e in [-1, 1]^m.
+
+    Attributes:
+        g: (m, B).
+        Q: (m, m, B) symmetric.
+    """
+
+    g: FloatArray
+    Q: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LimbBound:
+    """Bounds of one limb over B boxes of shared variables and N boxes of its own ones.
+
+    Attributes:
+        tilt: what was taken off.
+        reached: (B,) lower bound, over the shared box, of the limb without its tilt at the point known to be good.
+        value_of_good: (B,) value of the limb there, at the centre of the shared box; -inf where it is not known.
+        L: models of the N boxes without the tilt.
+        bounds: (N,) upper bounds of the limb without its tilt; -inf where no optimum may lie.
+        best: (B,) the largest bound of each list.
+        top: (B,) place of the box that has it.
+    """
+
+    tilt: Tilt
+    reached: FloatArray
+    value_of_good: FloatArray
+    L: QuadraticModel
+    bounds: FloatArray
+    best: FloatArray
+    top: NDArray[np.intp]
+
+
+def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
+    """Return the place (B,) of the first largest value (N,) of each list; NaN counts as -inf."""
+    values = np.where(np.isnan(values), -np.inf, values)
+    starts = own.starts
+    largest = np.maximum.reduceat(values, starts)
+    places = np.where(values == largest[own.of], np.arange(values.size), values.size)
+    return np.asarray(np.minimum.reduceat(places, starts))
+
+
+def bound_limb(
+    engine: LimbEngine, models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int
+) -> LimbBound:
+    """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
+
+    An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
+
+    Args:
+        engine: bounds models.
+        models: of the N own boxes.
+        good: of a good point of the limb in each of the B shared boxes.
+        fall: upper models of minus the limb's function there.
+        own: the own boxes.
+        m: number of shared variables.
+    """
+    with np.errstate(all="ignore"):
+        L, usable = models.L, models.is_possible & models.defined
+        promise = np.where(usable, L.middle + np.abs(L.b[m:]).sum(axis=0), -np.inf)
+        chosen = first_largest_of_lists(promise, own)
+        is_known = good.holds & good.defined
+        g = np.where(is_known, good.L.b[:m], L.b[:m, chosen])
+        Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
+        finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
+        tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
+        reached = np.where(is_known, -engine.bound(_add(fall, tilt)), -np.inf)
+        reached = np.where(np.isnan(reached), -np.inf, reached)
+        rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
+        bounds = np.where(models.defined, engine.bound(rest), np.inf)
+        # The bound of the limb itself, and that of minus its tilt.
+        apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
+        # The two may cancel: their rounding is in parts of their sizes.
+        other = models.high + apart[own.of] + (np.abs(models.high) + apart[own.of]) * (64 * ULP) + TINY
+        bounds = np.fmin(bounds, other)
+        is_possible = models.is_possible & ~(bounds < reached[own.of])
+        bounds = np.where(is_possible, np.where(np.isnan(bounds), np.inf, bounds), -np.inf)
+    return LimbBound(
+        tilt,
+        reached,
+        np.where(is_known, good.value, -np.inf),
+        rest,
+        bounds,
+        np.maximum.reduceat(bounds, own.starts),
+        first_largest_of_lists(bounds, own),
+    )
+
+
+def without_tilt(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
+    """Return the models without tilts of their first variables, (m, N) and (m, m, N)."""
+    return _add(L, Tilt(-tilt.g, -tilt.Q))
+
+
+def with_tilts(L: QuadraticModel, parts: list[LimbBound]) -> QuadraticModel:
+    """Return models over B shared boxes with the tilts of all limbs and the limbs' best values."""
+    with np.errstate(all="ignore"):
+        for part in parts:
+            L = _add(L, part.tilt)
+            L = replace(L, middle=L.middle + part.best, rounding=L.rounding + 64 * ULP * np.abs(part.best))
+    return L
+
+
+def _add(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
+    """Return the models plus a function of their first variables."""
+    m = len(tilt.g)
+    b, H = L.b.copy(), L.H.copy()
+    across = np.abs(tilt.Q).sum(axis=1)
+    # Sizes before the sum, which may cancel.
+    sizes = np.abs(b[:m]) + np.abs(tilt.g) + np.abs(H[:m, :m]).sum(axis=1) + across
+    margin = 64 * ULP * (sizes + np.abs(L.slope_lo[:m]) + np.abs(L.slope_hi[:m])) + TINY
+    b[:m] += tilt.g
+    H[:m, :m] += tilt.Q
+    low, high = L.slope_lo.copy(), L.slope_hi.copy()
+    low[:m] += tilt.g - across - margin
+    high[:m] += tilt.g + across + margin
+    return replace(L, b=b, H=H, slope_lo=low, slope_hi=high, rounding=L.rounding + 64 * ULP * sizes.sum(axis=0) + TINY)

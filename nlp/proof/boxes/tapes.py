@@ -1,0 +1,52 @@
+"""A form as lists of operations: what an engine evaluates on every box."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ...errors import UncoveredError
+from ..enclosure.instructions import compile_tape
+from ..enclosure.squared_quotients import SearchRows, search_rows
+from ..enclosure.tape import Tape
+from ..statement.piecewise_derivatives import refuse_jumps
+from ..statement.standard_form import StandardForm
+from .first_pass import MOST_VARIABLES, without_conditions
+
+#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
+_MANY_CONDITIONS = 4
+
+
+def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
+    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule, or its value jumps.
+    """
+    try:
+        rows = search_rows(form, apart=False) if rows is None else rows
+        refuse_jumps(rows.expressions, form.x)
+        return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
+    except UncoveredError as error:
+        raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def objective_tape(form: StandardForm, length: int) -> Tape | None:
+    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
+    if form.n > MOST_VARIABLES or not form.conditions:
+        return None
+    tape = search_tape(without_conditions(form))
+    return tape if len(tape) * _MANY_CONDITIONS <= length else None
+
+
+def _uncovered_limit(form: StandardForm) -> str | None:
+    """Return the key of the limit whose expressions hold an operation without a rule; None where the robot's do."""
+    keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
+    whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
+    for k, key in enumerate(whose):
+        row = form.expressions[k]
+        try:
+            refuse_jumps(row, form.x)
+            compile_tape(ca.Function("row", [form.x], [row, ca.densify(ca.jacobian(row, form.x)).T]))
+        except UncoveredError:
+            return None if key is None else f"limits.{key}"
+    return None

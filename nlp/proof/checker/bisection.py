@@ -1,0 +1,129 @@
+"""Loop of the checker: claims about boxes are shown on pieces of them, and pieces that are left are bisected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from .proof_file import ProofError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ....models import FloatArray
+
+#: Largest number of bisections on the way to a piece.
+_MOST_BISECTIONS = 60
+#: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
+_WIDEST = 5
+
+
+@dataclass(eq=False)
+class Shown:
+    """Results on N pieces of n variables.
+
+    Attributes:
+        holds: (N,) whether the claim is shown.
+        change: (n, N) how much the claim can gain from halving each variable.
+        lower, upper: (n, N) ends of the part of each piece that is left to be shown; crossed where nothing is.
+        is_wrong: (N,) whether the centre is a counterexample by more than rounding; None where that is not asked.
+    """
+
+    holds: NDArray[np.bool_]
+    change: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    is_wrong: NDArray[np.bool_] | None = None
+
+    def keep(self, which: NDArray[np.intp], holds: NDArray[np.bool_], change: FloatArray) -> None:
+        """Add what is shown of some pieces."""
+        self.holds[which] |= holds
+        self.change[:, which] = np.fmax(self.change[:, which], change)
+
+    def cut(self, which: NDArray[np.intp], ends: tuple[FloatArray, FloatArray]) -> None:
+        """Leave only a part of some pieces."""
+        self.lower[:, which] = np.fmax(self.lower[:, which], ends[0])
+        self.upper[:, which] = np.fmin(self.upper[:, which], ends[1])
+
+
+class Rule(Protocol):
+    """A rule that shows claims of one kind.
+
+    Attributes:
+        width: (n,) of the whole box.
+        block: number of pieces examined at once.
+        most_pieces: largest number of pieces of a claim's box.
+    """
+
+    width: FloatArray
+    block: int
+    most_pieces: int
+
+    def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N) of the claims with these numbers (N,).
+
+        Raises:
+            ProofError: a claim is wrong.
+        """
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+
+
+def show(rule: Rule, lower: FloatArray, upper: FloatArray, done: Callable[[int], None] | None = None) -> int:
+    """Show claims, and return the number of pieces examined.
+
+    Args:
+        rule: shows them.
+        lower: (n, L) lower ends of the claims' boxes.
+        upper: (n, L) upper ends.
+        done: called with the number of claims that have been shown since the last call.
+
+    Raises:
+        ProofError: a claim could not be shown.
+    """
+    count = lower.shape[1]
+    owner, depth = np.arange(count), np.zeros(count, dtype=np.intp)
+    used, total, waiting = np.zeros(count, dtype=np.intp), 0, count
+    while owner.size:
+        # The last pieces are taken first: one claim is finished before the next begins, as far as blocks allow.
+        first = max(owner.size - rule.block, 0)
+        a, b, of, deep = lower[:, first:], upper[:, first:], owner[first:], depth[first:]
+        np.add.at(used, of, 1)
+        total += of.size
+        with np.errstate(all="ignore"):
+            found = rule.examine(a, b, of)
+            left = np.flatnonzero(~(found.holds | (found.lower > found.upper).any(axis=0)))
+            along = _variables_to_bisect(found, a, b, rule.width, deep)[left]
+        low, high, of, deep = found.lower[:, left], found.upper[:, left], of[left], deep[left] + 1
+        failed = (used[of] > rule.most_pieces) | (deep > _MOST_BISECTIONS)
+        if found.is_wrong is not None:
+            failed |= found.is_wrong[left]
+        if failed.any():
+            raise ProofError(rule.sentence(int(of[failed.argmax()])))
+        columns = np.arange(of.size)
+        middle = 0.5 * low[along, columns] + 0.5 * high[along, columns]
+        below, above = high.copy(), low.copy()
+        below[along, columns] = above[along, columns] = middle
+        lower = np.concatenate([lower[:, :first], low, above], axis=1)
+        upper = np.concatenate([upper[:, :first], below, high], axis=1)
+        owner, depth = np.concatenate([owner[:first], of, of]), np.concatenate([depth[:first], deep, deep])
+        if done is not None:
+            before, waiting = waiting, np.unique(owner).size
+            done(before - waiting)
+    return total
+
+
+def _variables_to_bisect(
+    found: Shown, lower: FloatArray, upper: FloatArray, width: FloatArray, depth: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Return the variable (N,) along which to bisect what is left of each piece with ends (n, N) and a depth (N,)."""
+    wide = found.upper - found.lower
+    score = found.change * (wide / np.where(upper > lower, upper - lower, 1.0))
+    relative = wide / np.where(width > 0, width, np.inf)[:, None]
+    known = np.isfinite(score).all(axis=0) & (score > 0).any(axis=0)
+    score = np.where(known & (depth % _WIDEST != _WIDEST - 1), score, relative)
+    return np.asarray(np.where(wide > 0, score, -1.0).argmax(axis=0))

@@ -1,0 +1,166 @@
+"""Program of a case that a proof bounds, and the proven claim in words.
+
+The tasks, their weights and senses, poses, limits and dimensions are those of the case. A :class:`.proof.Statement`
+names one of the few programs that a case has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+
+from ....models import Model
+from ...case.case import Case
+from ...case.pose import OverPoses
+from ...case.task import Method, Sense
+from ...errors import InputError
+from ...program.epigraph import formulate_worst
+from ...program.formulation import formulate, formulate_weighted, scaled_weights
+from ...program.nlp import Nlp
+from .proof_file import ProofError, Statement
+
+#: Significant digits of bounds in claims.
+_DIGITS = 10
+
+
+def has_modes(model: Model) -> bool:
+    """Return whether a robot has several working modes that signs tell apart."""
+    return any(each.is_mode for each in model.signs)
+
+
+def has_both_senses(case: Case) -> bool:
+    """Return whether some tasks are maximised and others minimised."""
+    return len({task.sense for task in case.tasks}) > 1
+
+
+def check_minimum(case: Case) -> None:
+    """Refuse a case whose smallest F is no bound of one program.
+
+    Raises:
+        InputError: it has several tasks, or its F is the least of several poses.
+    """
+    if len(case.tasks) > 1:
+        raise InputError("above: is for a case with one task")
+    if case.pose_count > 1 and case.over_poses is OverPoses.WORST and case.tasks[0].sense is Sense.MAX:
+        raise InputError("above: is not for the worst of several poses, where F is to be maximised")
+
+
+def program_of(case: Case, statement: Statement) -> Nlp:
+    """Formulate the program of a case that a statement names.
+
+    Raises:
+        InputError: the case has no such program.
+    """
+    nlp = _program(case, statement)
+    return replace(nlp, in_home_mode=True) if statement.in_home_mode else nlp
+
+
+def _program(case: Case, statement: Statement) -> Nlp:
+    """Formulate the program for all working modes."""
+    if statement.is_minimum:
+        check_minimum(case)
+    if len(statement.best) != (len(case.tasks) if _has_losses(case) else 0):
+        raise ProofError("the proof is for other tasks, or for another way to combine them, than the case's")
+    if len(case.tasks) == 1:
+        nlp = formulate(case)
+        return replace(nlp, sense=Sense.MIN) if statement.is_minimum else nlp
+    weights = scaled_weights(case)
+    if case.method is Method.AVERAGE:
+        raise InputError("a case whose tasks are averaged has no one program to prove something of")
+    if case.method is Method.WEIGHTED_SUM:
+        return formulate_weighted(case, weights)
+    # The level's size is for local solvers alone: the bounded functions do not depend on it.
+    return formulate_worst(case, weights, statement.best or [0.0] * len(weights), 1.0)
+
+
+def _has_losses(case: Case) -> bool:
+    """Return whether the worst case of the tasks is that of their losses."""
+    return len(case.tasks) > 1 and case.method is Method.WORST_CASE and has_both_senses(case)
+
+
+def hold_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
+    """Refuse the statement of a proof unless it is the one that a user asks for.
+
+    Args:
+        case: the case.
+        statement: of the proof.
+        above: the value above which F is claimed to be; None where a bound of the case's optimum is asked for.
+        all_assemblies: whether all working modes are asked for, and not home's alone.
+
+    Raises:
+        ProofError: it is another one.
+        InputError: the case has no such statement.
+    """
+    if above is not None:
+        check_minimum(case)
+    if statement.is_minimum and above is None:
+        raise ProofError("the proof bounds the smallest F, and the case asks for the largest: see --above")
+    if above is not None and case.tasks[0].sense is Sense.MAX and not statement.is_minimum:
+        raise ProofError("the proof bounds the largest F, and --above asks for the smallest")
+    if statement.in_home_mode and all_assemblies:
+        raise ProofError("the proof covers home's working mode alone, and --all-assemblies asks for all")
+    if statement.in_home_mode and not has_modes(case.model):
+        raise ProofError("the proof is for home's working mode, and the robot has none")
+
+
+def claim_words(case: Case, statement: Statement, bound: float | None) -> str:
+    """Return a proven claim as a sentence without a full stop.
+
+    Args:
+        case: the case.
+        statement: of the proof.
+        bound: upper bound of the maximised value, minus F for a minimum; None where there is no feasible point.
+    """
+    where = f"within the limits of {case.name}"
+    if case.workspace is not None and case.workspace.stated_pose_notice:
+        where += ", taken at the stated pose alone,"
+    if has_modes(case.model):
+        where += " in home's working mode" if statement.in_home_mode else " in every working mode"
+    if bound is None:
+        return f"there is no feasible point {where}"
+    is_minimum = _has_minimum(case, statement)
+    side = f"at least {outward(-bound, up=False)}" if is_minimum else f"at most {outward(bound, up=True)}"
+    return f"F is {side} {where}, F being {_objective_words(case, statement)}{_pose_words(case)}"
+
+
+def _has_minimum(case: Case, statement: Statement) -> bool:
+    """Return whether the program of a statement minimises its objective."""
+    both = has_both_senses(case)
+    return statement.is_minimum or _has_losses(case) or (not both and case.tasks[0].sense is Sense.MIN)
+
+
+def _objective_words(case: Case, statement: Statement) -> str:
+    """Return the bounded number of a statement in words, with the tasks and their weights."""
+    names = [f"F({task.name!r})" for task in case.tasks]
+    if len(names) == 1:
+        return f"that of task {case.tasks[0].name!r}"
+    weights = [exact(weight) for weight in scaled_weights(case)]
+    if case.method is Method.WEIGHTED_SUM:
+        both = has_both_senses(case)
+        signs = ["-" if both and task.sense is Sense.MIN else "+" for task in case.tasks]
+        terms = zip(signs, weights, names, strict=True)
+        return " ".join(f"{sign} {weight} {name}" for sign, weight, name in terms).removeprefix("+ ")
+    if statement.best:
+        maxima = [task.sense is Sense.MAX for task in case.tasks]
+        pairs = zip(maxima, names, statement.best, strict=True)
+        names = [f"({exact(best)} - {name})" if is_max else f"({name} - {exact(best)})" for is_max, name, best in pairs]
+    elif case.tasks[0].sense is Sense.MAX:
+        return f"the least of {' and '.join(f'{name} / {w}' for name, w in zip(names, weights, strict=True))}"
+    return f"the largest of {' and '.join(f'{w} {name}' for name, w in zip(names, weights, strict=True))}"
+
+
+def _pose_words(case: Case) -> str:
+    """Return how F is taken over the poses of a case; empty for one pose."""
+    over = {OverPoses.SUM: "summed over", OverPoses.MEAN: "in the mean over", OverPoses.WORST: "at the worst of"}
+    return f", {over[case.over_poses]} {case.pose_count} poses" if case.pose_count > 1 else ""
+
+
+def outward(value: float, *, up: bool) -> str:
+    """Return a proven bound as text, rounded to the side on which it holds."""
+    context = Context(prec=_DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    return f"{float(context.create_decimal_from_float(value)):.{_DIGITS}g}"
+
+
+def exact(value: float) -> str:
+    """Return a number of a premise as text that is this double and no other."""
+    return repr(value).removesuffix(".0")

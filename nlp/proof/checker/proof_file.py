@@ -1,0 +1,306 @@
+"""Proofs as files: JSON of one format, whatever is proved.
+
+A file holds the case as text, what the proof says of the premises, and its claims. A claim has a name, a reason, and
+what the reason needs: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check
+takes all premises from the case and from its own arguments; those in the file tell a proof for other ones at once.
+
+A proof of a program's optimum has one claim. A claim is proved by one of
+
+    program     a tree of :mod:`.tree` for a program, whose value is at most the bound wherever it is feasible
+    regular     a tree of boxes of poses, each regular or outside of the workspace
+    singular    the opposite: two poses at which the determinant of the rows has opposite signs
+    boxes       a tree of boxes on each of which a number is not below (above) its bound
+    lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
+
+and, where it is about every machine within a tolerance on joint centres, also by
+
+    one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
+    singular machine    the opposite: a pose, and a machine at which the determinant has another sign there
+
+Lemmas are claims of their own that others rest on: the shortest lengths of the exact machine's legs, and those of
+``one machine``. Each is proved by a tree for a program.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from ...case.pose import Free
+from ...case.workspace import Workspace
+from ...errors import InputError
+from ...system.strictjson import json_tree, object_of
+
+_FORMAT = "screwsynth-proof"
+_VERSION = 4
+#: Formats of earlier versions.
+_EARLIER = ("screwsynth-workspace-proof",)
+#: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
+_LARGEST_TREE = 2**28
+#: Name of the only claim of a proof about a program.
+_OPTIMUM = "optimum"
+
+
+class ProofError(InputError):
+    """A text that is no proof, or a proof that does not hold for the case."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Which of a case's programs a proof is about; everything else follows from the case.
+
+    Attributes:
+        is_minimum: whether the smallest F of a task that the case maximises is bounded.
+        in_home_mode: whether home's working mode alone is covered.
+        best: of tasks of both senses in their worst case, the value of F of each from which its loss is measured.
+    """
+
+    is_minimum: bool = False
+    in_home_mode: bool = False
+    best: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class ProofClaim:
+    """A claim that is proved.
+
+    Attributes:
+        name: in the words of the command.
+        sense: ``min`` or ``max`` for a number over a workspace, else empty.
+        reason: how it is proved, in the words of this module's docstring.
+        bound: bound of the number in the unit of its search: of the maximised value of a program (minus F for a
+            minimum), of a distance, of a singular value or a condition number, or, for errors of a pose, of their part
+            of first order for legs that are one unit of length off; None without a number, and for a program without a
+            feasible point.
+        graph: fingerprint of the program; empty for other reasons.
+        tree: nodes in bytes; empty for a claim without a tree.
+        sides: two poses (6,) with determinants of opposite signs; two directions (3,) of a leg, in the world frame and
+            in the platform frame; a pose (6,) and joint centres (12, 3); empty for other reasons.
+    """
+
+    name: str
+    sense: str
+    reason: str
+    bound: float | None = None
+    graph: str = ""
+    tree: bytes = b""
+    sides: tuple[tuple[float, ...], ...] = ()
+
+    def as_data(self) -> dict[str, object]:
+        """Return the JSON object."""
+        text = base64.b64encode(zlib.compress(self.tree, 9)).decode("ascii")
+        return {**vars(self), "tree": text, "digest": hashlib.sha256(self.tree).hexdigest()}
+
+
+@dataclass(frozen=True)
+class Unproved:
+    """A claim without a proof, and the reason."""
+
+    name: str
+    sense: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A proof about a program of a case.
+
+    Attributes:
+        case: the case file's text.
+        name: the case's name.
+        statement: the program of the case that it is about.
+        graph: fingerprint of the program's expressions and bounds.
+        bound: upper bound of the maximised value (minus F for a minimum) over the feasible part of the root; None
+            where there is no feasible point.
+        tree: the nodes' bytes.
+    """
+
+    case: str
+    name: str
+    statement: Statement
+    graph: str
+    bound: float | None
+    tree: bytes
+
+    def as_text(self) -> str:
+        """Return the JSON text."""
+        claim = ProofClaim(_OPTIMUM, "", "program", self.bound, self.graph, self.tree)
+        return _text(self.name, self.case, "program", asdict(self.statement), [claim])
+
+
+@dataclass(frozen=True)
+class WorkspaceProof:
+    """Proofs of claims about a workspace.
+
+    Attributes:
+        case: the case file's text.
+        name: the case's name.
+        workspace: the poses, from :func:`workspace_numbers`.
+        legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
+        quantities: measures that were asked for.
+        leg_error: largest error of a leg's length.
+        claims: the claims that are proved.
+        unproved: the others.
+        tolerance: largest error of each joint centre in the machines that the claims are about; 0 for the exact one.
+        lemmas: claims that others rest on.
+    """
+
+    case: str
+    name: str
+    workspace: object
+    legs: tuple[tuple[float, ...], ...]
+    quantities: tuple[str, ...]
+    leg_error: float
+    claims: tuple[ProofClaim, ...]
+    unproved: tuple[Unproved, ...]
+    tolerance: float = 0.0
+    lemmas: tuple[ProofClaim, ...] = ()
+
+    def as_text(self) -> str:
+        """Return the JSON text."""
+        premises = _Premises(self.workspace, self.legs, self.quantities, self.leg_error, self.tolerance)
+        return _text(self.name, self.case, "workspace", vars(premises), self.claims, self.lemmas, self.unproved)
+
+
+def workspace_numbers(workspace: Workspace) -> object:
+    """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
+    position, angles = (
+        tuple((each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in values)
+        for values in (workspace.position, workspace.turns.angles)
+    )
+    return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
+
+
+def _text(
+    name: str,
+    case: str,
+    about: str,
+    premises: object,
+    claims: Sequence[ProofClaim],
+    lemmas: Sequence[ProofClaim] = (),
+    unproved: Sequence[Unproved] = (),
+) -> str:
+    """Return the JSON text of a proof."""
+    content = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "name": name,
+        "case": case,
+        "about": about,
+        "premises": premises,
+        "claims": [each.as_data() for each in claims],
+        "lemmas": [each.as_data() for each in lemmas],
+        "not_on_paper": [vars(each) for each in unproved],
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+@dataclass(frozen=True)
+class _Premises:
+    """What a proof about a workspace says of its premises, as its file has it."""
+
+    workspace: object
+    legs: tuple[tuple[float, ...], ...]
+    quantities: tuple[str, ...]
+    leg_error: float
+    joint_centre: float
+
+
+@dataclass(frozen=True)
+class _ClaimTable:
+    """A claim as the file has it."""
+
+    name: str
+    sense: str
+    reason: Literal["program", "regular", "singular", "boxes", "lengths", "one machine", "singular machine"]
+    bound: float | None
+    graph: str
+    sides: tuple[tuple[float, ...], ...]
+    digest: str
+    tree: str
+
+
+@dataclass(frozen=True)
+class _File:
+    """A proof as its file has it."""
+
+    format: Literal["screwsynth-proof"]
+    version: int
+    name: str
+    case: str
+    about: Literal["program", "workspace"]
+    premises: object
+    claims: tuple[_ClaimTable, ...]
+    lemmas: tuple[_ClaimTable, ...]
+    not_on_paper: tuple[Unproved, ...]
+
+
+def read_proof(text: str, source: str) -> Proof | WorkspaceProof:
+    """Read a proof from its JSON text.
+
+    Args:
+        text: the JSON text.
+        source: its name, for messages.
+
+    Raises:
+        ProofError: the text is no proof of this version, a value is not allowed, or a tree is damaged.
+    """
+    try:
+        table = json_tree(text)
+        if isinstance(table, dict) and (
+            table.get("format") in _EARLIER or (table.get("format") == _FORMAT and table.get("version") != _VERSION)
+        ):
+            raise ProofError(f"{source}: is no proof of this version, {_VERSION}: write it again")
+        found = object_of(_File, table)
+        if found.about == "program":
+            statement = object_of(Statement, found.premises, "premises")
+            if len(found.claims) != 1 or found.claims[0].reason != "program" or found.lemmas or found.not_on_paper:
+                raise ValueError("a proof about a program has one claim")
+        else:
+            premises = object_of(_Premises, found.premises, "premises")
+    except ValueError as error:
+        raise ProofError(f"{source}: is no proof as certify and workspace write it: {error}") from None
+    claims, lemmas = (tuple(_claim_of(each, source) for each in some) for some in (found.claims, found.lemmas))
+    if found.about == "program":
+        return Proof(found.case, found.name, statement, claims[0].graph, claims[0].bound, claims[0].tree)
+    return WorkspaceProof(
+        case=found.case,
+        name=found.name,
+        workspace=_tuples(premises.workspace),
+        legs=premises.legs,
+        quantities=premises.quantities,
+        leg_error=premises.leg_error,
+        claims=claims,
+        unproved=found.not_on_paper,
+        tolerance=premises.joint_centre,
+        lemmas=lemmas,
+    )
+
+
+def _tuples(value: object) -> object:
+    """Return lists within lists as tuples."""
+    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
+
+
+def _claim_of(table: _ClaimTable, source: str) -> ProofClaim:
+    """Return a claim with its tree unpacked.
+
+    Raises:
+        ProofError: the text is no such tree, or the digest is another.
+    """
+    fault = f"{source}: is damaged at '{table.name}'"
+    try:
+        reader = zlib.decompressobj()
+        tree = reader.decompress(base64.b64decode(table.tree, validate=True), _LARGEST_TREE)
+    except (ValueError, zlib.error):
+        raise ProofError(f"{fault}: its tree cannot be unpacked") from None
+    if not reader.eof or reader.unused_data:
+        raise ProofError(f"{fault}: its tree is incomplete, or larger than {_LARGEST_TREE // 2**20} MB")
+    if table.digest != hashlib.sha256(tree).hexdigest():
+        raise ProofError(f"{fault}: its digest is not that of its tree")
+    return ProofClaim(table.name, table.sense, table.reason, table.bound, table.graph, tree, table.sides)

@@ -1,0 +1,344 @@
+"""Check of a proof on paper, without trust in who made it.
+
+Everything is built again from the case: the box of poses, the joint centres, the expressions of numbers, and the claims
+that there must be. Trees of ``certify`` are checked by its checker. Every leaf of the other trees is shown again with
+balls and slopes (:mod:`.ballslopes`), and signs of determinants with fractions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import SX
+
+from .....models import Dimension
+from ....case.case import Case
+from ....case.task import Sense
+from ....errors import ScrewsynthError
+from ....program.layout import Layout
+from ...statement.machine import check_leg_error, legs_of, workspace_of_case
+from ...statement.posed_layout import extreme_program
+from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
+from ..proofcheck import check_proof
+from .anyrobot.rankofrobot import rank_claim
+from .anyrobot.robotclaims import robot_claims
+from .anyrobot.signchange import show_sign_change
+from .ballrows import Joints
+from .built.built import Built
+from .clearanceclaim import ClearanceClaim
+from .comparing import hold_premises, keep_limit
+from .errorclaim import ErrorClaim, whole_errors
+from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
+from .pieces import BoxClaim, show
+from .poseroot import COORDINATES, PoseRoot, pose_root
+from .rankclaim import RankClaim
+from .singularclaim import SingularClaim
+from .tree import read_leaves
+
+#: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
+_ROUNDING = 1e-15
+#: Reason that each kind of claim must have.
+_REASONS = {
+    "regular": ("regular", "singular", "singular machine"),
+    "constraints": ("regular",),
+    "number": ("program",),
+    "stroke": ("lengths", "one machine"),
+    "dead length": ("lengths", "one machine"),
+}
+#: Callback with the name of a claim, the number of claims checked, and of all.
+PaperProgress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class CheckedClaim:
+    """A claim that holds.
+
+    Attributes:
+        name, sense: of the claim.
+        bound: proven bound of the number as it reads in results, radians for angles; None without a number.
+        limit: limit of the case that it keeps, read in the same way; None without one.
+        is_refuted: whether the opposite is shown: a singular pose.
+        by_machine: whether that is a pose of another machine within the tolerance.
+        dimension: of the number.
+    """
+
+    name: str
+    sense: str
+    dimension: Dimension = Dimension.NUMBER
+    bound: float | None = None
+    limit: float | None = None
+    is_refuted: bool = False
+    by_machine: bool = False
+
+
+@dataclass(frozen=True)
+class VerifiedWorkspace:
+    """A proof that holds.
+
+    Attributes:
+        claims: what it proves.
+        unproved: claims of the case that it does not prove, with the reasons that the file gives.
+        numbers_at: assemblies that the claims about numbers cover; empty for a robot without loops.
+        leaves: number of claims about boxes in it.
+        pieces: number of boxes that were evaluated to show them.
+    """
+
+    claims: tuple[CheckedClaim, ...]
+    unproved: tuple[Unproved, ...]
+    numbers_at: str
+    leaves: int
+    pieces: int
+
+
+def check_workspace_proof(
+    proof: WorkspaceProof, case: Case, progress: PaperProgress | None = None, *, leg_error: float = 0.0
+) -> VerifiedWorkspace:
+    """Check a proof of a workspace, by showing each of its claims again.
+
+    Args:
+        proof: the proof.
+        case: the case that it is about.
+        progress: called before each claim.
+        leg_error: largest error of a leg's length, length.
+
+    Raises:
+        ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
+        CaseError: the case has no workspace, or a free dimension.
+        InputError: the error of legs is negative, or the robot is not six straight legs.
+    """
+    if not proof.claims:
+        raise ProofError("the proof claims nothing")
+    check_leg_error(case, leg_error)
+    checker = _Checker(proof, case, leg_error)
+    given = {(each.name, each.sense): each for each in proof.claims}
+    others = [(each.name, each.sense) for each in proof.unproved]
+    expected = {each.key: each for each in checker.expected}
+    # What a proof does not claim may be more than the claims that have proofs at all.
+    named = [*given, *(key for key in others if key in expected)]
+    if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
+        wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
+        name = " ".join(min(wrong)).strip() if wrong else "one of them"
+        raise ProofError(f"the claims are not those of the case, each once: see {name}")
+    claims = []
+    for done, (key, each) in enumerate(expected.items()):
+        if key not in given:
+            continue
+        if progress is not None:
+            progress(each.name, done, len(expected))
+        try:
+            claims.append(checker.check(each, given[key]))
+        except ProofError as error:
+            raise ProofError(f"{' '.join(key).strip()}: {error}") from None
+    return VerifiedWorkspace(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
+
+
+class _Checker:
+    """A check of claims one after the other; later ones use the bounds of earlier ones.
+
+    Args:
+        proof: the proof.
+        case: the case.
+        leg_error: largest error of a leg's length, length.
+
+    Raises:
+        ProofError: the proof is for another workspace, other joint centres or other errors.
+    """
+
+    def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
+        workspace = workspace_of_case(case)
+        self._case, self._proof, self._legs = case, proof, legs_of(case)
+        hold_premises(case, workspace, self._legs, leg_error, proof)
+        if self._legs is None and case.joint_centre_tolerance and proof.claims:
+            raise ProofError("claims about every machine within a tolerance have no proof for this robot")
+        robot = robot_claims(case, workspace, {each.name for each in proof.claims})
+        self._layout: Layout = robot.layout
+        self._model = robot.model
+        self._root: PoseRoot = pose_root(workspace)
+        self._tolerance = case.joint_centre_tolerance or 0.0
+        self._eps = leg_error_of(case, leg_error)
+        self.numbers_at = robot.numbers_at
+        self._bounds: dict[tuple[str, str], float] = {}
+        self.leaves = self.pieces = 0
+        try:
+            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, leg_error, robot.more)
+        except ProofError:
+            raise
+        except ScrewsynthError as error:
+            raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
+        self._built = self._built_machines()
+
+    def _built_machines(self) -> Built | None:
+        """Return all machines within the tolerance; None for the exact one."""
+        if self._legs is None or not self._tolerance:
+            return None
+        lemmas = {(each.name, each.sense): each for each in self._proof.lemmas}
+        return Built(self._layout, self._root, self._legs, lemmas, self._bound_of)
+
+    def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check one claim.
+
+        Raises:
+            ProofError: it could not be shown.
+        """
+        if given.reason not in _REASONS.get(each.kind, ("boxes",)):
+            raise ProofError(f"'{given.reason}' is no reason of this claim")
+        if self._tolerance and self._built is None:
+            raise ProofError("errors of joint centres are covered for six straight legs alone")
+        if each.kind in ("regular", "constraints"):
+            return self._check_rank(each, given)
+        if given.bound is None or not math.isfinite(given.bound):
+            raise ProofError("the claim has no bound")
+        if each.kind == "number":
+            return self._check_program(each, given)
+        if each.kind in ("stroke", "dead length"):
+            return self._check_stroke(each, given)
+        if each.kind == "error":
+            return self._check_error(each, given)
+        bound = float(given.bound)
+        keep_limit(each, bound)
+        claim: BoxClaim
+        if each.kind == "clearance":
+            # Two legs that are moved towards each other are nearer by twice the tolerance.
+            nearer = 2 * self._tolerance
+            least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
+            claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), least)
+        else:
+            is_condition = each.kind == "condition"
+            change = 0.0 if self._built is None else self._built.change(self._joints, each.length)
+            claim = SingularClaim(
+                self._root, self._joints, each.length, bound, is_condition=is_condition, change=change
+            )
+        self._show(claim, given.tree)
+        dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
+        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
+
+    @property
+    def _joints(self) -> Joints:
+        """Joint centres of the case's legs.
+
+        Raises:
+            ProofError: the robot is not six straight legs.
+        """
+        if self._legs is None:
+            raise ProofError("the case's robot is not six straight legs")
+        return Joints(np.array(self._legs.base), np.array(self._legs.platform))
+
+    def _show(self, claim: BoxClaim, tree: bytes) -> None:
+        """Show a claim on every leaf of a tree."""
+        leaves = read_leaves(tree, self._root.lower, self._root.upper)
+        self.leaves += len(leaves.lower)
+        self.pieces += show(claim, self._root, leaves)
+
+    def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check that J, or the constraint wrenches, keep their rank, or that J does not."""
+        if given.reason == "singular":
+            return self._check_sides(each, given)
+        if given.reason == "singular machine":
+            return self._check_machine(each, given)
+        if self._legs is None:
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            self._show(robot, given.tree)
+            robot.finish()
+        else:
+            self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
+        return CheckedClaim(each.name, each.sense)
+
+    def _check_sides(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check that two poses of the workspace have determinants of opposite signs."""
+        sides = [np.array(side, dtype=float) for side in given.sides]
+        if len(sides) != 2 or any(side.shape != (COORDINATES,) or not np.isfinite(side).all() for side in sides):
+            raise ProofError("the claim has no two poses")
+        if not all(self._root.holds(side) for side in sides):
+            raise ProofError("a pose is not one of the workspace")
+        if self._legs is None:
+            robot = rank_claim(self._case, self._model, self._root, each.name)
+            show_sign_change(robot, self._root, sides[0], sides[1])
+            return CheckedClaim(each.name, each.sense, is_refuted=True)
+        claim = RankClaim(self._root, self._joints)
+        if claim.sign_at(sides[0]) * claim.sign_at(sides[1]) >= 0:
+            raise ProofError("the determinant has not opposite signs at the two poses")
+        return CheckedClaim(each.name, each.sense, is_refuted=True)
+
+    def _check_machine(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check that a machine within the tolerance is singular at a pose of the workspace."""
+        if self._built is None:
+            raise ProofError("the claim is about the exact machine")
+        self._built.refuse_unless_singular(self._root, given.sides)
+        return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
+
+    def _bound_of(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout | None = None) -> float:
+        """Return the bound of an expression that a tree of ``certify`` proves, in a layout or that of the case."""
+        if given.reason != "program" or given.bound is None or not math.isfinite(given.bound):
+            raise ProofError("the claim has no bound")
+        nlp = extreme_program(layout or self._layout, expression, sense)
+        checked = check_proof(Proof("", given.name, Statement(), given.graph, given.bound, given.tree), nlp)
+        self.leaves += checked.leaves
+        self.pieces += checked.pieces
+        return -nlp.sign * checked.bound
+
+    def _check_program(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check a tree of ``certify`` for a number."""
+        claim = each.claim
+        if claim is None:
+            raise ProofError("the claim has no number")
+        layout = each.layout or self._layout
+        read = claim.reading.from_value
+        if self._built is None:
+            bound = value = self._bound_of(claim.expression, claim.sense, given, layout)
+            shown = read(bound)
+        else:
+            number = self._built.number(claim)
+            bound = self._bound_of(number.expression, claim.sense, given, layout)
+            shown, value = self._built.shown(claim, number, bound)
+        keep_limit(each, value)
+        self._bounds[each.key] = bound
+        limit = None if claim.limit is None else read(claim.limit)
+        return CheckedClaim(each.name, each.sense, claim.reading.dimension, shown, limit)
+
+    def _length(self, leg: str, sense: str) -> float:
+        """Return the proven shortest or longest length of a leg of the exact machine.
+
+        Raises:
+            ProofError: there is no proof of it.
+        """
+        key = f"leg_length limb {leg}", sense
+        if key not in self._bounds:
+            raise ProofError(f"the lengths of limb {leg} have no proof")
+        outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
+        return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
+
+    def _check_stroke(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check a limit on a telescoping leg from the lengths of the leg."""
+        leg, is_stroke = each.legs[0], each.kind == "stroke"
+        if given.reason == "one machine":
+            if self._built is None:
+                raise ProofError("the claim is about the exact machine")
+            bound = self._built.stroke(each.name, leg, each.sense, (1.0, -1.0) if is_stroke else (-1.0, 2.0), given)
+        else:
+            name = self._case.model.legs[leg].name
+            short = self._length(name, "min") - 2 * self._tolerance
+            long = self._length(name, "max") + 2 * self._tolerance
+            off = 8 * _ROUNDING * long
+            bound = long - short + off if is_stroke else 2 * short - long - off
+        keep_limit(each, bound)
+        return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
+
+    def _check_error(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
+        firsts = {one.name: one.bound for one in self._proof.claims if one.name in ERRORS}
+        position, rotation = (firsts.get(name) for name in ERRORS)
+        if position is None or rotation is None:
+            raise ProofError("one of the two errors has no proof")
+        is_rotation = each.name == ERRORS[1]
+        most = rotation if is_rotation else position
+        self._show(ErrorClaim(self._root, self._joints, most, is_rotation=is_rotation), given.tree)
+        lengths = (self._length(leg.name, "min") for leg in self._case.model.legs)
+        shortest = min(lengths) if self._built is None else self._built.shortest
+        reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)
+        whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
+        if not math.isfinite(whole):
+            raise ProofError("the errors are too large for a bound of their part of second order")
+        return CheckedClaim(each.name, each.sense, Dimension.ANGLE if is_rotation else Dimension.LENGTH, whole)

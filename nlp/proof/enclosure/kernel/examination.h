@@ -1,0 +1,190 @@
+/* The examination of one box; bounding.py and limbs/models.py. */
+#ifndef EXAMINATION_H
+#define EXAMINATION_H
+
+#include <Python.h>
+#include "contraction.h"
+
+#define WORTH 0.1
+#define LINEAR 0.3
+
+enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
+
+/* Arrays of results for B boxes, as in examination.py; the ends and reasons of variable i begin at i * B. */
+typedef struct {
+    Py_ssize_t B;
+    const double *lower, *upper;
+    int *verdict, *reason, *split, *cut_lower, *cut_upper;
+    double *bound, *value, *left_lower, *left_upper, *centre;
+    int shared;     /* number of the first variables that other limbs have too */
+    double *models; /* of the Lagrangian and of the function's gradient, limbs/models.py; NULL without them */
+    const double *least; /* (B) points with lesser values do not matter; NULL where all do */
+} Report;
+
+static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
+
+/* Writes row after row of a box's model: limbs/models.py names them. */
+static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
+{
+    int n = x->n, J = x->J, R = x->R;
+    double *to = report->models + at;
+    const double *vectors[] = {x->qb, x->qw, x->qlo, x->qhi};
+    Py_ssize_t B = report->B;
+    int holds = 1; /* whether every condition holds on the whole box */
+    for (int r = J; r < R; r++)
+        holds = holds && form->equation[r] != 1 && x->high[r] < 0;
+    *to = defined + 2 * holds, *(to += B) = x->q_middle, *(to += B) = x->q_rounding;
+    for (int k = 0; k < 4; k++)
+        for (int i = 0; i < n; i++)
+            *(to += B) = vectors[k][i];
+    for (int i = 0; i < n * n; i++)
+        *(to += B) = x->H[i];
+    for (int i = 0; i < report->shared; i++) {
+        double low = INFINITY, high = -INFINITY;
+        int up = 0, down = 0;
+        for (int r = 0; r < R; r++) {
+            double least = x->grad_lo[r * n + i], most = x->grad_hi[r * n + i];
+            if (r < J)
+                low = smaller(low, least), high = larger(high, most);
+            else if (form->depends[r * n + i] && !(x->high[r] < 0))
+                up |= form->equation[r] == 1 || !(most < 0), down |= form->equation[r] == 1 || !(least > 0);
+        }
+        *(to += B) = low, *(to += B) = high, *(to += B) = up, *(to += B) = down;
+    }
+}
+
+/* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results.
+ *
+ * With scores, those of the variables from the first pass, x holds the functions alone: returns whether the gradients of
+ * the conditions are needed too, which is where the functions rise along a variable. */
+static int judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
+                 double threshold, int passed, const double *scores)
+{
+    int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0, defined = 1, impossible = -1;
+    Py_ssize_t B = report->B;
+    double bound = passed ? report->bound[at] : INFINITY, value = passed ? report->value[at] : INFINITY;
+    for (int r = 0; r < R; r++) {
+        double steep = 0.0, middle = x->c[r], error = x->s[r];
+        for (int i = 0; i < n; i++)
+            steep += larger(fabs(x->slope_lo[r * n + i]), fabs(x->slope_hi[r * n + i]));
+        steep = steep * (1 + 64 * ULP) + TINY;
+        double ends = ULP * fabs(middle), spread = (error + steep) * (1 + ULP) + ends;
+        double high = middle + (spread * (1 + ULP) + ends), low = middle - (spread * (1 + ULP) + ends);
+        x->high[r] = high < x->hi[r] ? high : x->hi[r];
+        x->low[r] = low > x->lo[r] ? low : x->lo[r];
+        if (r < J) {
+            defined = defined && error < INFINITY;
+            bound = smaller(bound, x->high[r]);
+            value = passed ? value : smaller(value, middle - error);
+        } else {
+            if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] == 1 && x->high[r] < 0)))
+                impossible = r;
+            if (!passed && !(middle + error <= 0))
+                value = -INFINITY;
+        }
+    }
+    for (int i = 0; i < n && defined && scores; i++) {
+        int rises = report->upper[i * B + at] > report->lower[i * B + at], falls = rises;
+        for (int r = 0; r < J; r++)
+            rises = rises && x->grad_lo[r * n + i] > 0, falls = falls && x->grad_hi[r * n + i] < 0;
+        if (rises || falls)
+            return 1;
+    }
+    choose_multipliers(x, form->equation, report->shared);
+    combine(x);
+    if (report->models)
+        write_model(form, x, report, at, defined);
+    double lagrangian = report->models ? INFINITY : quadratic_bound(x);
+    bound = lagrangian < bound ? lagrangian : bound;
+    if (!defined)
+        bound = passed ? report->bound[at] : INFINITY;
+
+    for (int i = 0; i < n; i++) {
+        Py_ssize_t end = i * B + at;
+        x->e_lo[i] = passed ? report->left_lower[end] : -1.0, x->e_hi[i] = passed ? report->left_upper[end] : 1.0;
+        x->why_lo[i] = passed ? report->cut_lower[end] : -2, x->why_hi[i] = passed ? report->cut_upper[end] : -2;
+        report->left_lower[end] = report->lower[end], report->left_upper[end] = report->upper[end];
+        report->cut_lower[end] = report->cut_upper[end] = -2;
+        report->centre[end] = centre[i];
+    }
+    /* Monotonicity. */
+    for (int i = report->shared; i < n && defined; i++)
+        for (int side = 1; side >= -1; side -= 2) {
+            Py_ssize_t end = i * B + at;
+            int applies = report->upper[end] > report->lower[end] && verdict == OPEN;
+            for (int r = 0; r < R && applies; r++) {
+                double low = x->grad_lo[r * n + i], high = x->grad_hi[r * n + i];
+                if (r < J)
+                    applies = side > 0 ? low > 0 : high < 0;
+                else if (form->depends[r * n + i] && !(x->high[r] < 0) && r != impossible)
+                    applies = form->equation[r] != 1 && (side > 0 ? high < 0 : low > 0);
+            }
+            if (!applies)
+                continue;
+            double whole = side > 0 ? form->high[i] : form->low[i];
+            if ((side > 0 ? report->upper[end] : report->lower[end]) != whole)
+                verdict = MONOTONE, reason = i;
+            else if (side > 0)
+                report->left_lower[end] = whole, report->cut_lower[end] = -1;
+            else
+                report->left_upper[end] = whole, report->cut_upper[end] = -1;
+        }
+    /* Contraction. */
+    for (int r = 0; r < R && defined; r++) {
+        if (r < J || form->equation[r] == 1)
+            reach_expression(x, r, 1.0, r < J ? threshold : 0.0);
+        if (r >= J)
+            reach_expression(x, r, -1.0, 0.0);
+    }
+    if (R > 1 && defined)
+        reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, x->qw, x->q_rounding, threshold, 0);
+    int emptied = -1;
+    for (int i = 0; i < n && defined; i++) {
+        Py_ssize_t end = i * B + at;
+        double *lo = report->left_lower + end, *hi = report->left_upper + end;
+        double worth = WORTH * (*hi - *lo), margin = (fabs(centre[i]) + radius[i]) * (4 * ULP);
+        double new_lo = centre[i] + radius[i] * x->e_lo[i] - margin, new_hi = centre[i] + radius[i] * x->e_hi[i] + margin;
+        int collapsed = report->cut_lower[end] == -1 || report->cut_upper[end] == -1;
+        if (x->why_lo[i] >= 0 && !collapsed && new_lo - *lo > worth)
+            *lo = new_lo, report->cut_lower[end] = x->why_lo[i];
+        if (x->why_hi[i] >= 0 && !collapsed && *hi - new_hi > worth)
+            *hi = new_hi, report->cut_upper[end] = x->why_hi[i];
+        if (emptied < 0 && *lo > *hi)
+            emptied = i;
+    }
+    if (emptied >= 0)
+        verdict = EMPTIED, reason = emptied;
+    if (impossible >= 0)
+        verdict = INFEASIBLE, reason = impossible;
+    if (bound <= threshold)
+        verdict = BOUNDED, reason = 0;
+    /* The variable to bisect next. */
+    double most = -1.0;
+    int split = 0, finite = 1, flat = 1;
+    for (int i = 0; i < n; i++) {
+        Py_ssize_t end = i * B + at;
+        double sum = x->qw[i], width = report->upper[end] - report->lower[end];
+        double left = report->left_upper[end] - report->left_lower[end];
+        for (int j = 0; j < n; j++)
+            sum += fabs(x->H[j * n + i]);
+        sum = scores ? scores[i] + x->qw[i] : LINEAR * fabs(x->qb[i]) + sum;
+        x->left[i] = sum * (left / (width > 0 ? width : 1.0));
+        finite = finite && isfinite(x->left[i]);
+        flat = flat && !(x->left[i] > 0);
+    }
+    for (int i = 0; i < n; i++) {
+        double left = report->left_upper[i * B + at] - report->left_lower[i * B + at];
+        double score = finite && !flat ? x->left[i] : left / (form->high[i] - form->low[i]);
+        x->left[i] = score = left > 0 ? score : -1.0;
+        most = score > most ? score : most;
+    }
+    /* The first of the largest up to rounding, as in bounding.py. */
+    for (int i = n - 1; i >= 0; i--)
+        if (x->left[i] >= (1 - TIE) * most)
+            split = i;
+    report->verdict[at] = verdict, report->reason[at] = reason, report->split[at] = split;
+    report->bound[at] = bound, report->value[at] = value;
+    return 0;
+}
+
+#endif

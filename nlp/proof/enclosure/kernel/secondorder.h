@@ -1,0 +1,349 @@
+/* The interpreter of a tape in forms of second order over LANES boxes; second_order.py. */
+#ifndef SECONDORDER_H
+#define SECONDORDER_H
+
+#include "enclosure.h"
+
+/* c + a e + Q(e) + [p, q] +- s, with Q's range [sl, sh] and the sum of |a|. The n coefficients a follow in memory, then
+ * those of e_i e_j, i <= j, row by row. */
+typedef struct {
+    Lane c, p, q, s, lo, hi, rad, sl, sh;
+} Form2;
+
+static size_t pairs_of(int n) { return (size_t)n * ((size_t)n + 1) / 2; }
+static size_t stride_of_form2(int n) { return sizeof(Form2) / sizeof(double) + ((size_t)n + pairs_of(n)) * LANES; }
+static inline Form2 *form2_of(Store s, int i) { return (Form2 *)(s.memory + (size_t)i * s.stride); }
+static inline Lane *terms_of_form2(Form2 *v) { return (Lane *)(v + 1); }
+
+/* Place of the coefficient of e_i e_j, i <= j, less j. */
+static inline int row_of(int n, int i) { return i * n - i * (i + 1) / 2; }
+
+/* Sums of the sizes of the coefficients of a (other's Q) + (other's a) Q, monomial by monomial; with one = other, of
+ * 2 a Q. */
+INLINE void cubic_sizes(int n, int first, int last, const Lane *a, const Lane *Q, const Lane *b, const Lane *P, int own,
+                        double *restrict out)
+{
+    EACH out[l] = 0.0;
+    for (int i = first; i < last; i++) {
+        const Lane *Qi = Q + row_of(n, i), *Pi = P + row_of(n, i);
+        if (own)
+            EACH out[l] += fabs(2 * (a[i][l] * Q[row_of(n, i) + i][l]));
+        else
+            EACH out[l] += fabs(a[i][l] * Pi[i][l] + b[i][l] * Qi[i][l]);
+        for (int j = i + 1; j < last; j++) {
+            const Lane *Qj = Q + row_of(n, j), *Pj = P + row_of(n, j);
+            if (own)
+                EACH out[l] += fabs(2 * (a[i][l] * Qi[j][l] + a[j][l] * Qi[i][l])) +
+                               fabs(2 * (a[i][l] * Qj[j][l] + a[j][l] * Qi[j][l]));
+            else
+                EACH out[l] += fabs((a[i][l] * Pi[j][l] + a[j][l] * Pi[i][l]) + (b[i][l] * Qi[j][l] + b[j][l] * Qi[i][l])) +
+                               fabs((a[i][l] * Pj[j][l] + a[j][l] * Pi[j][l]) + (b[i][l] * Qj[j][l] + b[j][l] * Qi[j][l]));
+            for (int k = j + 1; k < last; k++)
+                if (own)
+                    EACH out[l] += fabs(2 * (a[i][l] * Qj[k][l] + a[j][l] * Qi[k][l] + a[k][l] * Qi[j][l]));
+                else
+                    EACH out[l] += fabs((a[i][l] * Pj[k][l] + a[j][l] * Pi[k][l] + a[k][l] * Pi[j][l]) +
+                                        (b[i][l] * Qj[k][l] + b[j][l] * Qi[k][l] + b[k][l] * Qi[j][l]));
+        }
+    }
+}
+
+/* Writes a value: ranges of its parts, poison without a finite form, and the interval with the form's range. */
+INLINE void settle2(Form2 *restrict v, int n, int first, int last, double slack, const Result *restrict from,
+                    Lane *restrict t)
+{
+    Lane *terms = terms_of_form2(v), rad, low, high;
+    double grown = 1 + slack;
+    size_t pairs = pairs_of(n);
+    int all = 1;
+    EACH rad[l] = low[l] = high[l] = 0.0;
+    for (int i = first; i < last; i++) {
+        const Lane *row = t + n + row_of(n, i);
+        EACH
+        {
+            double own = row[i][l];
+            rad[l] += fabs(t[i][l]);
+            low[l] += smaller(own, 0.0), high[l] += larger(own, 0.0);
+        }
+        for (int j = i + 1; j < last; j++)
+            EACH
+            {
+                double size = fabs(row[j][l]);
+                low[l] -= size, high[l] += size;
+            }
+    }
+    EACH
+    {
+        double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
+        double s = from->s[l] * grown, ends = ULP * fabs(c) + s;
+        double down = (rad[l] - low[l] - p + ends) * grown, up = (rad[l] + high[l] + q + ends) * grown;
+        int good = (down < LARGEST) & (up < LARGEST) & (fabs(c) < LARGEST);
+        double least = c - down, most = c + up;
+        least = least - ULP * fabs(least), most = most + ULP * fabs(most);
+        double lo = from->lo[l] > least ? from->lo[l] : least, hi = from->hi[l] < most ? from->hi[l] : most;
+        all &= good;
+        v->c[l] = good ? c : 0.0, v->rad[l] = good ? rad[l] : 0.0;
+        v->sl[l] = good ? low[l] : 0.0, v->sh[l] = good ? high[l] : 0.0;
+        v->p[l] = good ? p : 0.0, v->q[l] = good ? q : 0.0, v->s[l] = good ? s : INFINITY;
+        v->lo[l] = good ? lo : -INFINITY, v->hi[l] = good ? hi : INFINITY;
+    }
+    if (first == 0 && last == n)
+        memcpy(terms, t, ((size_t)n + pairs) * sizeof(Lane));
+    else {
+        memset(terms, 0, ((size_t)n + pairs) * sizeof(Lane));
+        memcpy(terms + first, t + first, (size_t)(last - first) * sizeof(Lane));
+        for (int i = first; i < last; i++) {
+            int at = n + row_of(n, i);
+            memcpy(terms + at + i, t + at + i, (size_t)(last - i) * sizeof(Lane));
+        }
+    }
+    if (!all)
+        for (size_t i = 0; i < (size_t)n + pairs; i++)
+            EACH terms[i][l] = v->s[l] < INFINITY ? terms[i][l] : 0.0;
+}
+
+/* Half of a function's second derivative at c, from its rule. */
+static double curve_of(int op, Rule rule, double c)
+{
+    switch (op) {
+    case SQRT:
+        return -0.25 * rule.slope / c;
+    case SIN:
+    case COS:
+        return -0.5 * rule.value;
+    case EXP:
+        return 0.5 * rule.value;
+    case LOG:
+        return -0.5 * rule.slope * rule.slope;
+    case ATAN:
+        return -c * rule.slope * rule.slope;
+    default:
+        return 0.0;
+    }
+}
+
+/* Writes the span's linear coefficients t[i] and those of its pairs t[at]. */
+#define EACH_TERM(linear, pair)                                                                                        \
+    for (int i = first; i < last; i++) {                                                                               \
+        EACH t[i][l] = linear;                                                                                         \
+        for (int j = i, at = n + row_of(n, i) + i; j < last; j++, at++)                                                \
+            EACH t[at][l] = pair;                                                                                      \
+    }
+
+WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *centre, Lane *radius, Lane *lower,
+                      Lane *upper, Lane *restrict t)
+{
+    size_t pairs = pairs_of(n), whole = sizeof(Form2) + ((size_t)n + pairs) * sizeof(Lane);
+    /* An operation makes fewer roundings of each of its terms than there are monomials of third order. */
+    double slack = ((double)(n * (n + 1) * (n + 2) / 6) + 16) * ULP;
+    for (int index = 0; index < tape->length; index++) {
+        const int *code = tape->code + 6 * index;
+        int op = code[0], first = code[4], last = code[5];
+        double k = tape->k[index];
+        Form2 *v = form2_of(op == OUTPUT ? out : work, code[1]);
+        if (op == OUTPUT) {
+            memcpy(v, form2_of(work, code[2]), whole);
+            continue;
+        }
+        if (op == INPUT) {
+            memset(v, 0, whole);
+            memcpy(v->c, centre[code[2]], sizeof(Lane));
+            memcpy(v->lo, lower[code[2]], sizeof(Lane));
+            memcpy(v->hi, upper[code[2]], sizeof(Lane));
+            memcpy(v->rad, radius[code[2]], sizeof(Lane));
+            memcpy(terms_of_form2(v)[code[2]], radius[code[2]], sizeof(Lane));
+            continue;
+        }
+        if (op == CONSTANT) {
+            memset(v, 0, whole);
+            EACH v->c[l] = v->lo[l] = v->hi[l] = k;
+            continue;
+        }
+        const Form2 *x = form2_of(work, code[2]), *y = form2_of(work, code[3]);
+        const Lane *ax = (const Lane *)(x + 1), *ay = (const Lane *)(y + 1), *Qx = ax + n, *Qy = ay + n;
+        Lane cubic;
+        Result r;
+        switch (op) {
+        case ADD:
+            EACH_TERM(ax[i][l] + ay[i][l], ax[at][l] + ay[at][l])
+            EACH
+            {
+                double c = x->c[l] + y->c[l], lo = x->lo[l] + y->lo[l], hi = x->hi[l] + y->hi[l];
+                double size = (x->rad[l] + y->rad[l]) + ((x->sh[l] - x->sl[l]) + (y->sh[l] - y->sl[l]));
+                r.c[l] = c, r.p[l] = x->p[l] + y->p[l], r.q[l] = x->q[l] + y->q[l];
+                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + size);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
+            }
+            break;
+        case SUB:
+            EACH_TERM(ax[i][l] - ay[i][l], ax[at][l] - ay[at][l])
+            EACH
+            {
+                double c = x->c[l] - y->c[l], lo = x->lo[l] - y->hi[l], hi = x->hi[l] - y->lo[l];
+                double size = (x->rad[l] + y->rad[l]) + ((x->sh[l] - x->sl[l]) + (y->sh[l] - y->sl[l]));
+                r.c[l] = c, r.p[l] = x->p[l] - y->q[l], r.q[l] = x->q[l] - y->p[l];
+                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + size);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
+            }
+            break;
+        case SHIFT:
+            EACH_TERM(ax[i][l], ax[at][l])
+            EACH
+            {
+                double c = x->c[l] + k, lo = x->lo[l] + k, hi = x->hi[l] + k;
+                r.c[l] = c, r.p[l] = x->p[l], r.q[l] = x->q[l], r.s[l] = x->s[l] + slack * fabs(c);
+                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
+            }
+            break;
+        case SCALE: {
+            double size = fabs(k);
+            EACH_TERM(ax[i][l] * k, ax[at][l] * k)
+            EACH
+            {
+                double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
+                double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down, all = x->rad[l] + (x->sh[l] - x->sl[l]);
+                r.c[l] = c, r.p[l] = k >= 0 ? p : q, r.q[l] = k >= 0 ? q : p;
+                r.s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * (fabs(c) + size * all) + TINY);
+                r.lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
+                r.hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
+            }
+            break;
+        }
+        case MUL:
+            for (int i = first; i < last; i++) {
+                EACH t[i][l] = x->c[l] * ay[i][l] + y->c[l] * ax[i][l];
+                int at = n + row_of(n, i) + i;
+                EACH t[at][l] = (x->c[l] * ay[at][l] + y->c[l] * ax[at][l]) + ax[i][l] * ay[i][l];
+                for (int j = i + 1; j < last; j++) {
+                    at++;
+                    EACH t[at][l] = (x->c[l] * ay[at][l] + y->c[l] * ax[at][l]) + (ax[i][l] * ay[j][l] + ax[j][l] * ay[i][l]);
+                }
+            }
+            cubic_sizes(n, first, last, ax, Qx, ay, Qy, 0, cubic);
+            EACH
+            {
+                double cx = x->c[l], cy = y->c[l], rx = x->rad[l], ry = y->rad[l], px = x->p[l], qx = x->q[l];
+                double py = y->p[l], qy = y->q[l], mx = larger(-px, qx), my = larger(-py, qy);
+                double Sx = larger(-x->sl[l], x->sh[l]), Sy = larger(-y->sl[l], y->sh[l]);
+                double higher = cubic[l] + Sx * Sy + ((rx + Sx) * my + (ry + Sy) * mx + mx * my);
+                double big = fabs(cx) + rx + (x->sh[l] - x->sl[l]) + mx, other = fabs(cy) + ry + (y->sh[l] - y->sl[l]) + my;
+                r.c[l] = cx * cy;
+                r.p[l] = smaller(cx * py, cx * qy) + smaller(cy * px, cy * qx) - higher;
+                r.q[l] = larger(cx * py, cx * qy) + larger(cy * px, cy * qx) + higher;
+                r.s[l] = (big * y->s[l] + other * x->s[l] + x->s[l] * y->s[l]) + (slack * (big * other) + TINY);
+            }
+            interval_product(x->lo, x->hi, y->lo, y->hi, &r);
+            break;
+        case SQUARE:
+            for (int i = first; i < last; i++) {
+                EACH t[i][l] = 2 * x->c[l] * ax[i][l];
+                int at = n + row_of(n, i) + i;
+                EACH t[at][l] = 2 * x->c[l] * ax[at][l] + ax[i][l] * ax[i][l];
+                for (int j = i + 1; j < last; j++) {
+                    at++;
+                    EACH t[at][l] = 2 * x->c[l] * ax[at][l] + 2 * (ax[i][l] * ax[j][l]);
+                }
+            }
+            cubic_sizes(n, first, last, ax, Qx, ax, Qx, 1, cubic);
+            EACH
+            {
+                double c = x->c[l], rad = x->rad[l], p = x->p[l], q = x->q[l], s = x->s[l], m = larger(-p, q);
+                double S = larger(-x->sl[l], x->sh[l]), mixed = cubic[l] + 2 * rad * m;
+                double size = fabs(c) + rad + (x->sh[l] - x->sl[l]) + m;
+                r.c[l] = c * c;
+                r.p[l] = smaller(2 * c * p, 2 * c * q) - mixed;
+                r.q[l] = larger(2 * c * p, 2 * c * q) + (mixed + (S + m) * (S + m));
+                r.s[l] = 2 * size * s + s * s + (slack * (size * size) + TINY);
+                double one = fabs(x->lo[l]), two = fabs(x->hi[l]);
+                double small = one < two ? one : two, large = one < two ? two : one;
+                small = (x->lo[l] <= 0) & (x->hi[l] >= 0) ? 0.0 : small;
+                double lo = small * small, hi = large * large;
+                lo = lo - (lo * ULP + TINY);
+                r.lo[l] = lo > 0.0 ? lo : 0.0, r.hi[l] = hi + (hi * ULP + TINY);
+            }
+            break;
+        case DIV: {
+            Lane ratio, inverse, near, rad, size, low, high;
+            EACH
+            {
+                int positive = y->lo[l] > 0;
+                double close = positive ? y->lo[l] : -y->hi[l], far = positive ? y->hi[l] : -y->lo[l];
+                close = close > 0 ? close : NAN;
+                near[l] = close, inverse[l] = 1.0 / y->c[l], ratio[l] = x->c[l] / y->c[l];
+                double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / close;
+                double least = one < two ? one : two, most = one < two ? two : one;
+                low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
+                rad[l] = size[l] = 0.0;
+            }
+            for (int i = first; i < last; i++)
+                EACH
+                {
+                    t[i][l] = (ax[i][l] - ratio[l] * ay[i][l]) * inverse[l];
+                    rad[l] += fabs(t[i][l]);
+                }
+            for (int i = first; i < last; i++)
+                for (int j = i, at = n + row_of(n, i) + i; j < last; j++, at++)
+                    EACH
+                    {
+                        double crossed = t[i][l] * ay[j][l] + (i == j ? 0.0 : t[j][l] * ay[i][l]);
+                        t[at][l] = ((ax[at][l] - ratio[l] * ay[at][l]) - crossed) * inverse[l];
+                        size[l] += fabs(t[at][l]);
+                    }
+            cubic_sizes(n, first, last, t, t + n, ay, Qy, 0, cubic);
+            EACH
+            {
+                int positive = y->lo[l] > 0;
+                double by = ratio[l], py = y->p[l], qy = y->q[l], my = larger(-py, qy), moved = rad[l] + size[l];
+                double Sy = larger(-y->sl[l], y->sh[l]), higher = cubic[l] + size[l] * Sy + moved * my;
+                double p = x->p[l] - larger(by * py, by * qy) - higher, q = x->q[l] - smaller(by * py, by * qy) + higher;
+                double whole = fabs(by) + moved, ylong = fabs(y->c[l]) + y->rad[l] + (y->sh[l] - y->sl[l]) + my;
+                double xlong = fabs(x->c[l]) + x->rad[l] + (x->sh[l] - x->sl[l]);
+                double s = x->s[l] + whole * y->s[l] + (slack * (xlong + whole * ylong) + TINY * (1 + ylong));
+                r.c[l] = by, r.s[l] = s / near[l] + (slack * whole + TINY);
+                r.p[l] = (positive ? p : -q) / near[l], r.q[l] = (positive ? q : -p) / near[l];
+            }
+            interval_product(x->lo, x->hi, low, high, &r);
+            break;
+        }
+        default: {
+            Lane slopes, curves;
+            cubic_sizes(n, first, last, ax, Qx, ax, Qx, 1, cubic);
+            EACH
+            {
+                Rule rule = rule_of(op, x->c[l], x->lo[l], x->hi[l]);
+                double slope = rule.slope, curve = curve_of(op, rule, x->c[l]), p = x->p[l], q = x->q[l], s = x->s[l];
+                double m = larger(-p, q), S = larger(-x->sl[l], x->sh[l]), rad = x->rad[l];
+                double moved = rad + (x->sh[l] - x->sl[l]) + m, reach = moved + s;
+                double mixed = cubic[l] + 2 * rad * m, square = mixed + (S + m) * (S + m);
+                double rest = reach * reach * (reach / 6), least = -rest, most = rest;
+                if (op != SIN && op != COS) {
+                    double blur = (fabs(rule.least) + fabs(rule.most) + fabs(curve)) * ULP;
+                    least = (rule.least - curve - blur) * (reach * reach), most = (rule.most - curve + blur) * (reach * reach);
+                }
+                slopes[l] = slope, curves[l] = curve;
+                r.c[l] = rule.value, r.lo[l] = rule.lo, r.hi[l] = rule.hi;
+                r.p[l] = smaller(slope * p, slope * q) + smaller(curve * -mixed, curve * square) + smaller(least, 0.0);
+                r.q[l] = larger(slope * p, slope * q) + larger(curve * -mixed, curve * square) + larger(most, 0.0);
+                double steep = fabs(slope) + 2 * fabs(curve) * reach;
+                double size = fabs(rule.value) + fabs(slope) * moved + fabs(curve) * (moved * moved);
+                /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
+                double unknown = 0 * (least + most);
+                double lost = TINY * (1 + fabs(curve) + fabs(rule.least) + fabs(rule.most));
+                r.s[l] = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + slack * size + unknown;
+            }
+            for (int i = first; i < last; i++) {
+                int at = n + row_of(n, i) + i;
+                EACH t[at][l] = slopes[l] * ax[at][l] + curves[l] * (ax[i][l] * ax[i][l]);
+                for (int j = i + 1; j < last; j++) {
+                    at++;
+                    EACH t[at][l] = slopes[l] * ax[at][l] + 2 * curves[l] * (ax[i][l] * ax[j][l]);
+                }
+                EACH t[i][l] = slopes[l] * ax[i][l];
+            }
+        }
+        }
+        settle2(v, n, first, last, slack, &r, t);
+    }
+}
+
+#endif

@@ -1,0 +1,115 @@
+"""A robot with its dimensions: a case all of whose parameters are fixed, and its legs as numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....models import FloatArray, Model, frozen_array
+from ...case.case import Case
+from ...case.pose import Free
+from ...case.workspace import Workspace
+from ...errors import CaseError, InputError
+
+#: Number of legs, as many as the platform has freedoms.
+LEGS = 6
+#: Part of a tolerance that the errors of a machine within it have, so that rounding leaves none outside.
+INSIDE = 1 - 1e-12
+
+
+class Legs(NamedTuple):
+    """Joint centres of a robot's six legs.
+
+    Attributes:
+        base: (6, 3) in the world frame, length.
+        platform: (6, 3) in the platform frame, length.
+        tolerance: largest error of each centre in the machines that are meant, length; 0 for the exact machine.
+    """
+
+    base: FloatArray
+    platform: FloatArray
+    tolerance: float = 0.0
+
+    @property
+    def length(self) -> float:
+        """Length of the order of the robot's, by which positions are comparable to rotations."""
+        return float(max(np.abs(self.base).max(), np.abs(self.platform).max())) or 1.0
+
+
+class JointErrors(NamedTuple):
+    """Errors of the joint centres of one machine, (6, 3) each: base in the world frame, platform in its own, length."""
+
+    base: FloatArray
+    platform: FloatArray
+
+    def applied(self, legs: Legs) -> Legs:
+        """Return the exact legs of the machine with these errors."""
+        return Legs(legs.base + self.base, legs.platform + self.platform)
+
+
+class CentreErrors(NamedTuple):
+    """Errors of the joint centres of one machine of a robot that is not six straight legs.
+
+    Attributes:
+        names: of the m joint centres.
+        vectors: (m, 3) in the world frame at home, length; of platform joints of legs in the platform's frame.
+    """
+
+    names: tuple[str, ...]
+    vectors: FloatArray
+
+
+def workspace_of_case(case: Case) -> Workspace:
+    """Return a case's workspace.
+
+    Raises:
+        CaseError: the case has none, or a dimension of its robot is free.
+    """
+    if case.workspace is None:
+        raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
+    for name in case.parameters:
+        if any(isinstance(value, Free) for value in case.components(name)):
+            fault = (
+                "is free, and a workspace is judged with fixed dimensions: give it with --set, or a result with --of"
+            )
+            raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
+    return case.workspace
+
+
+def check_leg_error(case: Case, leg_error: float) -> None:
+    """Refuse an error of the lengths of legs that is none, or that no claim about the robot has.
+
+    Raises:
+        InputError: it is negative or not finite, or is given for a robot that is not six straight legs.
+    """
+    if not 0 <= leg_error < float("inf"):
+        raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
+    if leg_error and not has_straight_legs(case.model):
+        raise InputError(f"--leg-error {leg_error:g}: is for six straight legs, which {case.model.name!r} is not")
+
+
+def has_straight_legs(model: Model) -> bool:
+    """Return whether a robot is six straight legs and nothing else."""
+    return len(model.legs) == LEGS and len(model.wrenches) == LEGS and not (model.members or model.unknowns)
+
+
+def legs_of(case: Case) -> Legs | None:
+    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
+
+    Their tolerance is the case's.
+    """
+    model = case.model
+    if not has_straight_legs(model):
+        return None
+    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+    parts = [value for name in case.parameters for value in case.components(name)]
+    values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
+    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
+    base, platform = ca.Function("legs", [symbols], outputs).call([values])
+    return Legs(
+        frozen_array(np.array(base).T, (LEGS, 3)),
+        frozen_array(np.array(platform).T, (LEGS, 3)),
+        case.joint_centre_tolerance or 0.0,
+    )

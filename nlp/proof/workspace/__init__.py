@@ -1,0 +1,9 @@
+"""A robot judged over a whole box of poses: proofs, counterexamples, and the boxes that are left open.
+
+The rooms and modules import each other in this order:
+
+* ``verdict``; ``robot`` (a robot as expressions over the box), ``ranks`` (of its matrices), ``regular`` (the same for
+  six straight legs), ``numbers`` (their extremes), ``tolerance`` (every machine within a tolerance);
+* ``home_poses`` (machines at single poses, in home's assembly), ``judge`` (all claims about a machine), ``scale`` (the
+  largest box), ``slices`` (for pictures), ``proof_record`` and ``proof_writer`` (proofs as files).
+"""

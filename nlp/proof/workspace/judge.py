@@ -1,0 +1,314 @@
+"""A machine judged over its whole workspace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ....models.joints.closedform import ClosedForm, closed_form
+from ...case.case import Case
+from ...case.workspace import Workspace
+from ...interruption import is_requested, one_call
+from ...program.layout import Layout
+from ..statement.claims import SPECTRAL, Claim, claims_of
+from ..statement.closed_layout import closed_layout, reach_claims
+from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
+from ..statement.posed_layout import posed_layout
+from .home_poses import Homes
+from .numbers.asked_values import spectral_extremes
+from .numbers.extremes import GAP, Extreme, prove_extreme
+from .numbers.leg_numbers import own_searches, pose_errors
+from .numbers.loop_limits import loop_extremes
+from .numbers.robot_limits import limited_spectrum
+from .numbers.strokes import with_strokes
+from .ranks.ranks import Ranks, not_judged, prove_ranks, touched
+from .regular.search import RankProgress, prove_regular
+from .robot.pose_box import PoseBox, pose_box
+from .robot.posed_robot import NotJudgedError
+from .tolerance.legs.limits import as_built, refined
+from .tolerance.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
+from .verdict import Outcome, Regularity
+
+if TYPE_CHECKING:
+    from .proof_record import PaperRecord
+
+#: Seconds for each search where none are asked for: the searches of singular values have no other end in six
+#: dimensions.
+TIME_LIMIT = 20.0
+#: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
+_AS_NEEDED = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """Verdicts on a machine over its workspace; with a tolerance on joint centres, on every machine within it.
+
+    Attributes:
+        case: the case, its dimensions fixed.
+        workspace: the poses.
+        regularity: whether J has full rank at every pose.
+        extremes: of the reach of limbs, limits, lengths of legs, measures and tasks, in this order.
+        constraints: whether the constraint wrenches alone keep their rank; None for a robot without any.
+    """
+
+    case: Case
+    workspace: Workspace
+    regularity: Regularity
+    extremes: tuple[Extreme, ...]
+    constraints: Regularity | None = None
+
+    @property
+    def ranks(self) -> tuple[Regularity, ...]:
+        """Verdicts on ranks."""
+        return (self.regularity,) if self.constraints is None else (self.regularity, self.constraints)
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether all ranks are proved to be full."""
+        return all(each.outcome is Outcome.PROVED for each in self.ranks)
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether all ranks are proved to be full, and every limit holds; a number without a limit is information."""
+        return self.is_regular and not any(each.fails for each in self.extremes)
+
+    @property
+    def is_refuted(self) -> bool:
+        """Whether a pose is known that is singular or outside of a limit."""
+        return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
+
+
+@one_call()
+def judge_workspace(
+    case: Case,
+    *,
+    workspace: Workspace | None = None,
+    quantities: Sequence[str] = (),
+    gap: float = GAP,
+    time_limit: float | None = TIME_LIMIT,
+    jobs: int | None = None,
+    engine: str | None = None,
+    with_limits: bool = True,
+    with_objective: bool = True,
+    until_fault: bool = False,
+    leg_error: float = 0.0,
+    rank_progress: RankProgress | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    paper: PaperRecord | None = None,
+) -> Judgement:
+    """Prove, for every pose of a case's workspace, that its machine is regular and keeps its limits, or find a pose.
+
+    Args:
+        case: a case with fixed dimensions.
+        workspace: the poses; those of the case if left out.
+        quantities: names of measures of the robot whose smallest and largest values are asked for.
+        gap: allowed distance of a bound from the best value known, as a part of it.
+        time_limit: seconds for each search; it then stops with the bound reached.
+        jobs: threads.
+        engine: ``"c"`` or ``"numpy"`` for the search of singular poses; left out, the C kernel where it was built.
+        with_limits: whether numbers are bounded at all, and not regularity alone.
+        with_objective: whether F of each task is bounded.
+        leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
+            the errors of the platform's pose are bounded, where F is.
+        until_fault: whether the work ends at the first rank or limit that is not proved.
+        rank_progress: called during the search for singular poses.
+        progress: called before each number with its name, the number of those done, and of all.
+        paper: records the searches for a proof.
+
+    Raises:
+        CaseError: the case has no workspace, or a free dimension.
+        InputError: the robot has no measure of a name, or the error of legs is negative, or for a robot that is not six
+            straight legs.
+    """
+    own = workspace_of_case(case)
+    check_leg_error(case, leg_error)
+    workspace = own if workspace is None else workspace
+    box, legs = pose_box(workspace), legs_of(case)
+    closed = closed_form(case.model)
+    machines, unknown = _machines(case, closed, box, legs)
+    homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
+    ranks = (
+        Ranks(not_judged(box, unknown), None)
+        if unknown
+        else _ranks(closed, homes, legs, engine, time_limit, rank_progress, paper)
+    )
+    judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
+    if not with_limits or (until_fault and not judged.is_regular):
+        return judged
+    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
+    found: list[Extreme] = []
+    for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+        if until_fault and each.fails:
+            break
+    return replace(judged, extremes=tuple(homes.shown(each) for each in found))
+
+
+def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
+    """Return the machines that are meant, or why they are not judged: None and no reason for the design or legs."""
+    if legs is not None or not case.joint_centre_tolerance:
+        return None, ""
+    try:
+        return machines_of(case, closed.model, box), ""
+    except NotJudgedError as error:
+        return None, str(error)
+
+
+def _ranks(
+    closed: ClosedForm,
+    homes: Homes,
+    legs: Legs | None,
+    engine: str | None,
+    time_limit: float | None,
+    progress: RankProgress | None,
+    paper: PaperRecord | None,
+) -> Ranks:
+    """Return the verdicts on J, and on the constraint wrenches of a robot that has them."""
+    case, box = homes.case, homes.box
+    if legs is not None:
+        recorder = None if paper is None else paper.rank
+        found = prove_regular(legs, box, engine=engine, time_limit=time_limit, progress=progress, recorder=recorder)
+        return Ranks(touched(case, box, found), None)
+    return prove_ranks(closed.model, homes, engine=engine, time_limit=time_limit, progress=progress, paper=paper)
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """The numbers of a machine over its workspace.
+
+    Attributes:
+        case: with fixed dimensions.
+        workspace: the poses.
+        closed: its robot without unknowns in closed form.
+        legs: joint centres; None for a robot that is not six straight legs.
+        gap, time_limit, jobs, progress, paper: as in :func:`judge_workspace`.
+        machines: every machine within the tolerance, of a robot without legs; None where none are judged.
+        unknown: reason why the machines that are meant are not judged; else empty.
+    """
+
+    case: Case
+    workspace: Workspace
+    closed: ClosedForm
+    legs: Legs | None
+    gap: float
+    time_limit: float | None
+    jobs: int | None
+    progress: Callable[[str, int, int], None] | None
+    paper: PaperRecord | None
+    machines: Machines | None
+    unknown: str
+
+    def add(
+        self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
+    ) -> Iterator[Extreme]:
+        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks, and yield each.
+
+        Args:
+            found: gets the extremes; lengths that a stroke needs more finely take the place of those found before.
+            quantities: names of measures.
+            leg_error: largest error of a leg's length, length.
+            with_objective: whether F of each task, and errors of the pose, are bounded.
+
+        Raises:
+            InputError: the robot has no measure of a name.
+        """
+        case, box, legs = self.case, pose_box(self.workspace), self.legs
+        names = [name for name in quantities if name not in SPECTRAL]
+        family = None if self.machines is None else self.machines.family
+        spectral = partial(
+            spectral_extremes,
+            family=family,
+            unknown=self.unknown,
+            gap=self.gap,
+            time_limit=self.time_limit,
+            interrupted=is_requested,
+            paper=self.paper,
+        )
+        if self.machines is not None:
+            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
+            yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
+            yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
+            return
+        layout = posed_layout(case, self.workspace)
+        claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
+        if self.closed.reaches:
+            reach = reach_claims(case, self.closed, self.workspace)
+            place, reaches = reach.layout, [replace(each, uncovered=self.unknown) for each in reach.claims]
+            yield from self._add_proved(found, place, reaches)
+            is_reached = not any(each.fails for each in found)
+            if is_reached:
+                # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+                layout = closed_layout(case, self.closed, self.workspace)
+                claims = claims_of(layout, names, with_objective=with_objective)
+        prove = self._prove(layout)
+        claims = [replace(each, uncovered=self.unknown) for each in claims]
+        shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
+        decided: list[Extreme] = []
+        if legs is None and not case.joint_centre_tolerance:
+            search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
+            if is_reached:
+                effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
+        yield from self._add_proved(found, layout, claims, decided)
+        if legs is not None:
+            again = partial(prove, paper=self.paper, again=True)
+            refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
+            before = len(found)
+            found[:] = with_strokes(case, legs, found, refine)
+            yield from found[before:]
+            others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
+        yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
+        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
+        if legs is not None and with_objective and eps > 0:
+            least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
+            shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
+            errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
+            yield from _add(found, errors(legs, box, eps, shortest))
+
+    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
+        """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
+        if self.legs is None:
+            family = None if self.machines is None else self.machines.family
+            own = partial(limited_spectrum, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
+            box = pose_box(self.workspace)
+            yield from _add(found, own(self.case, self.closed.model, box, family, self.unknown))
+        yield from _add(found, asked)
+
+    def _prove(self, layout: Layout) -> Callable[..., Extreme]:
+        """Return the function that proves a claim to a gap."""
+        return partial(
+            prove_extreme,
+            layout,
+            time_limit=self.time_limit,
+            jobs=self.jobs,
+            interrupted=is_requested,
+            legs=self.legs,
+        )
+
+    def _add_proved(
+        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+    ) -> Iterator[Extreme]:
+        """Add the extremes of claims, and yield them; those that are decided are searched again for the paper alone."""
+        prove, known = self._prove(layout), {(each.name, each.sense, each.key): each for each in decided}
+        for done, claim in enumerate(claims):
+            if self.progress is not None:
+                self.progress(claim.name, done, len(claims))
+            own = known.get((claim.name, claim.sense, claim.key))
+            is_limit = own is not None and own.limit is not None
+            if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
+                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap, paper=self.paper)
+                if is_limit and self.paper is not None and again.outcome is not Outcome.PROVED:
+                    self.paper.elsewhere.add((claim.name, claim.sense.value))
+                own = own or again
+            yield from _add(found, [own])
+
+
+def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:
+    """Add extremes one by one, and yield each."""
+    for each in more:
+        found.append(each)
+        yield each

@@ -1,0 +1,290 @@
+"""Proven smallest and largest values over a workspace, each with the pose at which it is met.
+
+Every claim is a program over the numbers of the pose, which :mod:`screwsynth.nlp.proof.certificate` bounds.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from casadi import SX
+
+from .....models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
+from ....case.task import Sense
+from ....errors import UncoveredError
+from ....program.layout import Layout
+from ....program.nlp import Nlp
+from ...boxes.proof_writer import ProofWriter
+from ...certificate.branch_and_bound import certify_program
+from ...certificate.certificate import Certificate, CertificateStatus
+from ...statement.claims import Claim
+from ...statement.machine import CentreErrors, JointErrors, Legs
+from ...statement.posed_layout import extreme_program, varies
+from ..robot.pose_box import PoseNumbers
+from ..verdict import Outcome
+
+if TYPE_CHECKING:
+    from ..proof_record import PaperRecord
+
+#: Gap of a bound as a part of the value, where none is asked for.
+GAP = 1e-3
+#: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
+_FINEST = 1e-10
+#: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
+_SHARE = 0.9
+#: Part of a limit by which a value may be beyond it and still count as on it: rounding.
+_ON_LIMIT = 1e-9
+#: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
+_NEAR_ZERO = 1e-6
+#: Reason for a limit that stays open between a bound and a value although the search ended.
+CLOSE = "the limit is closer to the value reached than bounds can tell"
+
+
+@dataclass(frozen=True, eq=False)
+class Extreme:
+    """The smallest or the largest value of a number over a workspace.
+
+    Attributes:
+        name: of the number, in the words of a case.
+        sense: whether the smallest or the largest value is meant.
+        dimension: of the number.
+        key: dotted key, below ``limits``, of the limit in the case; empty without one.
+        limit: the limit, radians for angles; None without one.
+        bound: proven: no pose has a smaller, or a larger, value; radians for angles; infinite where nothing is proved.
+        reached: the smallest or largest value known; NaN without one.
+        pose: the pose at which it is reached; None without one.
+        outcome: of the limit, or, without one, of the gap asked for.
+        boxes: number of boxes examined.
+        seconds: wall time.
+        reason: for an open outcome; else empty.
+        errors: of the joint centres of the machine that reaches the value; None for the exact machine.
+        centres: the same for a robot that is not six straight legs.
+    """
+
+    name: str
+    sense: Sense
+    dimension: Dimension
+    key: str
+    limit: float | None
+    bound: float
+    reached: float
+    pose: PoseNumbers | None
+    outcome: Outcome
+    boxes: int
+    seconds: float
+    reason: str
+    errors: JointErrors | None = None
+    centres: CentreErrors | None = None
+
+    @property
+    def fails(self) -> bool:
+        """Whether it has a limit that is not proved to hold; a number without a limit is information."""
+        return self.limit is not None and self.outcome is not Outcome.PROVED
+
+
+def prove_extreme(
+    layout: Layout,
+    claim: Claim,
+    *,
+    gap: float = GAP,
+    time_limit: float | None = None,
+    jobs: int | None = None,
+    interrupted: Callable[[], bool] = lambda: False,
+    legs: Legs | None = None,
+    paper: PaperRecord | None = None,
+    again: bool = False,
+) -> Extreme:
+    """Prove the smallest or the largest value of a number over a workspace.
+
+    A search whose bound is beyond the number's limit, with a value within it, goes on until the limit is decided.
+
+    Args:
+        layout: the case as symbols of the pose.
+        claim: the number.
+        gap: allowed distance of the bound from the best value known, as a part of it.
+        time_limit: seconds after which the search stops with the bound reached.
+        jobs: threads.
+        interrupted: whether the work is requested to stop.
+        legs: joint centres with their tolerance, for a claim about every machine within it.
+        paper: records the search for a proof.
+        again: whether the record takes the place of an earlier one of the same number.
+    """
+    if interrupted():
+        return _extreme(claim, _Found(reason="interrupted"), legs)
+    expression = claim.expression if claim.worst is None or claim.worst.expression is None else claim.worst.expression
+    nlp = extreme_program(layout, expression, claim.sense)
+    if not varies(layout, [expression])[0]:
+        value = nlp.evaluate(nlp.start).F
+        if paper is not None:
+            paper.constant(claim, nlp, value)
+        return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), legs)
+    record = None if paper is None else _Record(paper, again)
+    try:
+        return _extreme(claim, _search(nlp, claim, gap, time_limit, jobs, interrupted, record), legs)
+    except UncoveredError as error:
+        return _extreme(claim, _Found(reason=str(error)), legs)
+
+
+class _Record(NamedTuple):
+    """Where a search is recorded, and whether in the place of an earlier one of the same number."""
+
+    paper: PaperRecord
+    again: bool
+
+
+class _Found(NamedTuple):
+    """Result of a search in terms of its expression.
+
+    Attributes:
+        bound, reached, pose, boxes, seconds, reason: as for :class:`Extreme`.
+        is_met: whether the gap asked for is met.
+    """
+
+    bound: float = math.inf
+    reached: float = math.nan
+    pose: PoseNumbers | None = None
+    boxes: int = 0
+    seconds: float = 0.0
+    reason: str = ""
+    is_met: bool = False
+
+
+def _search(
+    nlp: Nlp,
+    claim: Claim,
+    gap: float,
+    time_limit: float | None,
+    jobs: int | None,
+    interrupted: Callable[[], bool],
+    record: _Record | None,
+) -> _Found:
+    """Return the bound of an expression, to the gap or, where that leaves its limit open, as fine as the limit needs.
+
+    Raises:
+        UncoveredError: the expression holds an operation without a rule.
+    """
+    began = time.perf_counter()
+    # A program of a claim has one function, and its search is that of certify with or without a record.
+    writer = None if record is None else ProofWriter(1)
+    found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs, recorder=writer)
+    boxes = found.boxes
+    while (finer := _finer_gap(nlp, claim, found)) is not None and not interrupted():
+        left = None if time_limit is None else time_limit - (time.perf_counter() - began)
+        if left is not None and left <= 0:
+            break
+        finer_writer = None if record is None else ProofWriter(1)
+        again = certify_program(nlp, found.x, gap=finer, time_limit=left, jobs=jobs, recorder=finer_writer)
+        boxes += again.boxes
+        sign = 1.0 if claim.sense is Sense.MAX else -1.0
+        if sign * again.bound <= sign * found.bound:
+            writer = finer_writer
+        else:
+            again = replace(again, bound=found.bound)
+        found = again
+    if record is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
+        record.paper.program(claim, found, writer, again=record.again)
+    if found.status is CertificateStatus.INFEASIBLE:
+        return _Found(boxes=boxes, seconds=found.seconds, reason="the robot has no pose there")
+    # A search that ends early has a bound too, which may be as good as asked for.
+    met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
+    pose = None if found.x is None else _pose(nlp, found.x)
+    seconds = time.perf_counter() - began
+    return _Found(found.bound, found.incumbent, pose, boxes, seconds, found.reason, met)
+
+
+def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
+    """Return the gap that decides a claim's limit; None where it is decided, or the search did not end by itself."""
+    if claim.limit is None or found.status is not CertificateStatus.PROVED:
+        return None
+    sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    limit = _limit_of_search(claim)
+    slack = slack_of(limit)
+    room = sign * (limit - found.incumbent) + slack / 2
+    if not (room > 0 and sign * (found.bound - limit) > slack):
+        return None
+    finer = _SHARE * room / max(abs(found.incumbent), _NEAR_ZERO * nlp.objective_size)
+    return finer if finer >= _FINEST else None
+
+
+def _limit_of_search(claim: Claim) -> float:
+    """Return the limit of a claim's expression, which may leave an allowance for errors of joint centres."""
+    if claim.limit is None:
+        raise TypeError("the claim has a limit")
+    if claim.worst is None or not claim.worst.allowance:
+        return claim.limit
+    sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    return _program_value(claim, claim.reading.from_value(claim.limit) - sign * claim.worst.allowance)
+
+
+def _program_value(claim: Claim, number: float) -> float:
+    """Return the program's value of a number as people read it."""
+    return float(claim.reading.to_value(SX(number)))
+
+
+def slack_of(limit: float) -> float:
+    """Return how far a value may be beyond a limit and still count as on it: a part of the limit, for rounding.
+
+    It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
+    """
+    return _ON_LIMIT * abs(limit)
+
+
+def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
+    """Return the extreme of a claim from numbers of its expression."""
+    sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
+    bound, reached, pose = found.bound, found.reached, found.pose
+    shown_bound = read(bound) if math.isfinite(bound) else sign * math.inf
+    shown_reached = read(reached) if math.isfinite(reached) else math.nan
+    errors, centres, worst = None, None, claim.worst
+    if worst is not None and (legs is not None or worst.machine is not None):
+        if math.isfinite(bound):
+            shown_bound = min(max(shown_bound + sign * worst.allowance, worst.least), worst.most)
+            bound = _program_value(claim, shown_bound)
+        if pose is not None:
+            if worst.machine is not None:
+                centres, shown_reached = worst.machine(pose)
+            elif legs is not None and worst.errors is not None and worst.value is not None:
+                errors = worst.errors(pose)
+                shown_reached = worst.value(errors.applied(legs), pose)
+            reached = _program_value(claim, shown_reached)
+    outcome, reason = Outcome.PROVED if found.is_met else Outcome.OPEN, found.reason
+    if claim.limit is not None:
+        slack = slack_of(claim.limit)
+        if sign * (reached - claim.limit) > slack:
+            outcome = Outcome.REFUTED
+        else:
+            outcome = Outcome.PROVED if sign * (bound - claim.limit) <= slack and math.isfinite(bound) else Outcome.OPEN
+            reason = reason or (CLOSE if outcome is Outcome.OPEN else "")
+    if claim.uncovered:
+        # What is proved of the exact machine is nothing about the others, and refutes all the same.
+        shown_bound = sign * math.inf
+        if outcome is not Outcome.REFUTED:
+            outcome, reason = Outcome.OPEN, claim.uncovered
+    return Extreme(
+        name=claim.name,
+        sense=claim.sense,
+        dimension=claim.reading.dimension,
+        key=claim.key,
+        limit=None if claim.limit is None else read(claim.limit),
+        bound=shown_bound,
+        reached=shown_reached,
+        pose=pose,
+        outcome=outcome,
+        boxes=found.boxes,
+        seconds=found.seconds,
+        reason="" if outcome is not Outcome.OPEN else reason,
+        errors=errors,
+        centres=centres,
+    )
+
+
+def _pose(nlp: Nlp, x: FloatArray) -> PoseNumbers:
+    """Return the pose at a point (n,) of a program."""
+    state = nlp.program.kernels.robot_state(x, nlp.arguments)
+    axis, angle = axis_angle_from_matrix(np.array(state.rotation))
+    return PoseNumbers(frozen_array(np.array(state.position).ravel(), (3,)), np.array(state.rotation), axis, angle)

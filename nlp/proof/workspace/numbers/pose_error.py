@@ -1,0 +1,149 @@
+"""Largest error of the platform's pose over a workspace, for every machine within its tolerances.
+
+A leg's length changes by at most ``eps = leg error + 2 joint error`` when its joint centres and its length are in
+error, at every pose: by the triangle inequality. To first order the platform's origin and its rotation are off by
+``J^-1 d`` with ``|d_i| <= eps``, and the largest size is met where every ``d_i`` is eps or -eps.
+
+Over a box ``J^-1`` is affine in the coordinates but for a rest (:mod:`.inverse`). Sizes are convex, and so largest at
+a corner of the box.
+
+For the rest of the pose error, let the error found be P eps in position and Q eps in rotation. By Taylor's formula the
+lengths at the true pose differ from those to first order by at most
+
+    r = ((p + a w)^2 / l + a w^2) / 2,      p = P (eps + r),  w = Q (eps + r),
+
+with l the shortest length of a leg on the way and a the largest distance of a joint from the platform's origin. The
+machine comes continuously from the one without errors, and so its errors are those of the smallest such r.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .....models import FloatArray
+from ...statement.machine import Legs
+from ..regular.inverse import CORNERS, inverse_over, inverses
+from ..regular.rows import expand
+from ..robot.pose_box import PoseBox
+from .bound_search import Bounds
+
+#: Part of its size by which a computed bound is moved outwards: rounding.
+_ROUNDING = 1e-10
+#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+_ERRORS = CORNERS[:32].T
+#: Steps in the search of the smallest r.
+_STEPS = 200
+#: Steps of Newton's method for a pose whose errors are small.
+_NEWTON = 8
+
+
+class WorstError:
+    """Minus the largest error of the pose to first order, for unit errors of legs: its smallest value is the worst.
+
+    Args:
+        legs: joint centres.
+        box: the poses.
+        is_rotation: whether the rotation is meant, and not the position of the platform's origin.
+    """
+
+    def __init__(self, legs: Legs, box: PoseBox, *, is_rotation: bool) -> None:
+        self._legs, self._box = legs, box
+        self._part = slice(3, 6) if is_rotation else slice(0, 3)
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return minus the error (K,) at points (K, 6)."""
+        return np.asarray(-np.linalg.norm(self.responses(points) @ _ERRORS, axis=1).max(axis=1))
+
+    def worst(self, y: FloatArray) -> FloatArray:
+        """Return the signs (6,) of the errors of legs that are worst at a point (6,)."""
+        sizes = np.linalg.norm(self.responses(y[None])[0] @ _ERRORS, axis=0)
+        return np.asarray(_ERRORS[:, int(np.argmax(sizes))])
+
+    def responses(self, points: FloatArray) -> FloatArray:
+        """Return the rows (K, 3, 6) of the inverses of J with unit rows."""
+        rows = expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0]
+        lengths = np.linalg.norm(rows[:, :, :3], axis=2)
+        with np.errstate(all="ignore"):
+            return np.asarray(inverses(rows)[:, self._part] * lengths[:, None, :])
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        """Return lower bounds over boxes (B, 6)."""
+        inverse = inverse_over(self._legs, self._box, lower, upper)
+        with np.errstate(all="ignore"):
+            corners = inverse.at_corners(self._part)
+            worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))
+            worst += np.linalg.norm(inverse.rest[:, self._part].sum(axis=2), axis=1)
+        bound = np.where(np.isfinite(worst), -worst * (1 + _ROUNDING), -np.inf)
+        return Bounds(bound, inverse.shares)
+
+
+class PoseErrors(NamedTuple):
+    """Largest errors of a platform's pose: of its origin's position, length, and of its rotation, radians."""
+
+    position: float
+    rotation: float
+
+
+def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> PoseErrors:
+    """Return bounds of the whole errors from bounds to first order.
+
+    Args:
+        first: bounds to first order, for errors of legs of at most eps.
+        eps: largest error of a leg, length.
+        shortest: shortest length of a leg over the workspace.
+        reach: largest distance of a joint from the platform's origin.
+
+    Returns:
+        Infinite errors where no bound is found: errors are then too large for the machine.
+    """
+    r = 0.0
+    for _ in range(_STEPS):
+        grown = (eps + r) / eps * (1 + _ROUNDING)
+        position, rotation = first.position * grown, first.rotation * grown
+        along = position + reach * rotation
+        if not along < shortest:
+            break
+        needed = 0.5 * (along**2 / (shortest - along) + reach * rotation**2) * (1 + _ROUNDING)
+        if needed <= r:
+            return PoseErrors(position, rotation)
+        r = needed * (1 + 1e-6)
+    return PoseErrors(math.inf, math.inf)
+
+
+def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors:
+    """Return the errors of the pose of a machine whose legs are longer by given lengths, by Newton's method.
+
+    Args:
+        legs: joint centres.
+        box: the poses.
+        y: (6,) the pose without errors.
+        errors: (6,) of the lengths of the legs.
+    """
+    pose = box.pose(y)
+    wanted = np.linalg.norm(pose.position + legs.platform @ pose.rotation.T - legs.base, axis=1) + errors
+    position, rotation = np.array(pose.position), np.array(pose.rotation)
+    for _ in range(_NEWTON):
+        arm = legs.platform @ rotation.T
+        span = position + arm - legs.base
+        lengths = np.linalg.norm(span, axis=1)
+        unit = span / lengths[:, None]
+        step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
+        position = position + step[:3]
+        rotation = _turned(step[3:]) @ rotation
+    turned = rotation @ pose.rotation.T
+    sine = np.linalg.norm([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
+    angle = math.atan2(float(sine), (float(np.trace(turned)) - 1) / 2)
+    return PoseErrors(float(np.linalg.norm(position - pose.position)), angle)
+
+
+def _turned(w: FloatArray) -> FloatArray:
+    """Return the rotation matrix of a rotation vector (3,)."""
+    angle = float(np.linalg.norm(w))
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = w / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)

@@ -1,0 +1,115 @@
+"""What loop equations say of the dependent coordinates over a box: a linear relation with a bounded rest.
+
+With forms ``g + A e + [-r, r]`` of the equations over a box, and Y close to the inverse of the columns of the dependent
+coordinates D, every closed point of the box has
+
+    e_D = off - T e_I + [-rho, rho],    off = -Y g,   T = Y A_I,   rho = |Y| r + |Y A_D - I|  (+ rounding).
+
+Errors of joint centres are further columns E, ``- Y A_E e_E``; those of one centre are a vector of at most unit length.
+Where the right side is inside of the box for all ``|e_I| <= 1``, Brouwer's theorem gives a closed point for each value
+of the independent coordinates; where moreover the derivatives by D are regular over the box, there is only one [1].
+
+Source: 1. R. Krawczyk, *Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969); the
+form with parameters is in A. Neumaier, *Interval Methods for Systems of Equations*, 1990, Section 5.6.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .....models import FloatArray
+from ...enclosure.forms import Forms
+from ..regular.inverse import inverses
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
+#: terms, each with a rounding of 2^-53.
+ROUNDING = 1e-13
+#: More than underflow can take from a sum of squares.
+_TINY = 1e-300
+#: Steps of the power method for a vector that proves a contraction.
+_POWERS = 12
+
+
+class Relation(NamedTuple):
+    """Dependent coordinates over B boxes, in parts of their half widths.
+
+    Attributes:
+        off: (B, k) at the middle of the independent ones.
+        T: (B, k, f) slopes, to be subtracted.
+        rho: (B, k) rest; infinite where nothing is known.
+        E: (B, k, 3 m) slopes by errors of m joint centres, to be subtracted.
+    """
+
+    off: FloatArray
+    T: FloatArray
+    rho: FloatArray
+    E: FloatArray
+
+    @property
+    def of_errors(self) -> FloatArray:
+        """Largest sizes (B, k) of the part of the errors."""
+        return by_centres(self.E)
+
+    @property
+    def reach(self) -> FloatArray:
+        """Largest sizes (B, k) over the box."""
+        return np.asarray((np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING))
+
+
+def by_centres(slopes: FloatArray) -> FloatArray:
+    """Return the largest sizes (...) of linear parts (..., 3 m) in the errors of m centres, each of at most size 1."""
+    parts = slopes.reshape(*slopes.shape[:-1], slopes.shape[-1] // 3, 3)
+    return np.asarray(np.sqrt((parts * parts).sum(axis=-1) + _TINY).sum(axis=-1) * (1 + ROUNDING))
+
+
+def relation_of(equations: Forms, independent: list[int], dependent: list[int], errors: list[int]) -> Relation:
+    """Return the relation that k equations over boxes give.
+
+    Args:
+        equations: their forms.
+        independent: indices of the coordinates that are free.
+        dependent: indices of those that follow.
+        errors: indices of errors of joint centres.
+    """
+    A = equations.a[:, :, dependent]
+    other, own = equations.a[:, :, independent], equations.a[:, :, errors]
+    Y = inverses(A)
+    size = np.abs(Y)
+    with np.errstate(all="ignore"):
+        T, E = Y @ other, Y @ own
+        off = -(Y @ equations.c[:, :, None])[:, :, 0]
+        defect = np.abs(Y @ A - np.eye(len(dependent))).sum(axis=2) + ROUNDING * (size @ np.abs(A)).sum(axis=2)
+        terms = np.abs(equations.c) + np.abs(other).sum(axis=2) + np.abs(own).sum(axis=2)
+        rho = ((size @ equations.r[:, :, None])[:, :, 0] + defect) * (1 + ROUNDING)
+        rho += ROUNDING * (size @ terms[:, :, None])[:, :, 0]
+    rho = np.where(np.isfinite(rho), rho, np.inf)
+    return Relation(np.nan_to_num(off), np.nan_to_num(T), rho, np.nan_to_num(E))
+
+
+def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which nonnegative matrices (B, c, c) surely have a spectral radius below 1, and positive vectors (B, c).
+
+    ``B v < v`` for a positive v proves it (Collatz and Wielandt).
+    """
+    v = np.ones(B.shape[:2])
+    proved = np.zeros(len(B), dtype=bool)
+    active = np.asarray(np.isfinite(B).all(axis=(1, 2)))
+    for _ in range(_POWERS):
+        rows = np.flatnonzero(active)
+        if not rows.size:
+            break
+        w = (B[rows] @ v[rows, :, None])[:, :, 0]
+        ratio = w / v[rows]
+        done = ratio.max(axis=1) < 1 - ROUNDING
+        proved[rows[done]] = True
+        active[rows[done | (ratio.min(axis=1) >= 1)]] = False
+        going = active[rows]
+        # A little of the vector before keeps every component positive.
+        scale = np.maximum(w[going].max(axis=1, keepdims=True), 1e-300)
+        v[rows[going]] = w[going] / scale + 1e-9 * v[rows[going]]
+    return proved, v

@@ -1,0 +1,213 @@
+"""A box of poses in the coordinates of the search: three of position, three of rotation.
+
+Rotations are covered in coordinates in which ``s R``, with a positive number ``s``, is a polynomial:
+
+* any axis: Cayley vector ``tan(angle / 2) axis``, within a ball;
+* one axis: ``tan(angle / 2)``, the first of the three coordinates;
+* roll, pitch and yaw: the tangents of half of each.
+
+Ends are moved outwards by rounding, so that the box of coordinates holds every pose of the workspace.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .....models import FloatArray, axis_angle_from_matrix, frozen_array
+from ....case.pose import Free, Value
+from ....case.workspace import TurnKind, Workspace
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Codes of the kinds of rotations: those of ``_workspace.c``.
+CODES = {TurnKind.ANY_AXIS: 0, TurnKind.AXIS: 1, TurnKind.ROLL_PITCH_YAW: 2}
+#: Part of itself by which a tangent may be off: several times the error of a library's function.
+_TANGENT = 2.0**-50
+#: Unit by which ends move outwards: several roundings.
+_ULP = 2.0**-51
+
+
+@dataclass(frozen=True, eq=False)
+class PoseNumbers:
+    """A pose of the platform.
+
+    Attributes:
+        position: (3,) origin of the platform frame in the world frame, length.
+        rotation: (3, 3) platform to world coordinates.
+        axis: (3,) unit axis of the rotation; z without rotation.
+        angle: of the rotation, radians, not negative.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    angle: float
+
+
+class Contracted(NamedTuple):
+    """Boxes (B, 6) contracted to the poses of a workspace, and whether nothing is left of each, (B,)."""
+
+    lower: FloatArray
+    upper: FloatArray
+    outside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseBox:
+    """A box of poses.
+
+    Attributes:
+        kind: coordinates of rotations.
+        axis: (3,) unit axis of rotations about one axis.
+        lower, upper: (6,) ends of the coordinates: position, then rotation.
+        ball: largest squared size of a Cayley vector, rounded up; infinite where rotations are no ball.
+    """
+
+    kind: TurnKind
+    axis: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    ball: float
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Indices of the coordinates that vary."""
+        return tuple(np.flatnonzero(self.upper > self.lower).tolist())
+
+    def holds(self, y: FloatArray) -> bool:
+        """Return whether a point (6,) is surely a pose of the workspace, and not only of the box rounded outwards."""
+        # Ends of rotations are about 4 roundings outwards; the ball's square as many again.
+        slack = np.array([0.0, 0.0, 0.0, *(8 * _TANGENT * np.abs(self.upper[3:]))])
+        fixed = self.upper == self.lower
+        inside = (y >= self.lower + slack) & (y <= self.upper - slack)
+        return bool((inside | (fixed & (y == self.lower))).all()) and float(y[3:] @ y[3:]) <= self.ball * (
+            1 - 16 * _TANGENT
+        )
+
+    def quaternion(self, y: FloatArray) -> FloatArray:
+        """Return a quaternion (4,) of the rotation at a point (6,), of any size."""
+        a, b, c = (float(each) for each in y[3:])
+        if self.kind is TurnKind.ANY_AXIS:
+            return np.array([1.0, a, b, c])
+        if self.kind is TurnKind.AXIS:
+            return np.concatenate([[1.0], a * self.axis])
+        # The product of the quaternions of yaw, pitch and roll, in this order.
+        return np.array([1 + a * b * c, a - b * c, b + a * c, c - a * b])
+
+    def pose(self, y: FloatArray) -> PoseNumbers:
+        """Return the pose at a point (6,)."""
+        w, x, y_, z = self.quaternion(y) / np.linalg.norm(self.quaternion(y))
+        cross = np.array([[0.0, -z, y_], [z, 0.0, -x], [-y_, x, 0.0]])
+        rotation = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+        axis, angle = axis_angle_from_matrix(rotation)
+        return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
+
+    def coordinates(self, pose: PoseNumbers) -> FloatArray:
+        """Return the point (6,) of a pose, which is one of this box: fixed coordinates are those of the box."""
+        turn = self._turn(pose)
+        y = np.concatenate([pose.position, turn])
+        return np.asarray(np.where(self.lower == self.upper, self.lower, y))
+
+    def _turn(self, pose: PoseNumbers) -> FloatArray:
+        """Return the coordinates (3,) of a pose's rotation."""
+        R = pose.rotation
+        if self.kind is not TurnKind.ROLL_PITCH_YAW:
+            r = np.tan(pose.angle / 2) * pose.axis
+            return np.asarray(r if self.kind is TurnKind.ANY_AXIS else np.array([r @ self.axis, 0.0, 0.0]))
+        pitch = math.asin(min(max(-R[2, 0], -1.0), 1.0))
+        roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
+        # The same rotation has two such triples.
+        other = [math.remainder(each, 2 * math.pi) for each in (roll + math.pi, math.pi - pitch, yaw + math.pi)]
+        both = [np.tan(0.5 * np.array(each)) for each in ((roll, pitch, yaw), other)]
+        return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
+
+    def contracted(self, lower: FloatArray, upper: FloatArray) -> Contracted:
+        """Return boxes (B, 6) with their ends moved to the ball of rotations."""
+        lower, upper = np.array(lower), np.array(upper)
+        if not self.ball < np.inf:
+            return Contracted(lower, upper, np.zeros(len(lower), dtype=bool))
+        low, high = lower[:, 3:], upper[:, 3:]
+        least = np.where(low > 0, low, np.where(high < 0, -high, 0.0)) ** 2
+        whole = least.sum(axis=1, keepdims=True)
+        slack = 4 * _ULP * (self.ball + whole)
+        most = np.sqrt(np.maximum(self.ball - (whole - least) + slack, 0)) * (1 + _ULP)
+        lower[:, 3:], upper[:, 3:] = np.maximum(low, -most), np.minimum(high, most)
+        outside = (whole > self.ball + slack)[:, 0] | (lower > upper).any(axis=1)
+        return Contracted(lower, np.maximum(lower, upper), outside)
+
+    def clipped(self, points: FloatArray) -> FloatArray:
+        """Return points (K, 6) moved into the workspace."""
+        points = np.clip(points, self.lower, self.upper)
+        sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
+        # A little inside, so that rounding leaves no point outside.
+        radius = math.sqrt(self.ball) * (1 - 16 * _TANGENT)
+        if math.isfinite(radius):
+            points[:, 3:] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
+        return np.asarray(points)
+
+    def random(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """Return random points (count, 6) of the workspace, those of rotations within the ball."""
+        points = rng.uniform(self.lower, self.upper, (count, 6))
+        while math.isfinite(self.ball):
+            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self.ball * (1 - 16 * _TANGENT))
+            if not outside.size:
+                break
+            points[outside] = rng.uniform(self.lower, self.upper, (outside.size, 6))
+        return points
+
+
+def pose_box(workspace: Workspace) -> PoseBox:
+    """Return the box of coordinates of a workspace."""
+    ends = [_ends(value) for value in workspace.position]
+    turns, ball = workspace.turns, math.inf
+    if turns.kind is TurnKind.ANY_AXIS:
+        radius = _tangent(max(abs(end) for end in _ends(turns.angles[0])), 1.0)
+        ball = radius * radius * (1 + _TANGENT)
+        ends += [(-radius, radius)] * 3
+    else:
+        angles = [_ends(value) for value in turns.angles]
+        ends += [
+            (_tangent(low, -1.0), _tangent(high, 1.0)) if low < high else (math.tan(low / 2),) * 2
+            for low, high in angles
+        ]
+        ends += [(0.0, 0.0)] * (6 - len(ends))
+    lower, upper = np.array(ends).T
+    return PoseBox(
+        turns.kind, frozen_array(turns.axis, (3,)), frozen_array(lower, (6,)), frozen_array(upper, (6,)), ball
+    )
+
+
+def scaled(workspace: Workspace, factor: float) -> Workspace:
+    """Return a workspace that is larger by a factor about its centre, ranges of angles too."""
+    turns = workspace.turns
+    return replace(
+        workspace,
+        position=tuple(_scaled(value, factor) for value in workspace.position),
+        turns=replace(
+            turns, angles=tuple(_scaled(value, factor, turns.kind is TurnKind.ANY_AXIS) for value in turns.angles)
+        ),
+    )
+
+
+def _scaled(value: Value, factor: float, about_zero: bool = False) -> Value:
+    """Return a range that is larger by a factor about its centre, or about zero."""
+    if not isinstance(value, Free):
+        return value
+    centre = 0.0 if about_zero else (value.lower + value.upper) / 2
+    return Free(centre + factor * (value.lower - centre), centre + factor * (value.upper - centre))
+
+
+def _ends(value: Value) -> tuple[float, float]:
+    """Return the ends of a number: the same twice for a fixed one."""
+    return (value.lower, value.upper) if isinstance(value, Free) else (value, value)
+
+
+def _tangent(angle: float, outwards: float) -> float:
+    """Return the tangent of half an angle, moved up or down by more than its rounding error."""
+    value = math.tan(angle / 2)
+    return value + outwards * _TANGENT * abs(value)

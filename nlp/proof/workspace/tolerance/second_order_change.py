@@ -1,0 +1,136 @@
+"""Bounds of what a first-order change by errors of joint centres leaves out, over a whole workspace.
+
+With g a number of a machine and H its second derivatives by the errors e, on the way from the exact machine
+
+    |g(e) - g(0) - g'(0) e| <= 1/2 sum_jk |H_jk| |e_j| |e_k|,
+
+where H_jk is the block (3, 3) of centres j and k, and |H_jk| its Frobenius norm. The blocks are bounded over boxes of
+poses and all errors within the tolerance; the boxes with the largest bounds are bisected. Centres whose blocks with all
+others are 0, as those of different limbs in F, are bounded apart.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .....models import FloatArray
+from .....models.arrays import first_largest
+from ...enclosure.forms import Encloser
+from ..ranks.covering import in_workspace, whole_workspace
+from ..ranks.loop_boxes import joined
+from ..robot.tolerance_model import Family
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Number of boxes examined at once, and of all boxes.
+_BLOCK, _MOST = 64, 4096
+#: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
+_SHARE, _NEAR = 0.02, 1.2
+#: Part of itself by which a bound moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-9
+#: Operations whose derivatives jump: second derivatives say nothing of the change there.
+_KINKS = (ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LE, ca.OP_LT, ca.OP_IF_ELSE_ZERO)
+
+
+def is_smooth(family: Family, expression: SX) -> bool:
+    """Return whether an expression (1, 1) has no operation whose derivative jumps."""
+    function = ca.Function("number", [family.coordinates], [expression])
+    return not any(function.instruction_id(k) in _KINKS for k in range(function.n_instructions()))
+
+
+def second_order_change(family: Family, expression: SX, first: float, engine: str | None = None) -> float:
+    """Return a bound of the change of an expression beyond first order; infinite where none is found.
+
+    Args:
+        family: the machines; no coordinate of theirs follows from others.
+        expression: (1, 1) in their coordinates, smooth.
+        first: size of the first-order change at some pose, beside which a small bound is good enough.
+        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+    H = ca.hessian(expression, family.errors)[0]
+    groups = _groups(H, len(family.names))
+    return sum((_of_centres(family, H, each, first / len(groups), engine) for each in groups), 0.0)
+
+
+def _groups(H: SX, count: int) -> list[list[int]]:
+    """Return the centres in groups of which the second derivatives (3 m, 3 m) have no entries in common."""
+    rows, columns = (np.array(each, dtype=int) // 3 for each in H.sparsity().get_triplet())
+    group = np.arange(count)
+    for i, j in set(zip(rows.tolist(), columns.tolist(), strict=True)):
+        group[group == group[i]] = group[j]
+    own = {int(group[i]) for i in rows}
+    return [np.flatnonzero(group == each).tolist() for each in sorted(own)]
+
+
+def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine: str | None) -> float:
+    """Return the bound for errors of some centres, whose second derivatives depend on no other errors."""
+    problem = family.problem
+    places = [3 * j + k for j in centres for k in range(3)]
+    own = ca.tril(H[places, places])
+    blocks = _Blocks(own, len(centres))
+    encloser = Encloser(
+        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())]), engine
+    )
+    factor = 0.5 * family.tolerance**2 * _OUTWARDS
+    cells, bounds, middles = whole_workspace(problem), np.array([math.inf]), np.array([0.0])
+    widths = cells.upper - cells.lower
+    whole, done = np.where(widths > 0, widths, np.inf), 0
+    while done < _MOST:
+        worst = int(np.argmax(bounds))
+        if bounds[worst] <= max(_SHARE * first, _NEAR * middles[worst]):
+            break
+        order = np.argsort(-bounds)
+        now, later = cells.some(order[:_BLOCK]), order[_BLOCK:]
+        if done:
+            split, every, middle = (
+                first_largest((now.upper - now.lower) / whole),
+                np.arange(len(now.near)),
+                now.centre,
+            )
+            low, high = now.lower.copy(), now.upper.copy()
+            high[every, split] = low[every, split] = middle[every, split]
+            now = in_workspace(problem, joined([now._replace(upper=high), now._replace(lower=low)]))
+        errors = np.full((len(now.lower), len(places)), family.tolerance)
+        forms = encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
+        with np.errstate(all="ignore"):
+            sizes = np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r
+            found = factor * blocks.sums(sizes)
+        cells = joined([cells.some(later), now])
+        bounds = np.concatenate([bounds[later], np.where(np.isfinite(found), found, np.inf)])
+        middles = np.concatenate([middles[later], np.nan_to_num(factor * blocks.sums(np.abs(forms.c)))])
+        done += len(now.lower)
+    return float(bounds.max(initial=0.0))
+
+
+class _Blocks:
+    """Blocks of centres of a symmetric matrix.
+
+    Args:
+        lower: (3 m, 3 m) its entries in and below the diagonal.
+        count: number m of centres.
+    """
+
+    def __init__(self, lower: SX, count: int) -> None:
+        rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
+        self._block: NDArray[np.int64] = rows // 3 * count + columns // 3
+        # An entry below the diagonal of a block on the diagonal stands for two of this block.
+        self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
+        self._count = count
+
+    def sums(self, sizes: FloatArray) -> FloatArray:
+        """Return the sums (B,) of the norms of all blocks from sizes (B, R) of the entries."""
+        total = np.zeros((len(sizes), self._count**2))
+        for k, block in enumerate(self._block):
+            total[:, block] += self._times[k] * sizes[:, k] ** 2
+        norms = np.sqrt(total).reshape(-1, self._count, self._count)
+        diagonal = np.trace(norms, axis1=1, axis2=2)
+        return np.asarray(2 * norms.sum(axis=(1, 2)) - diagonal)

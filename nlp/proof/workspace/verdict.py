@@ -1,0 +1,54 @@
+"""Verdicts on a workspace: proved, refuted with a pose, or open with what is left."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from ....models import FloatArray
+from ..statement.machine import CentreErrors, JointErrors
+from .robot.pose_box import PoseBox
+
+
+class Outcome(enum.Enum):
+    """Verdict on a claim about every pose; each value is the word in results."""
+
+    PROVED = "proved"
+    REFUTED = "refuted"
+    OPEN = "open"
+
+
+@dataclass(frozen=True, eq=False)
+class Regularity:
+    """Verdict on the claim that J has full rank at every pose.
+
+    Attributes:
+        outcome: the verdict.
+        box: the box of poses.
+        y: (6,) coordinates of a singular pose where the claim is refuted, and of the centre of the widest open box
+            where it is open; None where it is proved.
+        sides: (2, 6) two poses of the workspace at which the determinant of the rows has opposite signs, without
+            rounding, where the claim is refuted so.
+        engine: ``c`` or ``numpy``.
+        boxes: number of boxes examined.
+        open: number of boxes left.
+        share: part of the box's volume, that of its coordinates, in boxes that are left.
+        seconds: wall time.
+        reason: for stopping before every box was closed; else empty.
+        errors: of the joint centres of the machine that is singular at ``y``, where that is not the exact machine; else
+            None.
+        centres: the same for a robot that is not six straight legs.
+    """
+
+    outcome: Outcome
+    box: PoseBox
+    y: FloatArray | None
+    sides: FloatArray | None
+    engine: str
+    boxes: int
+    open: int
+    share: float
+    seconds: float
+    reason: str
+    errors: JointErrors | None = None
+    centres: CentreErrors | None = None
