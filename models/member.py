@@ -153,3 +153,19 @@ def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
             left = left - base * (ca.dot(base, left) / square)
         parts.append(left)
     return ca.horzcat(SX(columns.shape[0], 0), *parts)
+
+
+def resistance(member: Member, twists: SX, length: SX) -> SX:
+    """Return ``P x``, (size, n), of a member for twists (6, n)."""
+    if member.is_pinned:
+        velocities = (scaled_twists(each, member.centre, length, member.size) for each in (member.screws, twists))
+        return resisted_parts(next(velocities), member.rank, next(velocities))
+    # In parts of the length, axes of rotations have the same components in every unit of length, and cancel alike. The
+    # size of a translation means nothing for the span.
+    columns = [
+        ca.vertcat(column[:3] if column[3:].is_zero() else column[:3] / length, column[3:])
+        for column in ca.horzsplit(scaled_twists(member.screws, member.centre, SX(1), member.size))
+    ]
+    vectors = scaled_twists(twists, member.centre, SX(1), member.size)
+    parts = ca.vertcat(vectors[:3, :] / length, vectors[3:, :])
+    return length * resisted_parts(ca.horzcat(SX(6, 0), *columns), member.rank, parts)

@@ -38,7 +38,7 @@ COMPILER = shutil.which("gcc") or shutil.which("cc")
 #: Compiling a copy takes a second.
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler")]
 
-_TEST = "    if (is_contraction((const double(*)[N])B, v)) {\n"
+_TEST = "    if (is_contraction((const double(*)[N])B, robot->length, v)) {\n"
 _KEPT = "double kept_C[N][N], kept_B[N][N];\nWIDE static void examine_box("
 #: Text of the kernel that is replaced so that a copy keeps C and B.
 PROBE = {

@@ -24,6 +24,7 @@
 #define ULP 0x1p-51
 #define TINY 1e-300   /* more than underflow can take from a sum of squares */
 #define POWERS 12     /* steps of the power method, as in regularity.py */
+#define TIE (1 + 1e-6) /* factor up to which sizes are the same, so that rounding chooses no coordinate */
 
 enum { OPEN, REGULAR, OUTSIDE };
 enum { CAYLEY, AXIS, ROLL_PITCH_YAW };
@@ -36,6 +37,7 @@ typedef struct {
     const double *axis;            /* (3) */
     double ball;                   /* largest squared size of a Cayley vector; infinite without a ball */
     double tolerance;              /* largest error of each joint centre */
+    double length;                 /* of the order of the robot's */
 } Robot;
 
 static inline double larger(double a, double b) { return a > b ? a : b; }
@@ -261,11 +263,11 @@ static int invert(const double *A, double out[N][N])
 }
 
 /* Return whether a vector proves that the spectral radius of a nonnegative matrix is below 1; write the vector. */
-static int is_contraction(const double B[N][N], double *v)
+static int is_contraction(const double B[N][N], double length, double *v)
 {
     double w[N];
     for (int i = 0; i < N; i++)
-        v[i] = 1;
+        v[i] = i < 3 ? length : 1;
     for (int step = 0; step < POWERS; step++) {
         double least = INFINITY, most = 0, sum = 0;
         for (int i = 0; i < N; i++) {
@@ -275,7 +277,7 @@ static int is_contraction(const double B[N][N], double *v)
             double ratio = w[i] / v[i];
             if (!(ratio < INFINITY))
                 return 0;
-            least = smaller(least, ratio), most = larger(most, ratio), sum += w[i];
+            least = smaller(least, ratio), most = larger(most, ratio), sum += w[i] / (i < 3 ? length : 1);
         }
         if (most < 1 - 64 * ULP)
             return 1;
@@ -322,8 +324,9 @@ WIDE static void examine_box(const Robot *robot, double *lower, double *upper, i
     for (int k = 0; k < N; k++) {
         c[k] = 0.5 * lower[k] + 0.5 * upper[k];
         h[k] = larger(upper[k] - c[k], c[k] - lower[k]) * (1 + ULP);
-        if (h[k] > widest)
-            widest = h[k], *split = k;
+        double width = h[k] / (k < 3 ? robot->length : 1);
+        if (width > widest * TIE)
+            widest = width, *split = k;
         if (k > 2)
             inside += c[k] * c[k];
     }
@@ -361,7 +364,7 @@ WIDE static void examine_box(const Robot *robot, double *lower, double *upper, i
             B[i][j] = (sum + extra) * (1 + 64 * ULP);
         }
     }
-    if (is_contraction((const double(*)[N])B, v)) {
+    if (is_contraction((const double(*)[N])B, robot->length, v)) {
         *verdict = REGULAR;
         return;
     }
@@ -371,7 +374,7 @@ WIDE static void examine_box(const Robot *robot, double *lower, double *upper, i
         for (int i = 0; i < N; i++)
             for (int j = 0; j < N; j++)
                 sum += fabs(product[i][(k + 1) * N + j]) * v[j] / v[i];
-        if (h[k] * sum > widest)
+        if (h[k] * sum > widest * TIE)
             widest = h[k] * sum, *split = k;
     }
 }
@@ -399,8 +402,8 @@ static PyObject *examine(PyObject *module, PyObject *args)
     void *parts[8];
     int taken = 0, good = 1;
     (void)module;
-    if (!PyArg_ParseTuple(args, "iddnOOOOOOOO", &robot.kind, &robot.ball, &robot.tolerance, &count, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7]))
+    if (!PyArg_ParseTuple(args, "idddnOOOOOOOO", &robot.kind, &robot.ball, &robot.tolerance, &robot.length, &count, &arrays[0], &arrays[1],
+                          &arrays[2], &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7]))
         return NULL;
     Py_ssize_t D = sizeof(double), sizes[8] = {18 * D, 18 * D, 3 * D, count * N * D, count * N * D, count * (Py_ssize_t)sizeof(int),
                                                count * (Py_ssize_t)sizeof(int), count * (Py_ssize_t)sizeof(int)};
@@ -426,7 +429,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyMethodDef methods[] = {
     {"examine", examine, METH_VARARGS,
-     "examine(kind, ball, tolerance, B, base, platform, axis, lower, upper, verdict, split, sign)\n\n"
+     "examine(kind, ball, tolerance, length, B, base, platform, axis, lower, upper, verdict, split, sign)\n\n"
      "Examine B boxes of poses (B, 6) for regular rows; the boxes are contracted in place."},
     {NULL, NULL, 0, NULL},
 };

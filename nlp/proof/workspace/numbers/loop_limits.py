@@ -35,6 +35,8 @@ _BLOCK = 128
 _LEAST_WIDTH = 2.0**-24
 #: Smallest size of a number that gaps are parts of.
 _NEAR_ZERO = 1e-6
+#: Derivative, as a part of the largest, that is rounding error and points to no end of a box.
+_FLAT = 1e-9
 
 
 def loop_extremes(
@@ -167,9 +169,9 @@ class _Search:
         upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
         best = np.argmax(upper, axis=0)
         rows = np.concatenate([np.arange(len(cells.lower)), best])
-        ends = np.concatenate(
-            [np.zeros((len(cells.lower), len(self._independent))), np.sign(slopes[best, np.arange(len(best))])]
-        )
+        own = slopes[best, np.arange(len(best))]
+        own = np.where(np.abs(own) > _FLAT * np.abs(own).max(axis=1, keepdims=True, initial=0.0), own, 0.0)
+        ends = np.concatenate([np.zeros((len(cells.lower), len(self._independent))), np.sign(own)])
         z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
         off, T, _, _ = (each[rows] for each in enclosed.relation)

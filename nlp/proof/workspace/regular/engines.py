@@ -38,7 +38,7 @@ class KernelRankEngine:
 
     def __init__(self, legs: Legs, box: PoseBox, module: ModuleType) -> None:
         self._module = module
-        self._head = CODES[box.kind], box.ball, legs.tolerance
+        self._head = CODES[box.kind], box.ball, legs.tolerance, legs.length
         self._robot = tuple(np.ascontiguousarray(part) for part in (legs.base, legs.platform, box.axis))
 
     def examine(self, lower: FloatArray, upper: FloatArray) -> RankExamination:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
 from ...statement.machine import Legs
 from ..robot.pose_box import PoseBox
 from .rows import FIRST, SECOND, TERMS, expand
@@ -88,15 +89,17 @@ class NumpyRankEngine:
         terms[:, :, 0] += np.einsum("bt,blti->bli", factor[:, squares], terms[:, :, squares])
         verdict = np.where(outside, Rank.OUTSIDE, Rank.OPEN).astype(np.int32)
         C = _inverses(terms[:, :, 0])
+        # Twists and positions have lengths beside angles: in these units nothing depends on the case's unit of length.
+        units = np.repeat([self._legs.length, 1.0], 3)
         with np.errstate(all="ignore"):
             product = (C @ terms.reshape(len(centre), 6, TERMS * 6)).reshape(len(centre), 6, TERMS, 6)
             B = np.abs(product[:, :, 0] - np.eye(6)) + np.abs(C) @ rest
             B += np.einsum("bt,bitj->bij", factor[:, 1:], np.abs(product[:, :, 1:]))
-            proved, v = _contractions(B * (1 + 64 * _ULP))
+            proved, v = _contractions(B * (1 + 64 * _ULP), units)
             verdict[proved & ~outside] = Rank.REGULAR
             spread = half * (np.abs(product[:, :, 1:7]) * v[:, None, None, :] / v[:, :, None, None]).sum(axis=(1, 3))
         known = np.isfinite(spread).all(axis=1)
-        split = np.where(known, np.argmax(np.nan_to_num(spread), axis=1), np.argmax(half, axis=1)).astype(np.int32)
+        split = first_largest(np.where(known[:, None], np.nan_to_num(spread), half / units)).astype(np.int32)
         return RankExamination(verdict, split, sign.astype(np.int32), lower, upper)
 
 
@@ -114,9 +117,14 @@ def _inverses(matrices: FloatArray) -> FloatArray:
         return found
 
 
-def _contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Return which nonnegative matrices (B, 6, 6) are proved to have a spectral radius below 1, and vectors (B, 6)."""
-    v = np.ones(B.shape[:2])
+def _contractions(B: FloatArray, units: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which nonnegative matrices (B, 6, 6) are proved to have a spectral radius below 1, and vectors (B, 6).
+
+    Args:
+        B: the matrices.
+        units: (6,) sizes of the vectors' components.
+    """
+    v = np.broadcast_to(units, B.shape[:2]).copy()
     proved = np.zeros(len(B), dtype=bool)
     active = np.asarray(np.isfinite(B).all(axis=(1, 2)), dtype=bool)
     v[~active] = np.nan
@@ -130,5 +138,5 @@ def _contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
         proved[rows[done]] = True
         active[rows[done | hopeless]] = False
         left = ~(done | hopeless)
-        v[rows[left]] = w[left] / w[left].sum(axis=1, keepdims=True) + 1e-12 * v[rows[left]]
+        v[rows[left]] = w[left] / (w[left] / units).sum(axis=1, keepdims=True) + 1e-12 * v[rows[left]]
     return proved, v

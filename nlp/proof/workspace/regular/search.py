@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models import FloatArray, frozen_array
+from .....models.arrays import first_largest
 from ....interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ...statement.machine import Legs
 from ..robot.pose_box import PoseBox
@@ -179,18 +180,19 @@ class _Search:
     def verdict(self, reason: str) -> Regularity:
         """Return the verdict at this state of the search."""
         outcome, y, left = Outcome.OPEN if reason else Outcome.PROVED, None, self._state.left
+        whole = self._box.upper - self._box.lower
         if self._sides is not None:
             outcome = Outcome.REFUTED
             y = singular_between(self._legs, self._box, *self._sides)
         elif self._built is not None:
             outcome, y = Outcome.REFUTED, self._built.y
         elif left:
-            lower, upper = max(left, key=lambda each: float((each[1] - each[0]).max()))
-            widest = int(np.argmax((upper - lower).max(axis=1)))
+            lower, upper = (np.concatenate(ends) for ends in zip(*left, strict=True))
+            widths = ((upper - lower) / np.where(whole > 0, whole, np.inf)).max(axis=1)
+            widest = int(first_largest(widths))
             y = 0.5 * lower[widest] + 0.5 * upper[widest]
         free = list(self._box.free)
-        whole = (self._box.upper - self._box.lower)[free]
-        share = sum(float(((upper - lower)[:, free] / whole).prod(axis=1).sum()) for lower, upper in left)
+        share = sum(float(((upper - lower)[:, free] / whole[free]).prod(axis=1).sum()) for lower, upper in left)
         return Regularity(
             outcome=outcome,
             box=self._box,

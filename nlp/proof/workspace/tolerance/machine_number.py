@@ -20,6 +20,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
 from ....interruption import one_search, reason_of, reason_to_stop
 from ...enclosure.forms import Forms
 from ..ranks.connected import is_connected
@@ -160,7 +161,7 @@ class _Search:
                 if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
                     return "the boxes that are left are too small to be divided"
                 score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-                split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+                split = first_largest(np.where(width > 0, score, -1.0))
                 following = _State(later.followed_by(self._examined(self._examiner.halves(now, split))), closed)
                 done = following.bounds >= self._target(gap, limit, slack)
                 least = float(following.bounds[done].min(initial=math.inf))
