@@ -43,6 +43,7 @@ typedef struct {
 typedef struct {
     double f, violation, residual; /* recomputed at the point returned */
     const double *multipliers;     /* of its sides, in the order of the quadratic program; in the workspace */
+    const double *g, *rows;        /* the constraints and their gradients there; in the workspace */
     int iterations;
     int is_minimum; /* 0 where f falls, to second order, along the sides that the point lies on */
 } screwsynth_SQP_end;
