@@ -31,10 +31,8 @@ from screwsynth.nlp.embedding.measure import CORTEX_M7
 
 CASES = ("paper-4.1-helical", "paper-4.3", "drilling-spindle", "hexapod-machining", "flight-simulator", "camera-mount")
 FLAGS = ("-std=gnu99", "-O2")
-#: Number of solves of each kind, in rounds by turns, those of a slow case, and those of which instructions are counted.
-SOLVES, ROUNDS = 10_000, 10
-SLOW = {"hexapod-machining": 3_000}
-COUNTED = 200
+#: Rounds by turns in which solves of each kind are run, and number of calls of which instructions are counted.
+ROUNDS, COUNTED = 10, 200
 FUNCTIONS = ("F", "F_gradient", "limits")
 KINDS = ("cold", "task", "warm")
 VERSIONS = ("before", "after")
@@ -141,14 +139,13 @@ int main(int count, char **words) {
 
 
 class Build(NamedTuple):
-    """A case's C of one version, compiled: flash by compiler, seconds of gcc, doubles and ints, stack, instructions."""
+    """A case's C of one version, compiled: flash by compiler, workspaces in bytes, bound of the stack, and stack."""
 
     name: str
     version: str
     folder: Path
     flash: int
     flash_m7: int | None
-    seconds: float
     workspace: int
     bound: int | None
     painted: int
@@ -172,13 +169,11 @@ def compiled(name: str, version: str, checkout: Path | None, root: Path) -> Buil
     text = DRIVER.replace("BIG", prefix.upper()).replace("ID", prefix).replace("CLOCK", "CLOCK_PROCESS_CPUTIME_ID")
     (folder / "driver.c").write_text(text, encoding="utf-8")
     sources = sorted(path.name for path in folder.glob(f"{prefix}*.c"))
-    began = time.perf_counter()
     subprocess.run(["gcc", *FLAGS, "-fcallgraph-info=su", "-c", *sources], cwd=folder, check=True)
-    seconds = time.perf_counter() - began
     objects = [f"{source[:-2]}.o" for source in sources]
     flash = size("size", folder, objects)
     for program in ("driver", "bench"):
-        words = ["gcc", *FLAGS, f"{program}.c", *objects, "-Wl,-z,now", "-lm", "-o", program]
+        words = ["gcc", *FLAGS, "-DRUNS=10000", f"{program}.c", *objects, "-Wl,-z,now", "-lm", "-o", program]
         subprocess.run(words, cwd=folder, check=True)
     flash_m7 = None
     if shutil.which(CORTEX_M7.compilers[0]):
@@ -192,7 +187,7 @@ def compiled(name: str, version: str, checkout: Path | None, root: Path) -> Buil
     # The pointers of a version before are others: its stack is painted only.
     bound = stack_bound(graphs, prefix) if checkout is None else None
     painted = int(output(folder, "./driver", "stack", "0", "0"))
-    return Build(name, version, folder, flash, flash_m7, seconds, 8 * doubles + 4 * ints, bound, painted)
+    return Build(name, version, folder, flash, flash_m7, 8 * doubles + 4 * ints, bound, painted)
 
 
 def size(program: str, folder: Path, objects: list[str]) -> int:
@@ -214,10 +209,9 @@ def instructions(build: Build, function: str, kind: str, count: int) -> float:
     return int(re.findall(r"Collected : (\d+)", done.stderr)[0]) / count
 
 
-def times(builds: list[Build], kind: str) -> list[str]:
+def times(builds: list[Build], kind: str, solves: int) -> list[str]:
     """Return a row of each build: the solves of one kind, in turns."""
-    name = builds[0].name
-    count = SLOW.get(name, SOLVES) // ROUNDS
+    name, count = builds[0].name, solves // ROUNDS
     found: dict[str, list[list[float]]] = {each.version: [] for each in builds}
     for turn in range(ROUNDS):
         for build in builds if turn % 2 else builds[::-1]:
@@ -295,7 +289,7 @@ def worst_of(build: Build) -> str:
 def sizes_of(build: Build) -> str:
     """Return a row of sizes of a build."""
     cells = ["-" if each is None else f"{each / 1e3:.0f}" for each in (build.flash, build.flash_m7)]
-    cells += [f"{build.workspace / 1e3:.1f}", str(build.bound or "-"), str(build.painted), f"{build.seconds:.1f}"]
+    cells += [f"{build.workspace / 1e3:.1f}", str(build.bound or "-"), str(build.painted)]
     return f"| `{build.name}` | {build.version} | {' | '.join(cells)} |"
 
 
@@ -305,6 +299,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--old", type=Path, help="a checkout of the version before")
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
+    parser.add_argument("--solves", type=int, default=10_000, help="solves of each kind whose times are measured")
     parser.add_argument("cases", nargs="*", default=CASES)
     given = parser.parse_args()
     began, tables, made = time.perf_counter(), Tables(), dict[tuple[str, str], Build]()
@@ -320,7 +315,7 @@ def main() -> None:
             made[waiting[done]] = done.result()
             say(began, f"{len(made)} of {len(jobs)}: compiled {' '.join(waiting[done])}")
         order = [(name, version) for name in given.cases for version in VERSIONS if (name, version) in made]
-        tables.begin("case | version | flash kB | on a Cortex-M7 | workspace kB | stack bound | stack | gcc s")
+        tables.begin("case | version | flash kB | on a Cortex-M7 | workspace kB | stack bound | stack")
         for job in order:
             tables.add(sizes_of(made[job]))
         tables.add("", "Thousands of instructions of one call; the last four columns are solves.", "")
@@ -332,7 +327,7 @@ def main() -> None:
         tables.begin("case | version | solves | median | 99.9 % | largest | iterations, mean and largest | OK")
         for name in given.cases:
             for kind in KINDS:
-                tables.add(*times([made[job] for job in order if job[0] == name], kind))
+                tables.add(*times([made[job] for job in order if job[0] == name], kind, given.solves))
                 say(began, f"{name}, {kind}")
         tables.add("", "The worst case by the counts of the header, in this version.", "")
         tables.begin("case | us an iteration | us second derivatives | ms, one point | ms, all | us, slowest of 2,000")
