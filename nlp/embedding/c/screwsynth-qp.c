@@ -26,7 +26,9 @@ static inline double dot(const double *a, const double *b, int n) {
     return sum;
 }
 
-double screwsynth_QP_dot(const double *a, const double *b, int n) { return dot(a, b, n); }
+double screwsynth_QP_dot(const double *a, const double *b, int n) {
+    return dot(a, b, n);
+}
 
 /* Of sides that are not held, the one that d is farthest outside of, where that is farther than `worst`, which is negative;
  * else -1. Sides: n lower bounds, n upper bounds, lower and upper bounds of c rows. `products` takes those of the rows and d. */
