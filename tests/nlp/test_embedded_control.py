@@ -245,5 +245,7 @@ def test_no_function_calls_itself_or_a_later_one() -> None:
             assert not called & set(own[place:]), (end, name)
             # Of the other files, only the earlier ones.
             later = {each for each in called if re.match("screwsynth.*_(S?QP|SCALED)", each)} - set(own) - set(found)
-            assert all(each.endswith(("_limits", "_derivatives", "_curvature", "_curvature_again")) for each in later), (end, later)
+            assert all(
+                each.endswith(("_limits", "_derivatives", "_curvature", "_curvature_again")) for each in later
+            ), (end, later)
         found += own
