@@ -189,7 +189,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c, multipliers, numbers at a point. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 19 * n + 15 * c + 3 * c * n + 1
+    solver_work = work + 5 * n**2 + 18 * n + 15 * c + 3 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,
@@ -223,7 +223,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1, level >= 0),
+        **worst_case_texts(n, c, _SEEDS + 1),
         "measured_macros": f"/* {NOT_MEASURED} */",
         "measured_rows": NOT_MEASURED,
         "solver_work": str(solver_work),
