@@ -333,7 +333,8 @@ def homogenised(jacobian: Matrix, centre: Matrix, length: float) -> tuple[Matrix
 def _resistance(member: Member, twists: SX, length: SX) -> SX:
     """Return ``P x``, (size, n), of a member for twists (6, n)."""
     columns = scaled_twists(member.screws, member.centre, length, member.size)
-    return resisted_parts(columns, member.rank, scaled_twists(twists, member.centre, length, member.size))
+    vectors = scaled_twists(twists, member.centre, length, member.size)
+    return resisted_parts(columns, member.rank, vectors, member.groups)
 
 
 def _row_factor(row: Wrench, length: SX) -> SX:

@@ -122,7 +122,9 @@ def resisting(
         open_columns = []
         for k in actuated:
             column = free.columns.index(k)
-            driven = null.driven(free.platform[:, column], [loop[:, column] for loop in free.loops])
+            driven = null.driven(
+                free.platform[:, column], ca.vertcat(SX(0, 1), *[loop[:, column] for loop in free.loops])
+            )
             open_columns.append(driven.open_loops)
             if not ca.sparsify(driven.screw).is_zero():
                 screws[k][label or limb.name] = driven.screw / rate_sizes[k]

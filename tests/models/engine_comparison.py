@@ -45,16 +45,16 @@ def work(rows: Array) -> Array:
     return np.hstack([rows[:, 3:], rows[:, :3]])
 
 
-def is_regular(engine: Engine) -> bool:
+def is_regular(engine: Engine, regular: float) -> bool:
     """Whether no singular value of the engine's constraints, or of the platform in their null space, is near 0."""
     for locked in (False, True):
         rows = engine.rows(locked=locked)
         values = np.linalg.svd(rows, compute_uv=False)
-        if np.any((values > 1e-11 * values[0]) & (values < REGULAR * values[0])):
+        if np.any((values > 1e-11 * values[0]) & (values < regular * values[0])):
             return False
         motions = null_space(rows)[: engine.model.nv]
         values = np.linalg.svd(engine.motion(engine.mechanism.platform, np.zeros(3)) @ motions, compute_uv=False)
-        if np.any((values > 1e-11) & (values < REGULAR)):
+        if np.any((values > 1e-11) & (values < regular)):
             return False
     return True
 
@@ -186,7 +186,7 @@ def joined(sets: list[set[str]], more: list[set[str]]) -> list[set[str]]:
     return sets
 
 
-def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
+def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -> Differences:
     """Compare a robot's model, and its numbers as a mechanism, with the engine at home and at random configurations.
 
     Raises:
@@ -196,7 +196,7 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
     worst, count = np.zeros(3), 0
     for there in (home, *closed_configurations(home, count=driven)):
         engine = Engine(there)
-        if not is_regular(engine):
+        if not is_regular(engine, regular):
             continue
         count += 1
         free, locked = (engine.platform_twists(locked=each) for each in (False, True))
