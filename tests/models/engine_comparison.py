@@ -17,6 +17,7 @@ from screwsynth.models.mechanism.singularities import closed_configurations
 from screwsynth.nlp import Case, Nlp, Task, evaluate, formulate
 from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.paths import velocities_at
 
 Array = NDArray[np.float64]
 CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
@@ -207,7 +208,7 @@ def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -
         state = evaluate(nlp, x)
         mobility = mobility_of(nlp, x, state)
         assert mobility is not None
-        velocities = nlp.program.kernels.robot_state(x, nlp.arguments).velocities
+        velocities = velocities_at(nlp, x, nlp.program.kernels.robot_state(x, nlp.arguments))
         constraints = constraint_rows(model, velocities, state.position)
         assert mobility.freedoms == free.shape[1], (mobility.freedoms, free.shape[1])
         assert state.rank == 6 - locked.shape[1], (state.rank, locked.shape[1])

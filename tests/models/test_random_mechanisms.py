@@ -152,6 +152,27 @@ def test_dependent_screws_that_nearly_lose_a_rank_keep_their_complement(kind: st
     assert_equal(compare(tables, driven=1, regular=1e-8))
 
 
+def test_loops_at_a_dead_centre_determine_the_rates_that_they_hold() -> None:
+    """A crank and its rod in line hold a foot's motor at home, and with it the hip's: both were not determined."""
+    links = ["base", "thigh", "shin", "heel", "crank", "rod", "platform"]
+    ends = {
+        "hip": ("base", "thigh"),
+        "knee": ("thigh", "shin"),
+        "ankle": ("shin", "heel"),
+        "foot": ("heel", "platform"),
+        "low": ("heel", "crank"),
+        "middle": ("crank", "rod"),
+        "high": ("rod", "platform"),
+    }
+    places = [(0, 1, 0), (0.3, 0.7, 0), (-0.2, 0.4, 0), (0, 0, 0), (0, -0.5, 0), (0.15, -0.2, 0), (0.3, 0.1, 0)]
+    joints = [
+        table(name, "R", between, at, axis="z", actuated=name in ("hip", "foot"))
+        for (name, between), at in zip(ends.items(), places, strict=True)
+    ]
+    tables = {"name": "dead centre", "home": [0.1, -0.2, 0], "links": links, "joint": joints}
+    assert_equal(compare(tables, driven=2))
+
+
 def test_links_that_hang_on_one_joint_leave_a_network_as_it_is() -> None:
     """A member with such a link was left out of F, and of all that follows."""
     tables = random_mechanism(24)
