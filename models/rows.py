@@ -121,4 +121,4 @@ def _rank(columns: FloatArray) -> int:
 def _dependence(columns: FloatArray) -> FloatArray:
     """Return how much columns depend on each other, (n, n): the sizes of the projector on the rows."""
     right = np.linalg.svd(columns, full_matrices=False)[2][: _rank(columns)]
-    return np.abs(right.T @ right)
+    return np.asarray(np.abs(right.T @ right))
