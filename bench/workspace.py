@@ -54,7 +54,9 @@ def by_angle(case: Case) -> None:
                 best = math.inf
                 for _ in range(5):
                     began = time.process_time()
-                    found = judge_workspace(replace(case, workspace=workspace), engine=engine, with_limits=False).regularity
+                    found = judge_workspace(
+                        replace(case, workspace=workspace), engine=engine, with_limits=False
+                    ).regularity
                     best = min(best, time.process_time() - began)
                 cells.append(f"{engine} {found.outcome.value} {found.boxes:,} boxes {1e3 * best:.1f} ms")
             print(f"{kind.value}, {degrees} deg: {'; '.join(cells)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,7 +26,8 @@ class BoxSearch(BoundedSearch[Boxes]):
 
     Args:
         form: the form.
-        engine: examines boxes.
+        engine: returns the engine that examines boxes. It takes seconds for long expressions, and so is built by the
+            first step, which can be stopped.
         incumbent: the best point known, which the search improves.
         recorder: records the search's tree for a proof.
 
@@ -36,23 +38,30 @@ class BoxSearch(BoundedSearch[Boxes]):
     """
 
     def __init__(
-        self, form: StandardForm, engine: Engine, incumbent: PointKeeper, recorder: ProofWriter | None = None
+        self,
+        form: StandardForm,
+        engine: Callable[[], Engine],
+        incumbent: PointKeeper,
+        recorder: ProofWriter | None = None,
     ) -> None:
         self.form, self.incumbent = form, incumbent
-        self._engine, self._recorder = engine, recorder
+        self._build, self._recorder = engine, recorder
+        self._engine: Engine | None = None
         self._nodes = 1
         root = np.zeros(1, dtype=np.int64)
         super().__init__(Boxes(form.lower[:, None], form.upper[:, None], np.array([np.inf]), root))
 
     def close(self) -> None:
         """Stop the engine."""
-        self._engine.close()
+        if self._engine is not None:
+            self._engine.close()
 
     def _step(self, threshold: float) -> None:
         """Examine a block of boxes, and close those whose bounds do not exceed a threshold."""
-        boxes = self._opened.pop(self._engine.block if self._turn else 1)
+        engine = self._engine = self._engine or self._build()
+        boxes = self._opened.pop(engine.block if self._turn else 1)
         self._turn += 1
-        found = self._engine.examine(boxes.lower, boxes.upper, threshold)
+        found = engine.examine(boxes.lower, boxes.upper, threshold)
         self._improve(found)
         self._branch(boxes, found, threshold)
 

@@ -14,13 +14,14 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
-from ...interruption import Milestone, reached, reason_of, reason_to_stop
+from ...interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ...program.nlp import Nlp
 from ..boxes.engines import engine_for
 from ..boxes.incumbent import Incumbent, IncumbentError
@@ -84,36 +85,39 @@ def certify_program(
         UncoveredError: an expression holds an operation without a rule.
         ValueError: ``above`` for a maximisation, or an engine that does not exist here.
     """
-    began = time.perf_counter()
     if above is not None and nlp.sense is not Sense.MIN:
         raise ValueError("above is proved by minimising: the program's sense must be min")
-    if nlp.n == 0:
-        return _certify_point(nlp, above, time.perf_counter() - began)
-    form = standard_form(nlp)
-    incumbent = Incumbent(form)
-    method = _method(form, incumbent, engine, jobs, recorder)
-    search = _Search(form, incumbent, method, engine_name(engine), gap, above, began)
-    try:
-        search.incumbent.start(x, claimed)
-    except IncumbentError as error:
-        return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    search.first_value = incumbent.value
+    with one_search(time_limit):
+        began = time.perf_counter()
+        if nlp.n == 0:
+            return _certify_point(nlp, above, time.perf_counter() - began)
+        form = standard_form(nlp)
+        incumbent = Incumbent(form)
+        # The method in use takes the place of this one: what it sets up can be stopped.
+        whole = BoxSearch(form, partial(engine_for, form, engine, jobs), incumbent)
+        search = _Search(form, incumbent, whole, engine_name(engine), gap, above, began)
+        try:
+            search.incumbent.start(x, claimed)
+        except IncumbentError as error:
+            return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
 
-    def run() -> str:
-        reason = search.run(time_limit, progress)
-        while not reason and search.is_short():
+        def run() -> str:
+            reason = reason_to_stop(time.perf_counter() - began)
+            while not reason:
+                search.restart(_method(form, incumbent, engine, jobs, recorder))
+                reason = search.run(progress)
+                if reason or not search.is_short():
+                    break
+                search.method.close()
+                if recorder is not None:
+                    recorder.clear()
+            return reason
+
+        try:
+            reason = reason_of(run)
+        finally:
             search.method.close()
-            if recorder is not None:
-                recorder.clear()
-            search.restart(_method(form, incumbent, engine, jobs, recorder))
-            reason = search.run(time_limit, progress)
-        return reason
-
-    try:
-        reason = reason_of(run)
-    finally:
-        search.method.close()
-    return search.certificate(reason)
+        return search.certificate(reason)
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -146,7 +150,8 @@ def _method(
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return BoxSearch(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
+        build = partial(engine_for, form, engine, jobs, tangents=recorder is None)
+        return BoxSearch(form, build, incumbent, recorder)
     return SharedSearch(form, separation, incumbent, engine, jobs, recorder)
 
 
@@ -263,7 +268,7 @@ class _Search:
             return self.bound < -self.above
         return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
 
-    def run(self, time_limit: float | None, progress: CertifyProgress | None) -> str:
+    def run(self, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
@@ -271,7 +276,7 @@ class _Search:
             if self._has_counterexample():
                 return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
             seconds = time.perf_counter() - self.began
-            reason = reason_to_stop(seconds, time_limit)
+            reason = reason_to_stop(seconds)
             if reason:
                 return reason
             if seconds - reported >= _REPORT_EVERY:

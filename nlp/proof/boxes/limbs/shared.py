@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ...enclosure.first_order import midpoints
 from ...enclosure.quadratic_models import GradientModel, ranges
 from ..bounding import NumpyEngine
@@ -25,7 +26,7 @@ from .boxes import OwnBoxes, SharedBoxes
 from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
 from .models import LimbEngine, LimbModels
 from .record import SharedRecord
-from .sums import LimbBound, bound_limb, first_largest, with_tilts
+from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -187,7 +188,7 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         J = 1
         error = sums.common.value.c + sums.common.value.s
         values = np.where((error[J:] <= 0).all(axis=0), sums.common.value.c[0] - sums.common.value.s[0], -np.inf)
-        places = [first_largest(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
+        places = [first_largest_of_lists(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
         for each, place in zip(sums.models, places, strict=True):
             values = values + each.value[place]
         values = np.where(np.isnan(values), -np.inf, values)
@@ -241,10 +242,10 @@ class SharedSearch(BoundedSearch[SharedBoxes]):
         if self._record is not None:
             emptied = sizes == 0
             self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
-            self._record.bisect(boxes, np.where(cut, change.argmax(axis=0), -1))
+            self._record.bisect(boxes, np.where(cut, first_largest(change.T), -1))
         if cut.any():
             places = np.flatnonzero(cut)
-            self._opened.push(rest.select(places).bisect(change.argmax(axis=0)[places]))
+            self._opened.push(rest.select(places).bisect(first_largest(change.T)[places]))
         if refine.any():
             own = tuple(_refined(each, spread[k] >= _SPREAD * spread.max(axis=0)) for k, each in enumerate(lists))
             refined = SharedBoxes(lower, upper, sums.bound, own, good)

@@ -261,7 +261,7 @@ static void turn_columns(int rows, int c, RankParts x, int is_meant)
     int axis = 0;
     for (int i = 0; i < c; i++) {
         x.t[i] = is_meant ? x.w[i] : 0.0, size += x.t[i] * x.t[i];
-        axis = fabs(x.t[i]) > fabs(x.t[axis]) ? i : axis;
+        axis = fabs(x.t[i]) > fabs(x.t[axis]) * (1 + TIE) ? i : axis;
     }
     if (!(size > 0))
         return;

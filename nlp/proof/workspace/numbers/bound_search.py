@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from .....models import FloatArray
-from ....interruption import reason_of, reason_to_stop
+from .....models.arrays import first_largest
+from ....interruption import one_search, reason_of, reason_to_stop
 from ..robot.pose_box import PoseBox
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
 _SHRINK = 0.7
 _SEED = 0
+#: Part of itself by which a value may be off by rounding: the first of several that are the same is taken.
+_TIE = 1e-11
 
 
 class Bounds(NamedTuple):
@@ -78,7 +80,6 @@ def prove_minimum(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     recorder: TreeRecord | None = None,
 ) -> Minimum:
     """Prove the smallest value of a function over a box of poses.
@@ -91,7 +92,6 @@ def prove_minimum(
             while no value below it is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
     began = time.perf_counter()
@@ -103,13 +103,15 @@ def prove_minimum(
     def run() -> str:
         nonlocal state
         while len(state.bounds.lower) and state.least < _target(state.value, gap, limit, slack):
-            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
+            reason = reason_to_stop(time.perf_counter() - began)
             if reason:
                 return reason
             state = _after_step(state, oracle, box, gap, limit, slack, recorder)
         return ""
 
-    reason, count = reason_of(run), len(state.bounds.lower)
+    with one_search(time_limit):
+        reason = reason_of(run)
+    count = len(state.bounds.lower)
     least = min(state.least, state.value)
     return Minimum(least, state.value, state.y, state.boxes, count, time.perf_counter() - began, reason)
 
@@ -145,7 +147,7 @@ def _after_step(
     order = np.argpartition(bound, min(_BLOCK, len(bound)) - 1)
     now, later = order[:_BLOCK], order[_BLOCK:]
     part_lower, part_upper, parents = lower[now], upper[now], bound[now]
-    split = np.argmax(np.where(part_upper > part_lower, shares[now], -1.0), axis=1)
+    split = first_largest(np.where(part_upper > part_lower, shares[now], -1.0))
     every = np.arange(len(now))
     middle = 0.5 * part_lower[every, split] + 0.5 * part_upper[every, split]
     left, right = part_upper.copy(), part_lower.copy()
@@ -161,8 +163,9 @@ def _after_step(
     found = np.fmax(at.lower, np.concatenate([parents, parents])[kept])
     centres = box.clipped(0.5 * new_lower + 0.5 * new_upper)
     values = oracle.values(centres)
-    if len(values) and float(np.nanmin(values)) < value:
-        y, value = centres[int(np.nanargmin(values))], float(np.nanmin(values))
+    if len(values) and is_smaller(float(np.nanmin(values)), value):
+        best = first_smallest(values)
+        y, value = centres[best], float(values[best])
     done = found >= max(value - gap, _target(value, gap, limit, slack))
     return _State(
         np.concatenate([lower[later], new_lower[~done]]),
@@ -173,6 +176,17 @@ def _after_step(
         value,
         boxes + len(found),
     )
+
+
+def is_smaller(value: float, known: float) -> bool:
+    """Return whether a value is smaller than a known one by more than rounding."""
+    return value < (known - _TIE * abs(known) if math.isfinite(known) else known)
+
+
+def first_smallest(values: FloatArray) -> int:
+    """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
+    least = float(np.nanmin(values))
+    return int(np.argmax(values <= least + _TIE * abs(least)))
 
 
 def _target(value: float, gap: float, limit: float | None, slack: float) -> float:
@@ -187,13 +201,13 @@ def _good_point(oracle: Oracle, box: PoseBox) -> tuple[FloatArray, float]:
     rng = np.random.default_rng(_SEED)
     points = np.concatenate([box.random(_POINTS, rng), _corners(box)])
     values = oracle.values(points)
-    best = int(np.nanargmin(values))
+    best = first_smallest(values)
     y, value, step = points[best], float(values[best]), 0.3
     for _ in range(_STEPS):
         around = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
         values = oracle.values(around)
-        best = int(np.nanargmin(values))
-        if values[best] < value:
+        best = first_smallest(values)
+        if is_smaller(float(values[best]), value):
             y, value = around[best], float(values[best])
         else:
             step *= _SHRINK

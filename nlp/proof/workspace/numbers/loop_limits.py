@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from .....models import FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....errors import UncoveredError
-from ....interruption import reason_of, reason_to_stop
+from ....interruption import one_search, reason_of, reason_to_stop
 from ..ranks.connected import is_connected
 from ..ranks.covering import coordinates_to_split, in_workspace, whole_workspace, widths_of
 from ..ranks.loop_boxes import Cells, Examiner, are_between, joined
@@ -36,6 +35,8 @@ _BLOCK = 128
 _LEAST_WIDTH = 2.0**-24
 #: Smallest size of a number that gaps are parts of.
 _NEAR_ZERO = 1e-6
+#: Derivative, as a part of the largest, that is rounding error and points to no end of a box.
+_FLAT = 1e-9
 
 
 def loop_extremes(
@@ -44,8 +45,6 @@ def loop_extremes(
     box: PoseBox,
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
 ) -> list[Extreme]:
     """Return the extremes of numbers with a limit, in the assembly of home; none of a robot without open loops.
 
@@ -54,20 +53,19 @@ def loop_extremes(
         closed: its robot without unknowns in closed form.
         box: the poses.
         gap: allowed distance of a bound from a value beyond its limit, as a part of the value.
-        time_limit: seconds after which the search stops.
-        interrupted: whether the work is requested to stop.
     """
     if not closed.model.unknowns:
         return []
-    try:
-        problem = build_problem(case, closed.model, box)
-        values = LimitValues(case, closed, problem)
-        if not values.claims:
+    with one_search():
+        try:
+            problem = build_problem(case, closed.model, box)
+            values = LimitValues(case, closed, problem)
+            if not values.claims:
+                return []
+            search = _Search(problem, values, gap)
+        except (NotJudgedError, UncoveredError):
             return []
-        search = _Search(problem, values, gap)
-    except (NotJudgedError, UncoveredError):
-        return []
-    return search.run(time_limit, interrupted)
+        return search.run()
 
 
 class _Best(NamedTuple):
@@ -90,19 +88,19 @@ class _Search:
         self._boxes = 0
         self._roots: list[Cells] = []
 
-    def run(self, time_limit: float | None, interrupted: Callable[[], bool]) -> list[Extreme]:
+    def run(self) -> list[Extreme]:
         """Search until every claim is decided, or the time is over."""
         began = time.perf_counter()
-        reason = reason_of(lambda: self._run(began, time_limit, interrupted))
+        reason = reason_of(lambda: self._run(began))
         return self._extremes(reason, time.perf_counter() - began)
 
-    def _run(self, began: float, time_limit: float | None, interrupted: Callable[[], bool]) -> str:
+    def _run(self, began: float) -> str:
         """Search until no box is left; return the reason for stopping earlier, or an empty text."""
         problem, start = self._problem, whole_workspace(self._problem)
         whole = (start.upper - start.lower)[0, self._independent]
         stack = [start]
         while stack:
-            reason = reason_to_stop(time.perf_counter() - began, time_limit, interrupted)
+            reason = reason_to_stop(time.perf_counter() - began)
             if reason:
                 return reason
             cells = stack.pop()
@@ -171,9 +169,9 @@ class _Search:
         upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
         best = np.argmax(upper, axis=0)
         rows = np.concatenate([np.arange(len(cells.lower)), best])
-        ends = np.concatenate(
-            [np.zeros((len(cells.lower), len(self._independent))), np.sign(slopes[best, np.arange(len(best))])]
-        )
+        own = slopes[best, np.arange(len(best))]
+        own = np.where(np.abs(own) > _FLAT * np.abs(own).max(axis=1, keepdims=True, initial=0.0), own, 0.0)
+        ends = np.concatenate([np.zeros((len(cells.lower), len(self._independent))), np.sign(own)])
         z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
         off, T, _, _ = (each[rows] for each in enclosed.relation)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ..robot.posed_robot import Problem
 from .loop_boxes import Cells
 
@@ -42,7 +43,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
     score[flat] = width[flat]
     # A coordinate that counts for little is divided where it is much wider than all others.
     score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
-    return np.asarray(np.argmax(score, axis=1))
+    return first_largest(score)
 
 
 class Contracted(NamedTuple):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from ....interruption import Milestone, reached, reason_of, reason_to_stop
+from ....interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
@@ -64,8 +64,9 @@ def prove_rank(
         UncoveredError: an expression holds an operation without a rule.
     """
     refuter = NewtonRefuter(problem, matrix, family) if refuter is None else refuter
-    search = _Search(problem, matrix, family, engine, recorder, refuter)
-    return search.verdict(reason_of(lambda: search.run(time_limit, most_boxes, progress)))
+    with one_search(time_limit):
+        search = _Search(problem, matrix, family, engine, recorder, refuter)
+        return search.verdict(reason_of(lambda: search.run(most_boxes, progress)))
 
 
 class _State(NamedTuple):
@@ -108,14 +109,14 @@ class _Search:
         self._roots: list[Cells] = []
         self._singular: Singular | None = None
 
-    def run(self, time_limit: float | None, most_boxes: int | None, progress: RankProgress | None) -> str:
+    def run(self, most_boxes: int | None, progress: RankProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""
         reported = -math.inf
         reached(Milestone.BOUND)
         while self._state.stack:
             (*stack, cells), small, boxes = self._state
             seconds = time.perf_counter() - self._began
-            reason = reason_to_stop(seconds, time_limit, boxes=boxes, most_boxes=most_boxes)
+            reason = reason_to_stop(seconds, boxes, most_boxes)
             if reason:
                 return reason
             if progress is not None and seconds - reported >= REPORT_EVERY:

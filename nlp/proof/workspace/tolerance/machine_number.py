@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,7 +20,8 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
-from ....interruption import reason_of, reason_to_stop
+from .....models.arrays import first_largest
+from ....interruption import one_search, reason_of, reason_to_stop
 from ...enclosure.forms import Forms
 from ..ranks.connected import is_connected
 from ..ranks.covering import in_workspace, whole_workspace, widths_of
@@ -98,7 +98,6 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     engine: str | None = None,
 ) -> MachineMinimum:
     """Prove the smallest value of an expression over all machines and poses.
@@ -110,14 +109,13 @@ def smallest_of_machines(
         limit: the search ends once the bound is at least this, or a smaller value is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    search = _Search(family, expression, engine)
-    return search.run(gap, limit, slack, time_limit, interrupted)
+    with one_search(time_limit):
+        return _Search(family, expression, engine).run(gap, limit, slack)
 
 
 class _State(NamedTuple):
@@ -147,9 +145,7 @@ class _Search:
         self._boxes = 0
         self._state = _State(self._examined(whole), math.inf)
 
-    def run(
-        self, gap: float, limit: float | None, slack: float, time_limit: float | None, interrupted: Callable[[], bool]
-    ) -> MachineMinimum:
+    def run(self, gap: float, limit: float | None, slack: float) -> MachineMinimum:
         """Search until the gap is met and the limit decided."""
 
         def run() -> str:
@@ -157,7 +153,7 @@ class _Search:
                 (found, closed), bounds = self._state, self._state.bounds
                 if min(closed, float(bounds.min())) >= self._target(gap, limit, slack):
                     break
-                reason = reason_to_stop(time.perf_counter() - self._began, time_limit, interrupted)
+                reason = reason_to_stop(time.perf_counter() - self._began)
                 if reason:
                     return reason
                 order = np.argpartition(bounds, min(_BLOCK, len(bounds)) - 1)
@@ -166,7 +162,7 @@ class _Search:
                 if (width.max(axis=1, initial=0.0) < _LEAST_WIDTH).any():
                     return "the boxes that are left are too small to be divided"
                 score = now.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-                split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+                split = first_largest(np.where(width > 0, score, -1.0))
                 following = _State(later.followed_by(self._examined(self._examiner.halves(now, split))), closed)
                 done = following.bounds >= self._target(gap, limit, slack)
                 least = float(following.bounds[done].min(initial=math.inf))

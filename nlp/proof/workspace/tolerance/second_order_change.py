@@ -19,6 +19,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
 from ...enclosure.forms import Encloser
 from ..ranks.covering import in_workspace, whole_workspace
 from ..ranks.loop_boxes import joined
@@ -91,7 +92,7 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine:
         now, later = cells.some(order[:_BLOCK]), order[_BLOCK:]
         if done:
             split, every, middle = (
-                np.argmax((now.upper - now.lower) / whole, axis=1),
+                first_largest((now.upper - now.lower) / whole),
                 np.arange(len(now.near)),
                 now.centre,
             )
