@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ...interruption import Milestone, is_requested, reached, reason_of, reason_to_stop
+from ...interruption import Milestone, one_search, reached, reason_of, reason_to_stop
 from .rows import SMALL, WHOLE, Boxes, Columns, bisected, joined, some
 
 if TYPE_CHECKING:
@@ -307,14 +307,12 @@ class Effort:
     Attributes:
         time_limit: seconds after which a search stops.
         most_boxes: number of boxes after which it stops.
-        interrupted: whether the work is requested to stop.
         progress: called with the seconds, about ten times a second.
         began: time at the start.
     """
 
     time_limit: float | None = None
     most_boxes: int | None = None
-    interrupted: Callable[[], bool] = is_requested
     progress: Callable[[float], None] | None = None
     began: float = field(default_factory=lambda: time.perf_counter())  # noqa: PLW0108 - tests have a clock of their own
 
@@ -333,7 +331,8 @@ class Effort:
             ending: returns the reason for ending, which is empty where the claim is decided; None for going on.
             target: returns the bound up to which boxes may be closed.
         """
-        return reason_of(lambda: self._run(search, ending, target))
+        with one_search(self.time_limit):
+            return reason_of(lambda: self._run(search, ending, target))
 
     def _run(self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
         """Run a search that may be interrupted."""
@@ -344,7 +343,7 @@ class Effort:
             if ended is not None or not search.is_open:
                 return ended or ""
             seconds = self.seconds
-            reason = reason_to_stop(seconds, self.time_limit, self.interrupted, search.boxes, self.most_boxes)
+            reason = reason_to_stop(seconds, search.boxes, self.most_boxes)
             if reason:
                 return reason
             if self.progress is not None and seconds - reported >= _REPORT_EVERY:

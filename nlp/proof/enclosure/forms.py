@@ -55,7 +55,9 @@ class Enclosures:
     hi: FloatArray
 
 
-def enclose(tape: Tape, lower: FloatArray, upper: FloatArray, module: ModuleType | None = None) -> Enclosures:
+def enclose(
+    tape: Tape, lower: FloatArray, upper: FloatArray, module: ModuleType | None = None, order: int = 1
+) -> Enclosures:
     """Return enclosures of a tape's results over boxes.
 
     Args:
@@ -63,12 +65,13 @@ def enclose(tape: Tape, lower: FloatArray, upper: FloatArray, module: ModuleType
         lower: (n, B) lower ends of the boxes.
         upper: (n, B) upper ends of the boxes.
         module: the C kernel, where it is known already.
+        order: of the forms; with 2, ``a`` has coefficients of pairs of variables too, and ``[p, q]`` what is left.
     """
     n, count = lower.shape
     c, p, q, s, lo, hi = (np.empty((tape.outputs, count)) for _ in range(6))
-    a = np.empty((tape.outputs, n, count))
+    a = np.empty((tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
     ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-    (module or kernel()).enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count)
+    (module or kernel()).enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count, order)
     return Enclosures(c, a, p, q, s, lo, hi)
 
 
@@ -90,6 +93,22 @@ class Forms(NamedTuple):
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
 
 
+class SecondForms(NamedTuple):
+    """R expressions over B boxes, with ``Q_ij e_i e_j`` for each pair i <= j, row by row.
+
+    Attributes:
+        c: (B, R) values at the centres, and middles of the terms of higher order.
+        a: (B, R, n) linear parts.
+        Q: (B, R, n (n + 1) / 2) terms of second order.
+        r: (B, R) bounds of the rest; infinite where a value may be undefined.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    Q: FloatArray
+    r: FloatArray
+
+
 class Encloser:
     """Forms of expressions.
 
@@ -109,6 +128,12 @@ class Encloser:
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms over boxes with ends (n, B)."""
         return forms_of(enclose(self.tape, lower, upper, self.module))
+
+    def second(self, lower: FloatArray, upper: FloatArray) -> SecondForms:
+        """Return the forms of second order over boxes with ends (n, B)."""
+        n = len(lower)
+        c, terms, r = forms_of(enclose(self.tape, lower, upper, self.module, 2))
+        return SecondForms(c, terms[:, :, :n], terms[:, :, n:], r)
 
 
 def forms_of(found: Enclosures) -> Forms:

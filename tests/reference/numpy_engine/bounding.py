@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
+from screwsynth.models.arrays import first_largest
 from screwsynth.nlp.proof.boxes.examination import COLLAPSED, UNMOVED, Examination, Verdict
 from screwsynth.nlp.proof.boxes.tapes import objective_tape, search_tape, value_tape, without_conditions
 from screwsynth.nlp.proof.enclosure.intervals import Midpoints, midpoints
@@ -303,7 +304,7 @@ class NumpyEngine:
         # Where nothing changes, the longest side.
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(left.upper > left.lower)] = -1.0
-        return np.asarray(score.argmax(axis=0), dtype=np.int32)
+        return first_largest(score.T).astype(np.int32)
 
 
 def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> None:

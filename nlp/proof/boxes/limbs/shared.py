@@ -26,7 +26,7 @@ from .common import CommonPart
 from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
 from .models import LimbModels
 from .record import SharedRecord
-from .sums import LimbBound, bound_limb, first_largest, with_tilts
+from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -192,7 +192,7 @@ class SharedRule(Rule[SharedColumns]):
         J = 1
         error = sums.common.value.c + sums.common.value.s
         values = np.where((error[J:] <= 0).all(axis=0), sums.common.value.c[0] - sums.common.value.s[0], -np.inf)
-        places = [first_largest(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
+        places = [first_largest_of_lists(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
         for each, place in zip(sums.models, places, strict=True):
             values = values + each.value[place]
         values = np.where(np.isnan(values), -np.inf, values)

@@ -9,7 +9,6 @@ beyond this value by more than the gap.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +34,8 @@ _BLOCK = 128
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Smallest size of a number that gaps are parts of.
 _NEAR_ZERO = 1e-6
+#: Derivative, as a part of the largest, that is rounding error and points to no end of a box.
+_FLAT = 1e-9
 
 
 def loop_extremes(
@@ -43,8 +44,6 @@ def loop_extremes(
     box: PoseBox,
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
 ) -> list[Extreme]:
     """Return the extremes of numbers with a limit, in the assembly of home; none of a robot without open loops.
 
@@ -53,8 +52,6 @@ def loop_extremes(
         closed: its robot without unknowns in closed form.
         box: the poses.
         gap: allowed distance of a bound from a value beyond its limit, as a part of the value.
-        time_limit: seconds after which the search stops.
-        interrupted: whether the work is requested to stop.
     """
     if not closed.model.unknowns:
         return []
@@ -73,7 +70,7 @@ def loop_extremes(
             return TOO_SMALL
         return None if search.is_open or rule.is_one_assembly() else APART
 
-    effort = Effort(time_limit, interrupted=interrupted)
+    effort = Effort()
     reason = effort.run(search, ending)
     return rule.extremes(reason, search.boxes, effort.seconds)
 
@@ -140,9 +137,9 @@ class _LimitsRule(LoopRule):
         upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
         best = np.argmax(upper, axis=0)
         rows = np.concatenate([np.arange(len(cells.lower)), best])
-        ends = np.concatenate(
-            [np.zeros((len(cells.lower), len(self._independent))), np.sign(slopes[best, np.arange(len(best))])]
-        )
+        own = slopes[best, np.arange(len(best))]
+        own = np.where(np.abs(own) > _FLAT * np.abs(own).max(axis=1, keepdims=True, initial=0.0), own, 0.0)
+        ends = np.concatenate([np.zeros((len(cells.lower), len(self._independent))), np.sign(own)])
         z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
         off, T, _, _ = (each[rows] for each in enclosed.relation)

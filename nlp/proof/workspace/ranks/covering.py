@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .....models import FloatArray
+from .....models.arrays import first_largest
 
 #: Reason for which nothing is claimed although every box is closed.
 APART = "the assemblies in two neighbouring boxes are not proved to be the same"
@@ -44,7 +45,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
     score[flat] = width[flat]
     # A coordinate that counts for little is divided where it is much wider than all others.
     score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
-    return np.asarray(np.argmax(score, axis=1))
+    return first_largest(score)
 
 
 class Contracted(NamedTuple):

@@ -12,7 +12,6 @@ first; errors never are. Values are those of machines whose errors are along the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,7 +94,6 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
 ) -> MachineMinimum:
     """Prove the smallest value of an expression over all machines and poses.
 
@@ -106,12 +104,11 @@ def smallest_of_machines(
         limit: the search ends once the bound is at least this, or a smaller value is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    effort = Effort(time_limit, interrupted=interrupted)
+    effort = Effort(time_limit)
     rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
     search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
     reason = effort.run(search, rule.ending(search))
